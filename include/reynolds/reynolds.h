@@ -1,0 +1,198 @@
+/* reynolds.h: the whole public C API of Reynolds, physics-based differentiable rendering.
+ *
+ * Compiles alone as C99, C11 and C++17. Every function that can fail returns a rey_result; the message
+ * (file, line, value, allowed range) stays in the context until the next failure. The library never prints,
+ * aborts or exits. A context may be used by one thread at a time; different contexts are independent.
+ *
+ * Images are float32, linear sRGB, row major from the top left: image[(y * width + x) * 3 + channel]. */
+#ifndef REYNOLDS_H
+#define REYNOLDS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define REY_VERSION_MAJOR 0
+#define REY_VERSION_MINOR 1
+#define REY_VERSION_PATCH 0
+#define REY_VERSION "0.1.0"
+
+#if defined(__GNUC__)
+#define REY_API __attribute__((visibility("default")))
+#else
+#define REY_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Result codes: name and text. */
+#define REY_RESULTS(R)                                                                   \
+    R(REY_OK, "success")                                                                 \
+    R(REY_ERROR_ARGUMENT, "invalid argument")                                            \
+    R(REY_ERROR_MEMORY, "out of memory")                                                 \
+    R(REY_ERROR_IO, "cannot read or write a file")                                       \
+    R(REY_ERROR_FORMAT, "malformed file")                                                \
+    R(REY_ERROR_SCENE, "invalid scene description")                                      \
+    R(REY_ERROR_UNSUPPORTED, "not supported")                                            \
+    R(REY_ERROR_PARAM, "unknown or invalid parameter")                                   \
+    R(REY_ERROR_INCOMPLETE, "the gradient would be incomplete")                          \
+    R(REY_ERROR_CANCELLED, "cancelled")
+
+typedef enum rey_result {
+#define REY_RESULT_ENUM(name, text) name,
+    REY_RESULTS(REY_RESULT_ENUM)
+#undef REY_RESULT_ENUM
+    REY_RESULT_COUNT
+} rey_result;
+
+typedef struct rey_context rey_context;
+typedef struct rey_scene rey_scene;
+
+/* ---- context ------------------------------------------------------------------------------------------- */
+
+typedef struct rey_context_def {
+    size_t size;     /* sizeof(rey_context_def), set by rey_default_context_def */
+    int threads;     /* worker threads, 0 (default) = as many as the affinity mask and cgroup quota allow */
+    int lanes;       /* SIMD width of the kernels: 1, 8, 16; 0 (default) = the widest this machine runs */
+    void *(*alloc)(void *user, size_t bytes, size_t alignment); /* default: the C library's */
+    void (*release)(void *user, void *memory);                  /* frees what alloc returned */
+    void *user;                                                 /* passed to alloc and release */
+} rey_context_def;
+
+REY_API rey_context_def rey_default_context_def(void);
+
+/* Creates a context. def may be null for the defaults. The caller owns *out and destroys it after its scenes. */
+REY_API rey_result rey_context_create(const rey_context_def *def, rey_context **out);
+REY_API void rey_context_destroy(rey_context *ctx);
+
+/* The last failure's message. Never null; valid until the next failing call on this context. */
+REY_API const char *rey_error(const rey_context *ctx);
+REY_API const char *rey_result_text(rey_result result);
+REY_API const char *rey_version(void);
+REY_API int rey_threads(const rey_context *ctx); /* worker threads in use */
+REY_API int rey_lanes(const rey_context *ctx);   /* SIMD width in use */
+
+/* ---- scene --------------------------------------------------------------------------------------------- */
+
+typedef struct rey_define { /* one $name substitution, like -D name=value on the command line */
+    const char *name;
+    const char *value;
+} rey_define;
+
+/* Loads a Mitsuba 3 XML scene. The caller owns *out; it must be destroyed before the context. */
+REY_API rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines,
+                                  int define_count, rey_scene **out);
+REY_API void rey_scene_destroy(rey_scene *scene);
+
+/* Writes the scene back with its current parameter values: path is the XML file, data files (.exr, .ply, .obj) go
+ * beside it into a folder named after the file without its extension, plus "_data". */
+REY_API rey_result rey_scene_save(const rey_scene *scene, const char *path);
+
+REY_API int rey_scene_sensor_count(const rey_scene *scene);
+/* Size in pixels of the picture that a sensor delivers (the crop window's size). */
+REY_API rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height);
+
+typedef struct rey_scene_info {
+    int64_t shapes, triangles, vertices, bsdfs, emitters, textures, sensors, instances;
+    int64_t parameters;      /* named parameters */
+    int64_t parameter_floats; /* numbers in all of them together */
+    int64_t bytes;           /* memory held by the scene, without the ray-tracing structure [bytes] */
+    double bounds[6];        /* world bounding box: min x y z, max x y z */
+    int sample_count;        /* samples per pixel that the first sensor's sampler asks for */
+    int max_depth, rr_depth; /* of the integrator; max_depth -1 = unlimited */
+    const char *integrator;  /* name of the integrator that runs */
+} rey_scene_info;
+REY_API void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info);
+
+/* ---- parameters ---------------------------------------------------------------------------------------- */
+
+/* Terms of a derivative. A gradient is the sum of the terms that its parameter needs. */
+enum {
+    REY_TERM_INTERIOR = 1,    /* everything that does not move a discontinuity */
+    REY_TERM_PRIMARY = 2,     /* silhouettes seen by the camera */
+    REY_TERM_INDIRECT = 4,    /* silhouettes seen from other path vertices */
+    REY_TERM_SPECULAR = 8,    /* chains of smooth mirrors and glass */
+    REY_TERM_MEDIUM = 16,     /* participating media */
+    REY_TERM_TERMINATOR = 32, /* jumps where a shading normal turns away from the viewer or the light */
+    REY_TERM_ALL = 63
+};
+/* Name of one term ("interior"), null when bit is not one of the above. */
+REY_API const char *rey_term_name(int bit);
+
+typedef struct rey_param_info {
+    const char *name;        /* stable dotted path, such as red.reflectance.value */
+    const char *unit;        /* "" when dimensionless */
+    const char *description; /* one line */
+    int64_t count;           /* numbers in the parameter */
+    int dims;                /* number of entries of shape, 0 to 3 */
+    int64_t shape[3];        /* for example height, width, 3 */
+    float low, high;         /* allowed range, -INFINITY and INFINITY where open */
+    int terms;               /* bits of the terms that its derivative needs; 0 = not differentiable */
+    const char *why;         /* why the terms beyond interior are needed, or why it is not differentiable; "" else */
+} rey_param_info;
+
+REY_API int rey_param_count(const rey_scene *scene);
+REY_API rey_result rey_param_get_info(const rey_scene *scene, int param, rey_param_info *info);
+/* Index of a parameter by name or alias, -1 when there is none. rey_param_nearest suggests the closest name. */
+REY_API int rey_param_find(const rey_scene *scene, const char *name);
+REY_API const char *rey_param_nearest(const rey_scene *scene, const char *name);
+/* The parameter's values: a view that stays valid and in place while the scene lives. */
+REY_API const float *rey_param_values(const rey_scene *scene, int param);
+/* Writes count values (must be the parameter's count). Checks finiteness and range before anything is changed. */
+REY_API rey_result rey_param_set(rey_scene *scene, int param, const float *values, int64_t count);
+
+/* ---- rendering ----------------------------------------------------------------------------------------- */
+
+enum { REY_SAMPLER_DEFAULT, REY_SAMPLER_INDEPENDENT, REY_SAMPLER_SOBOL };
+
+typedef struct rey_render_def {
+    size_t size;       /* sizeof(rey_render_def), set by rey_default_render_def */
+    int sensor;        /* default 0 */
+    int spp;           /* samples per pixel, 0 (default) = the scene's own count */
+    uint32_t seed;     /* default 0 */
+    uint32_t set;      /* which independently scrambled sample set; same seed, other set = independent noise */
+    int sampler;       /* REY_SAMPLER_*; default: what the scene names */
+    int terms;         /* derivative terms to estimate, 0 (default) = all that the parameters need, else a refusal */
+    int sets;          /* derivatives: spp is split over this many independent sets (default 16, at least 1) */
+    bool (*progress)(void *user, double fraction); /* may be null; false cancels. Called from one thread at a time */
+    void *user;
+} rey_render_def;
+REY_API rey_render_def rey_default_render_def(void);
+
+typedef struct rey_stats {
+    double seconds;      /* wall time of the call [s] */
+    double trace_seconds; /* thread time inside the ray tracer, summed over threads [s] */
+    double thread_seconds; /* thread time of the workers, summed [s] */
+    int64_t paths, rays; /* camera paths, and rays of any kind */
+    int64_t nonfinite;   /* samples dropped because they were not finite; 0 in a healthy renderer */
+} rey_stats;
+
+/* Renders. image: height x width x 3 floats owned by the caller. stats may be null. */
+REY_API rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats);
+
+/* A selection of parameters: vectors over it are the parameters' values one after the other. */
+typedef struct rey_selection {
+    const int *params; /* parameter indices, none twice */
+    int count;
+} rey_selection;
+REY_API int64_t rey_selection_size(const rey_scene *scene, rey_selection selection);
+
+/* Vector-Jacobian product (reverse mode): gradient[i] = d/dtheta_i sum over pixels and channels of adjoint * image.
+ * adjoint: height x width x 3 floats. gradient: rey_selection_size doubles, assigned.
+ * set_gradients: null, or def->sets times the selection's size doubles: the gradient of each sample set, whose mean
+ * is gradient. REY_ERROR_INCOMPLETE when a parameter needs a term that def->terms does not allow. */
+REY_API rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection,
+                           const float *adjoint, double *gradient, double *set_gradients, rey_stats *stats);
+
+/* Jacobian-vector product (forward mode): derivative[pixel] = sum_i d image[pixel] / d theta_i * tangent[i].
+ * tangent: rey_selection_size floats. derivative: height x width x 3 floats, assigned.
+ * set_values: null, or def->sets doubles: mean over pixels and channels of each set's derivative image. */
+REY_API rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection selection,
+                           const float *tangent, float *derivative, double *set_values, rey_stats *stats);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,199 @@
+// context.c: context life cycle, failures, memory, nearest words.
+#include "base/context.h"
+
+#include "base/parallel.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void *default_alloc(void *user, size_t bytes, size_t alignment) {
+    UNUSED(user);
+    return aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+}
+
+static void default_release(void *user, void *memory) {
+    UNUSED(user);
+    free(memory);
+}
+
+rey_context_def rey_default_context_def(void) {
+    return (rey_context_def){.size = sizeof(rey_context_def), .alloc = default_alloc, .release = default_release};
+}
+
+rey_result rey_context_create(const rey_context_def *def, rey_context **out) {
+    if (!out) {
+        return REY_ERROR_ARGUMENT;
+    }
+    *out = NULL;
+    rey_context_def d = def ? *def : rey_default_context_def();
+    if (d.size != sizeof d || !d.alloc || !d.release || d.threads < 0) {
+        return REY_ERROR_ARGUMENT;
+    }
+    int widest = rey_widest_lanes();
+    if (d.lanes == 0) {
+        d.lanes = widest;
+    }
+    if ((d.lanes != 1 && d.lanes != 8 && d.lanes != 16) || d.lanes > widest) {
+        return REY_ERROR_UNSUPPORTED;
+    }
+    if (d.threads == 0) {
+        d.threads = rey_available_threads();
+    }
+    rey_context *ctx = d.alloc(d.user, sizeof *ctx, 64);
+    if (!ctx) {
+        return REY_ERROR_MEMORY;
+    }
+    memset(ctx, 0, sizeof *ctx);
+    ctx->def = d;
+    *out = ctx;
+    return REY_OK;
+}
+
+void rey_context_destroy(rey_context *ctx) {
+    if (ctx) {
+        ctx->def.release(ctx->def.user, ctx);
+    }
+}
+
+const char *rey_error(const rey_context *ctx) {
+    return ctx ? ctx->message : "no context";
+}
+
+int rey_threads(const rey_context *ctx) {
+    return ctx->def.threads;
+}
+
+int rey_lanes(const rey_context *ctx) {
+    return ctx->def.lanes;
+}
+
+const char *rey_version(void) {
+    return REY_VERSION;
+}
+
+const char *rey_result_text(rey_result result) {
+    static const char *const texts[] = {
+#define RESULT_TEXT(name, text) text,
+        REY_RESULTS(RESULT_TEXT)
+#undef RESULT_TEXT
+    };
+    return (unsigned)result < REY_RESULT_COUNT ? texts[result] : "unknown result";
+}
+
+rey_result rey_fail(rey_context *ctx, rey_result code, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(ctx->message, sizeof ctx->message, format, arguments);
+    va_end(arguments);
+    return code;
+}
+
+rey_result rey_fail_memory(rey_context *ctx, size_t bytes) {
+    return rey_fail(ctx, REY_ERROR_MEMORY, "out of memory: %zu bytes could not be had", bytes);
+}
+
+void *rey_alloc(rey_context *ctx, size_t bytes) {
+    size_t size = bytes ? bytes : 1;
+    void *memory = size <= SIZE_MAX / 2 ? ctx->def.alloc(ctx->def.user, size, 64) : NULL;
+    if (!memory) {
+        rey_fail_memory(ctx, size);
+        return NULL;
+    }
+    memset(memory, 0, size);
+    return memory;
+}
+
+void *rey_alloc_array(rey_context *ctx, size_t count, size_t item_bytes) {
+    if (item_bytes && count > SIZE_MAX / 4 / item_bytes) {
+        rey_fail_memory(ctx, SIZE_MAX);
+        return NULL;
+    }
+    return rey_alloc(ctx, count * item_bytes);
+}
+
+void rey_free(rey_context *ctx, void *memory) {
+    if (memory) {
+        ctx->def.release(ctx->def.user, memory);
+    }
+}
+
+char *rey_strdup(rey_context *ctx, const char *text) {
+    size_t bytes = strlen(text) + 1;
+    char *copy = rey_alloc(ctx, bytes);
+    if (copy) {
+        memcpy(copy, text, bytes);
+    }
+    return copy;
+}
+
+void *rey_array_push(rey_context *ctx, Array *array, size_t item_bytes, size_t n) {
+    if (n > array->capacity - array->count) {
+        size_t capacity = array->capacity + array->capacity / 2;
+        if (capacity < array->count + n) {
+            capacity = array->count + n;
+        }
+        if (capacity < 8) {
+            capacity = 8;
+        }
+        void *grown = rey_alloc_array(ctx, capacity, item_bytes);
+        if (!grown) {
+            return NULL;
+        }
+        if (array->count) {
+            memcpy(grown, array->data, array->count * item_bytes);
+        }
+        rey_free(ctx, array->data);
+        array->data = grown;
+        array->capacity = capacity;
+    }
+    void *first = (char *)array->data + array->count * item_bytes;
+    memset(first, 0, n * item_bytes);
+    array->count += n;
+    return first;
+}
+
+void rey_array_free(rey_context *ctx, Array *array) {
+    rey_free(ctx, array->data);
+    *array = (Array){0};
+}
+
+int rey_edit_distance(const char *a, const char *b) {
+    enum { LONGEST = 128 };
+    int row[LONGEST + 1];
+    int na = (int)strlen(a), nb = (int)strlen(b);
+    if (na > LONGEST || nb > LONGEST) {
+        return LONGEST;
+    }
+    for (int j = 0; j <= nb; j++) {
+        row[j] = j;
+    }
+    for (int i = 1; i <= na; i++) {
+        int diagonal = row[0];
+        row[0] = i;
+        for (int j = 1; j <= nb; j++) {
+            int best = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            best = row[j] + 1 < best ? row[j] + 1 : best;
+            best = row[j - 1] + 1 < best ? row[j - 1] + 1 : best;
+            row[j] = best;
+        }
+    }
+    return row[nb];
+}
+
+const char *rey_nearest_word(const char *word, const char *(*next)(void *user, int i), void *user) {
+    const char *nearest = NULL;
+    int limit = (int)strlen(word) / 2 + 1;
+    for (int i = 0;; i++) {
+        const char *candidate = next(user, i);
+        if (!candidate) {
+            return nearest;
+        }
+        int distance = rey_edit_distance(word, candidate);
+        if (distance < limit) {
+            limit = distance;
+            nearest = candidate;
+        }
+    }
+}
