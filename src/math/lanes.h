@@ -1,0 +1,255 @@
+// lanes.h: the wide Float that kernels are written in, and every operation on it that C's operators do not give.
+//
+// LANES = 1 is the scalar reference (and the CUDA form); 8 is AVX2, 16 is AVX-512. With REAL_DOUBLE (and LANES 1) the
+// same kernels compile in double precision, for the derivative tests. A Mask lane is 0 or -1. Float, Int, UInt and
+// Mask take + - * / & | ^ ~ << >> and mix with scalars; comparisons and selects go through the functions below.
+// This is the only file with loops over lanes besides ray packing and the sinks.
+#pragma once
+
+#include "base/platform.h"
+
+#include <math.h>
+#include <string.h>
+
+#ifndef LANES
+#define LANES 1
+#endif
+
+#define LANES_CONCAT_(a, b) a##b
+#define LANES_CONCAT(a, b) LANES_CONCAT_(a, b)
+#define KNAME(name) LANES_CONCAT(name##_w, LANES) // external symbols carry their width
+
+#if LANES == 1
+#ifdef REAL_DOUBLE
+typedef double real;
+#define REAL_EPSILON 2.220446e-16
+#else
+typedef float real;
+#define REAL_EPSILON 5.960464e-8f
+#endif
+typedef real Float;
+typedef int32_t Int;
+typedef uint32_t UInt;
+typedef int32_t Mask;
+#else
+#include <immintrin.h>
+typedef float real;
+#define REAL_EPSILON 5.960464e-8f
+typedef float Float __attribute__((vector_size(4 * LANES)));
+typedef int32_t Int __attribute__((vector_size(4 * LANES)));
+typedef uint32_t UInt __attribute__((vector_size(4 * LANES)));
+typedef Int Mask;
+#endif
+
+// ---- construction, comparison, selection -------------------------------------------------------------------------
+
+#if LANES == 1
+KFN Float f_set(real x) { return x; }
+KFN Int i_set(int32_t x) { return x; }
+KFN UInt u_set(uint32_t x) { return x; }
+KFN Int i_iota(void) { return 0; }
+KFN Mask m_lt(Float a, Float b) { return -(a < b); }
+KFN Mask m_le(Float a, Float b) { return -(a <= b); }
+KFN Mask m_eq(Float a, Float b) { return -(a == b); }
+KFN Mask mi_eq(Int a, Int b) { return -(a == b); }
+KFN Mask mi_lt(Int a, Int b) { return -(a < b); }
+KFN Float f_select(Mask m, Float a, Float b) { return m ? a : b; }
+KFN Int i_select(Mask m, Int a, Int b) { return m ? a : b; }
+KFN UInt u_select(Mask m, UInt a, UInt b) { return m ? a : b; }
+KFN bool m_any(Mask m) { return m != 0; }
+KFN bool m_all(Mask m) { return m != 0; }
+KFN uint32_t m_bits(Mask m) { return m != 0; }
+KFN Mask m_from_bits(uint32_t bits) { return -(int32_t)(bits & 1); }
+#else
+KFN Float f_set(real x) { return (Float){0} + x; }
+KFN Int i_set(int32_t x) { return (Int){0} + x; }
+KFN UInt u_set(uint32_t x) { return (UInt){0} + x; }
+KFN Mask m_lt(Float a, Float b) { return (Mask)(a < b); }
+KFN Mask m_le(Float a, Float b) { return (Mask)(a <= b); }
+KFN Mask m_eq(Float a, Float b) { return (Mask)(a == b); }
+KFN Mask mi_eq(Int a, Int b) { return (Mask)(a == b); }
+KFN Mask mi_lt(Int a, Int b) { return (Mask)(a < b); }
+#if LANES == 8
+KFN Int i_iota(void) { return (Int){0, 1, 2, 3, 4, 5, 6, 7}; }
+KFN Int i_select(Mask m, Int a, Int b) {
+    return (Int)_mm256_blendv_epi8((__m256i)b, (__m256i)a, (__m256i)m);
+}
+KFN uint32_t m_bits(Mask m) { return (uint32_t)_mm256_movemask_ps((__m256)m); }
+KFN bool m_all(Mask m) { return m_bits(m) == 0xff; }
+KFN Mask m_from_bits(uint32_t bits) { return (Mask)((i_set((int32_t)bits) >> i_iota()) & 1) * -1; }
+#else
+KFN Int i_iota(void) { return (Int){0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; }
+KFN Int i_select(Mask m, Int a, Int b) {
+    return (Int)_mm512_ternarylogic_epi32((__m512i)m, (__m512i)a, (__m512i)b, 0xca);
+}
+KFN uint32_t m_bits(Mask m) { return (uint32_t)_mm512_movepi32_mask((__m512i)m); }
+KFN bool m_all(Mask m) { return m_bits(m) == 0xffff; }
+KFN Mask m_from_bits(uint32_t bits) { return (Mask)_mm512_movm_epi32((__mmask16)bits); }
+#endif
+KFN Float f_select(Mask m, Float a, Float b) { return (Float)i_select(m, (Int)a, (Int)b); }
+KFN UInt u_select(Mask m, UInt a, UInt b) { return (UInt)i_select(m, (Int)a, (Int)b); }
+KFN bool m_any(Mask m) { return m_bits(m) != 0; }
+#endif
+
+KFN Mask m_gt(Float a, Float b) { return m_lt(b, a); }
+KFN Mask m_ge(Float a, Float b) { return m_le(b, a); }
+KFN Mask m_ne(Float a, Float b) { return ~m_eq(a, b); }
+KFN Mask m_set(bool on) { return (Mask)i_set(on ? -1 : 0); }
+KFN int m_count(Mask m) { return __builtin_popcount(m_bits(m)); }
+KFN int m_first(Mask m) { return __builtin_ctz(m_bits(m)); } // m must have a lane on
+// The first n lanes.
+KFN Mask m_first_n(int n) { return mi_lt(i_iota(), i_set(n)); }
+KFN Mask m_finite(Float x) { return m_eq(x - x, f_set(0)); }
+KFN Float f_zero_unless(Mask m, Float x) { return f_select(m, x, f_set(0)); }
+
+KFN real f_lane(Float x, int lane) {
+#if LANES == 1
+    UNUSED(lane);
+    return x;
+#else
+    return x[lane];
+#endif
+}
+KFN int32_t i_lane(Int x, int lane) {
+#if LANES == 1
+    UNUSED(lane);
+    return x;
+#else
+    return x[lane];
+#endif
+}
+
+// ---- arithmetic --------------------------------------------------------------------------------------------------
+
+#if LANES == 1
+#ifdef REAL_DOUBLE
+KFN Float f_sqrt(Float x) { return sqrt(x); }
+KFN Float f_floor(Float x) { return floor(x); }
+KFN Float f_abs(Float x) { return fabs(x); }
+KFN Float f_copysign(Float x, Float s) { return copysign(x, s); }
+#else
+KFN Float f_sqrt(Float x) { return sqrtf(x); }
+KFN Float f_floor(Float x) { return floorf(x); }
+KFN Float f_abs(Float x) { return fabsf(x); }
+KFN Float f_copysign(Float x, Float s) { return copysignf(x, s); }
+#endif
+KFN Float f_min(Float a, Float b) { return a < b ? a : b; }
+KFN Float f_max(Float a, Float b) { return a > b ? a : b; }
+KFN Int i_min(Int a, Int b) { return a < b ? a : b; }
+KFN Int i_max(Int a, Int b) { return a > b ? a : b; }
+KFN Float f_from_i(Int x) { return (Float)x; }
+KFN Float f_from_u(UInt x) { return (Float)x; }
+KFN Int i_from_f(Float x) { return (Int)x; }
+#else
+#if LANES == 8
+#define SIMD_F(op) _mm256_##op##_ps
+#define SIMD_I(op) _mm256_##op##_epi32
+typedef __m256 SimdF;
+typedef __m256i SimdI;
+#else
+#define SIMD_F(op) _mm512_##op##_ps
+#define SIMD_I(op) _mm512_##op##_epi32
+typedef __m512 SimdF;
+typedef __m512i SimdI;
+#endif
+KFN Float f_sqrt(Float x) { return (Float)SIMD_F(sqrt)((SimdF)x); }
+KFN Float f_floor(Float x) { return (Float)SIMD_F(floor)((SimdF)x); }
+KFN Float f_abs(Float x) { return (Float)((Int)x & 0x7fffffff); }
+KFN Float f_copysign(Float x, Float s) { return (Float)(((Int)x & 0x7fffffff) | ((UInt)s & 0x80000000u)); }
+KFN Float f_min(Float a, Float b) { return (Float)SIMD_F(min)((SimdF)a, (SimdF)b); }
+KFN Float f_max(Float a, Float b) { return (Float)SIMD_F(max)((SimdF)a, (SimdF)b); }
+KFN Int i_min(Int a, Int b) { return (Int)SIMD_I(min)((SimdI)a, (SimdI)b); }
+KFN Int i_max(Int a, Int b) { return (Int)SIMD_I(max)((SimdI)a, (SimdI)b); }
+KFN Float f_from_i(Int x) { return __builtin_convertvector(x, Float); }
+KFN Float f_from_u(UInt x) { return __builtin_convertvector(x, Float); }
+KFN Int i_from_f(Float x) { return __builtin_convertvector(x, Int); } // truncates
+#endif
+
+KFN Float f_clamp(Float x, Float low, Float high) { return f_min(f_max(x, low), high); }
+KFN Float f_sqr(Float x) { return x * x; }
+KFN Float f_safe_sqrt(Float x) { return f_sqrt(f_max(x, f_set(0))); }
+KFN Float f_lerp(Float a, Float b, Float t) { return a + (b - a) * t; }
+// x^5
+KFN Float f_pow5(Float x) { return f_sqr(f_sqr(x)) * x; }
+// 1 / x where |x| is not tiny, 0 elsewhere: a safe input for lanes that do not count.
+KFN Float f_safe_rcp(Float x) {
+    Mask ok = m_gt(f_abs(x), f_set(1e-30f));
+    return f_zero_unless(ok, 1.0f / f_select(ok, x, f_set(1)));
+}
+KFN Float f_sign(Float x) { return f_copysign(f_set(1), x); }
+
+// ---- memory ------------------------------------------------------------------------------------------------------
+
+KFN Float f_load(const real *p) {
+    Float x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+KFN void f_store(real *p, Float x) { memcpy(p, &x, sizeof x); }
+KFN Int i_load(const int32_t *p) {
+    Int x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+KFN void i_store(int32_t *p, Int x) { memcpy(p, &x, sizeof x); }
+
+// base[index] per lane. Every lane's index must be valid, dead lanes included.
+#if LANES == 1
+KFN Float f_gather(const float *base, Int index) { return base[index]; }
+KFN Int i_gather(const int32_t *base, Int index) { return base[index]; }
+#elif LANES == 8
+KFN Float f_gather(const float *base, Int index) { return (Float)_mm256_i32gather_ps(base, (SimdI)index, 4); }
+KFN Int i_gather(const int32_t *base, Int index) { return (Int)_mm256_i32gather_epi32(base, (SimdI)index, 4); }
+#else
+KFN Float f_gather(const float *base, Int index) { return (Float)_mm512_i32gather_ps((SimdI)index, base, 4); }
+KFN Int i_gather(const int32_t *base, Int index) { return (Int)_mm512_i32gather_epi32((SimdI)index, base, 4); }
+#endif
+
+// Stores the lanes of m one after the other from p on (up to LANES entries behind them may be overwritten).
+#if LANES == 16
+KFN void f_compress(real *p, Float x, Mask m) {
+    _mm512_storeu_ps(p, _mm512_maskz_compress_ps((__mmask16)m_bits(m), (SimdF)x));
+}
+KFN void i_compress(int32_t *p, Int x, Mask m) {
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((__mmask16)m_bits(m), (SimdI)x));
+}
+#else
+KFN void f_compress(real *p, Float x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        *p++ = f_lane(x, __builtin_ctz(bits));
+    }
+}
+KFN void i_compress(int32_t *p, Int x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        *p++ = i_lane(x, __builtin_ctz(bits));
+    }
+}
+#endif
+
+KFN void f_scatter(real *base, Int index, Float x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        base[i_lane(index, lane)] = f_lane(x, lane);
+    }
+}
+KFN void f_scatter_add(real *base, Int index, Float x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        base[i_lane(index, lane)] += f_lane(x, lane);
+    }
+}
+KFN void f_scatter_add_double(double *base, Int index, Float x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        base[i_lane(index, lane)] += (double)f_lane(x, lane);
+    }
+}
+// Sum over the lanes of m, in double and in lane order.
+KFN double f_sum(Float x, Mask m) {
+    double sum = 0;
+    x = f_zero_unless(m, x);
+    for (int lane = 0; lane < LANES; lane++) {
+        sum += (double)f_lane(x, lane);
+    }
+    return sum;
+}
