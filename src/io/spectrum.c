@@ -1,0 +1,298 @@
+// spectrum.c: source spectra to linear sRGB, the text format of spectra, named materials.
+#include "io/spectrum.h"
+
+#include "io/number.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+enum { SHORTEST = 360, LONGEST = 830, STEP = 5, ENTRIES = (LONGEST - SHORTEST) / STEP + 1, SAMPLES = 1000 };
+
+static const double observer[ENTRIES][4] = {
+#include "io/spectrum_tables.inl"
+};
+
+// Integral of the y curve over the range, by which a spectrum of 1 has Y = 1.
+static const double y_integral = 106.7502593994140625;
+
+static const double xyz_to_rgb[3][3] = {
+    {3.240479, -1.537150, -0.498535}, {-0.969256, 1.875991, 0.041556}, {0.055648, -0.204043, 1.057311}};
+
+static double table_value(double wavelength, int column) {
+    if (!(wavelength >= SHORTEST && wavelength <= LONGEST)) {
+        return 0;
+    }
+    double position = (wavelength - SHORTEST) / STEP;
+    int i = (int)position < ENTRIES - 2 ? (int)position : ENTRIES - 2;
+    double t = position - i;
+    return observer[i][column] * (1 - t) + observer[i + 1][column] * t;
+}
+
+void rey_cie1931(double wavelength, double xyz[3]) {
+    for (int i = 0; i < 3; i++) {
+        xyz[i] = table_value(wavelength, i);
+    }
+}
+
+double rey_d65(double wavelength) {
+    return table_value(wavelength, 3);
+}
+
+// Planck's law: L = 2 h c^2 / lambda^5 / (exp(h c / (lambda k T)) - 1), CODATA 2018 constants.
+double rey_blackbody(double wavelength, double temperature) {
+    const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
+    if (!(wavelength >= SHORTEST && wavelength <= LONGEST) || !(temperature > 0)) {
+        return 0;
+    }
+    double metres = wavelength * 1e-9;
+    double per_metre = 2 * h * c * c / pow(metres, 5) / expm1(h * c / (metres * k * temperature));
+    return per_metre * 1e-9;
+}
+
+double rey_luminance(const double rgb[3]) {
+    return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
+}
+
+// Linear between the pairs, 0 outside. *at is where the last look-up ended; wavelengths must not decrease between calls.
+static double pair_value(const rey_spectrum *s, double wavelength, int *at) {
+    if (wavelength < s->wavelengths[0] || wavelength > s->wavelengths[s->count - 1]) {
+        return 0;
+    }
+    while (*at < s->count - 2 && s->wavelengths[*at + 1] <= wavelength) {
+        ++*at;
+    }
+    double t = (wavelength - s->wavelengths[*at]) / (s->wavelengths[*at + 1] - s->wavelengths[*at]);
+    return s->values[*at] * (1 - t) + s->values[*at + 1] * t;
+}
+
+static double sample_wavelength(int i) {
+    return SHORTEST + (LONGEST - SHORTEST) * (i / (double)(SAMPLES - 1));
+}
+
+// Adds one of the SAMPLES equally spaced samples of a spectrum to its colour.
+static void add_sample(double xyz[3], double wavelength, double value) {
+    double weight = value * (LONGEST - SHORTEST) / (y_integral * SAMPLES), cmf[3];
+    rey_cie1931(wavelength, cmf);
+    for (int i = 0; i < 3; i++) {
+        xyz[i] += weight * cmf[i];
+    }
+}
+
+static void to_rgb(const double xyz[3], double rgb[3]) {
+    for (int i = 0; i < 3; i++) {
+        rgb[i] = xyz_to_rgb[i][0] * xyz[0] + xyz_to_rgb[i][1] * xyz[1] + xyz_to_rgb[i][2] * xyz[2];
+    }
+}
+
+static void clip(double rgb[3], double high) {
+    for (int i = 0; i < 3; i++) {
+        rgb[i] = rgb[i] > 0 ? (rgb[i] < high ? rgb[i] : high) : 0;
+    }
+}
+
+static void integrate(const rey_spectrum *s, bool under_d65, double rgb[3]) {
+    double xyz[3] = {0};
+    int at = 0;
+    for (int i = 0; i < SAMPLES; i++) {
+        double wavelength = sample_wavelength(i);
+        double value = pair_value(s, wavelength, &at);
+        add_sample(xyz, wavelength, under_d65 ? value * rey_d65(wavelength) * REY_D65_SCALE : value);
+    }
+    to_rgb(xyz, rgb);
+}
+
+void rey_spectrum_to_rgb(const rey_spectrum *s, rey_colour_use use, double rgb[3]) {
+    if (s->count > 0) {
+        integrate(s, use != REY_COLOUR_EMISSION, rgb);
+        clip(rgb, use == REY_COLOUR_REFLECTANCE ? 1 : INFINITY);
+    } else if (use == REY_COLOUR_EMISSION) {
+        const double equal_energy[3] = {s->flat, s->flat, s->flat};
+        to_rgb(equal_energy, rgb);
+    } else {
+        rgb[0] = rgb[1] = rgb[2] = s->flat;
+    }
+}
+
+void rey_spectrum_to_rgb_unweighted(const rey_spectrum *s, double rgb[3]) {
+    if (s->count > 0) {
+        integrate(s, false, rgb);
+        clip(rgb, INFINITY);
+    } else {
+        rgb[0] = rgb[1] = rgb[2] = s->flat;
+    }
+}
+
+void rey_blackbody_to_rgb(double temperature, double rgb[3]) {
+    double xyz[3] = {0};
+    for (int i = 0; i < SAMPLES; i++) {
+        double wavelength = sample_wavelength(i);
+        add_sample(xyz, wavelength, rey_blackbody(wavelength, temperature));
+    }
+    to_rgb(xyz, rgb);
+    clip(rgb, INFINITY);
+}
+
+// ---- text files --------------------------------------------------------------------------------------------------
+
+// One line without its end: blank, comment or two numbers (stored, *pairs counted up). False when it is none of these.
+static bool read_line(const char *line, double *pair, size_t *pairs) {
+    while (rey_is_blank(*line)) {
+        line++;
+    }
+    if (*line == '\0' || *line == '#') {
+        return true;
+    }
+    for (int i = 0; i < 2; i++) {
+        if (!rey_parse_real(line, &line, &pair[i]) || (*line && !rey_is_blank(*line))) {
+            return false;
+        }
+        while (rey_is_blank(*line)) {
+            line++;
+        }
+    }
+    ++*pairs;
+    return *line == '\0' || *line == '#';
+}
+
+static size_t count_lines(const char *text, size_t bytes) {
+    size_t lines = 1;
+    for (size_t i = 0; i < bytes; i++) {
+        lines += text[i] == '\n';
+    }
+    return lines;
+}
+
+// Fills wavelengths and values, each with room for every line of the text.
+static rey_result read_pairs(rey_context *ctx, const char *file, const char *text, size_t bytes,
+                             double *wavelengths, double *values, size_t *pairs) {
+    char line[256];
+    int number = 1;
+    for (size_t at = 0; at < bytes; number++) {
+        const char *end = memchr(text + at, '\n', bytes - at);
+        size_t length = end ? (size_t)(end - (text + at)) : bytes - at;
+        size_t shown = length < sizeof line - 1 ? length : sizeof line - 1;
+        memcpy(line, text + at, shown);
+        line[shown] = '\0';
+        double pair[2];
+        size_t before = *pairs;
+        bool comment = line[strspn(line, " \t\r")] == '#';
+        if (!comment && (shown < length || strlen(line) != shown || !read_line(line, pair, pairs))) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: bad line '%.60s', expected 'wavelength value'", file,
+                            number, line);
+        }
+        if (*pairs > before) {
+            wavelengths[before] = pair[0];
+            values[before] = pair[1];
+            if (before > 0 && !(pair[0] > wavelengths[before - 1])) {
+                return rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: wavelength %g follows %g, expected ascending order",
+                                file, number, pair[0], wavelengths[before - 1]);
+            }
+        }
+        at += length + 1;
+    }
+    return *pairs >= 2 ? REY_OK
+                       : rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: the spectrum ends after %zu pairs, expected at least 2",
+                                  file, number, *pairs);
+}
+
+rey_result rey_spectrum_read_memory(rey_context *ctx, const char *file, const char *text, size_t bytes,
+                                    rey_spectrum *out, double **storage) {
+    *out = (rey_spectrum){0};
+    *storage = NULL;
+    size_t lines = count_lines(text, bytes), pairs = 0;
+    if (lines > INT32_MAX) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: %zu lines are too many for a spectrum", file, lines);
+    }
+    double *data = rey_alloc_array(ctx, lines * 2, sizeof(double));
+    if (!data) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_result result = read_pairs(ctx, file, text, bytes, data, data + lines, &pairs);
+    if (result) {
+        rey_free(ctx, data);
+        return result;
+    }
+    *storage = data;
+    *out = (rey_spectrum){.count = (int)pairs, .wavelengths = data, .values = data + lines};
+    return REY_OK;
+}
+
+rey_result rey_spectrum_read(rey_context *ctx, const char *path, rey_spectrum *out, double **storage) {
+    enum { CHUNK = 1 << 14, LARGEST = 1 << 26 };
+    *out = (rey_spectrum){0};
+    *storage = NULL;
+    FILE *stream = fopen(path, "rb");
+    if (!stream) {
+        return rey_fail(ctx, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+    }
+    Array content = {0};
+    rey_result result = REY_OK;
+    for (size_t got = 1; got > 0 && !result;) {
+        char *chunk = rey_array_push(ctx, &content, 1, CHUNK);
+        got = chunk ? fread(chunk, 1, CHUNK, stream) : 0;
+        content.count -= chunk ? CHUNK - got : 0;
+        if (!chunk) {
+            result = REY_ERROR_MEMORY;
+        } else if (ferror(stream) || content.count > LARGEST) {
+            result = rey_fail(ctx, REY_ERROR_IO, "cannot read '%.400s': %s", path,
+                              ferror(stream) ? strerror(errno) : "it is too long for a spectrum");
+        }
+    }
+    fclose(stream);
+    if (!result) {
+        result = rey_spectrum_read_memory(ctx, path, content.data, content.count, out, storage);
+    }
+    rey_array_free(ctx, &content);
+    return result;
+}
+
+// ---- named materials ---------------------------------------------------------------------------------------------
+
+static const struct {
+    const char *name;
+    double ior;
+} iors[] = {
+#include "io/named_ior.inl"
+};
+
+static const struct {
+    const char *name;
+    double eta[3], k[3];
+} metals[] = {
+    {"none", {0, 0, 0}, {1, 1, 1}}, // ideal mirror
+#include "io/metals.inl"
+};
+
+bool rey_named_ior(const char *name, double *ior) {
+    for (int i = 0; i < COUNT_OF(iors); i++) {
+        if (strcasecmp(name, iors[i].name) == 0) {
+            *ior = iors[i].ior;
+            return true;
+        }
+    }
+    return false;
+}
+
+const char *rey_named_ior_name(void *user, int i) {
+    UNUSED(user);
+    return i < COUNT_OF(iors) ? iors[i].name : NULL;
+}
+
+bool rey_named_metal(const char *name, double eta[3], double k[3]) {
+    for (int i = 0; i < COUNT_OF(metals); i++) {
+        if (strcmp(name, metals[i].name) == 0) {
+            memcpy(eta, metals[i].eta, sizeof metals[i].eta);
+            memcpy(k, metals[i].k, sizeof metals[i].k);
+            return true;
+        }
+    }
+    return false;
+}
+
+const char *rey_named_metal_name(void *user, int i) {
+    UNUSED(user);
+    return i < COUNT_OF(metals) ? metals[i].name : NULL;
+}

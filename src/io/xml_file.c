@@ -1,0 +1,156 @@
+// xml_file.c: finding and loading the files that a scene names.
+#include "io/xml_parts.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+bool xml_is_folder(const char *path) {
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+char *xml_folder_of(rey_context *ctx, rey_xml_document *document, const char *path) {
+    const char *slash = strrchr(path, '/');
+    if (!slash) {
+        return xml_keep_text(ctx, document, ".", 1);
+    }
+    return xml_keep_text(ctx, document, path, slash == path ? 1 : (size_t)(slash - path));
+}
+
+char *xml_join(rey_context *ctx, const char *folder, const char *path) {
+    if (path[0] == '/' || strcmp(folder, ".") == 0) {
+        return rey_strdup(ctx, path);
+    }
+    size_t a = strlen(folder), b = strlen(path);
+    bool slash = a > 0 && folder[a - 1] != '/';
+    char *joined = rey_alloc(ctx, a + slash + b + 1);
+    if (joined) {
+        memcpy(joined, folder, a);
+        joined[a] = '/';
+        memcpy(joined + a + slash, path, b + 1);
+    }
+    return joined;
+}
+
+// The i-th folder to search: first_folder (when given), the <path> folders, latest first, then the scene's folder.
+static const char *search_folder(const rey_xml_document *document, const char *first_folder, size_t i) {
+    if (first_folder && i-- == 0) {
+        return first_folder;
+    }
+    size_t count = document->folders.count;
+    if (i < count) {
+        return ARRAY_AT(document->folders, const char *, count - 1 - i);
+    }
+    return i == count ? document->folder : NULL;
+}
+
+rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,
+                      const char *path, char **out) {
+    *out = NULL;
+    const char *folder;
+    for (size_t i = 0; (folder = search_folder(document, first_folder, i)); i++) {
+        char *candidate = xml_join(ctx, folder, path);
+        if (!candidate) {
+            return REY_ERROR_MEMORY;
+        }
+        struct stat info;
+        if (stat(candidate, &info) == 0 && S_ISREG(info.st_mode)) {
+            *out = candidate;
+            return REY_OK;
+        }
+        rey_free(ctx, candidate);
+    }
+    return REY_OK;
+}
+
+rey_result xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
+                         const char *first_folder, const char *path) {
+    if (path[0] == '/') {
+        return rey_xml_fail(ctx, at, REY_ERROR_IO, "there is no file '%.400s'", path);
+    }
+    char list[900] = "";
+    size_t used = 0;
+    const char *folder;
+    for (size_t i = 0; (folder = search_folder(document, first_folder, i)); i++) {
+        int written = snprintf(list + used, sizeof list - used, "%s'%s'", i ? ", " : "", folder);
+        if (written < 0 || (size_t)written >= sizeof list - used) {
+            memcpy(list + sizeof list - 4, "...", 4);
+            break;
+        }
+        used += (size_t)written;
+    }
+    return rey_xml_fail(ctx, at, REY_ERROR_IO, "file '%.400s' was not found, looked in %s", path, list);
+}
+
+static rey_result read_all(XmlReader *reader, rey_xml_position at, const char *path, FILE *stream, Array *content) {
+    enum { CHUNK = 1 << 16 };
+    for (;;) {
+        char *chunk = rey_array_push(reader->ctx, content, 1, CHUNK);
+        if (!chunk) {
+            return REY_ERROR_MEMORY;
+        }
+        size_t got = fread(chunk, 1, CHUNK, stream);
+        content->count -= CHUNK - got;
+        if (ferror(stream)) {
+            return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot read '%.400s': %s", path, strerror(errno));
+        }
+        if (content->count + reader->bytes_read > XML_LARGEST_FILE) {
+            return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "the scene's files together exceed %d bytes",
+                                XML_LARGEST_FILE);
+        }
+        if (got == 0) {
+            return REY_OK;
+        }
+    }
+}
+
+rey_result xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
+                    size_t *bytes) {
+    *text = NULL;
+    *bytes = 0;
+    struct stat info;
+    if (stat(path, &info) != 0) {
+        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+    }
+    if (S_ISDIR(info.st_mode) || (!any_kind && !S_ISREG(info.st_mode))) {
+        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "'%.400s' is not a file", path);
+    }
+    FILE *stream = fopen(path, "rb");
+    if (!stream) {
+        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+    }
+    Array content = {0};
+    rey_result result = read_all(reader, at, path, stream, &content);
+    fclose(stream);
+    if (result) {
+        rey_array_free(reader->ctx, &content);
+        return result;
+    }
+    reader->bytes_read += content.count;
+    *text = content.data;
+    *bytes = content.count;
+    return REY_OK;
+}
+
+rey_result rey_xml_resolve_file(rey_context *ctx, const rey_xml_document *document, const rey_xml_node *node,
+                                const char *name, char **out) {
+    *out = NULL;
+    const char *path = NULL;
+    rey_result result = rey_xml_require(ctx, node, name);
+    if (!result) {
+        result = rey_xml_get_string(ctx, node, name, NULL, &path);
+    }
+    if (result) {
+        return result;
+    }
+    if (!path) {
+        return rey_xml_fail(ctx, node->at, REY_ERROR_SCENE, "'%s' must be a string, not an object", name);
+    }
+    result = xml_search(ctx, document, NULL, path, out);
+    if (!result && !*out) {
+        result = xml_not_found(ctx, document, rey_xml_find(node, name)->at, NULL, path);
+    }
+    return result;
+}
