@@ -146,8 +146,8 @@ static void assert_point(const double p[3], double x, double y, double z) {
 
 static void transform_of(rey_context *ctx, const char *operations, double out[16]) {
     char text[1024];
-    snprintf(text, sizeof text,
-             "<shape version='3.0.0' type='cube'><transform name='to_world'>%s</transform></shape>", operations);
+    snprintf(text, sizeof text, "<shape version='3.0.0' type='cube'><transform name='to_world'>%s</transform></shape>",
+             operations);
     rey_xml_document *document = read_text(ctx, text);
     assert_int_equal(rey_xml_get_transform(ctx, rey_xml_root(document), "to_world", out), REY_OK);
     rey_xml_free(ctx, document);
@@ -280,8 +280,7 @@ static void test_locale(void **state) {
     if (!setlocale(LC_NUMERIC, "de_DE.UTF-8")) {
         skip();
     }
-    rey_xml_document *document =
-        read_text(ctx, "<film version='3.0.0' type='f'><float name='f' value='0.5'/></film>");
+    rey_xml_document *document = read_text(ctx, "<film version='3.0.0' type='f'><float name='f' value='0.5'/></film>");
     assert_true(rey_xml_find(rey_xml_root(document), "f")->number == 0.5);
     rey_xml_free(ctx, document);
     setlocale(LC_NUMERIC, "C");
@@ -339,7 +338,8 @@ static const BadCase bad_cases[] = {
     {REY_ERROR_SCENE, S " <spectrum name='a' value='500:1,600:'/></scene>", ":2:21: bad value '500:1,600:'"},
     {REY_ERROR_SCENE, S " <spectrum name='a'/></scene>", ":2:2: <spectrum> needs either"},
     {REY_ERROR_IO, S " <spectrum name='a' filename='no.spd'/></scene>", ":2:2: file 'no.spd' was not found"},
-    {REY_ERROR_SCENE, S " <transform name='t'>\n<rotate angle='3'/></transform></scene>", ":3:1: <rotate> needs an axis"},
+    {REY_ERROR_SCENE, S " <transform name='t'>\n<rotate angle='3'/></transform></scene>",
+     ":3:1: <rotate> needs an axis"},
     {REY_ERROR_SCENE, S " <transform name='t'>\n<rotate x='1'/></transform></scene>",
      ":3:1: <rotate> lacks the attribute 'angle'"},
     {REY_ERROR_SCENE, S " <transform name='t'>\n<rotate x='1' angle='a'/></transform></scene>", ":3:15: bad angle 'a'"},
@@ -359,7 +359,8 @@ static const BadCase bad_cases[] = {
      ":3:17: unknown id 'whit' in <ref>, expected the id of an object of this scene, did you mean 'white'?"},
     {REY_ERROR_SCENE, S " <bsdf type='a' id='x'/>\n <bsdf type='a' id='x'/></scene>", ":3:17: duplicate id 'x', first"},
     {REY_ERROR_SCENE, S " <bsdf type='a' id='x'>\n <ref id='x'/></bsdf></scene>", ":3:2: reference cycle: 'x'"},
-    {REY_ERROR_SCENE, S " <bsdf type='a' id='x'><ref id='y'/></bsdf>\n <bsdf type='a' id='y'><ref id='x'/></bsdf></scene>",
+    {REY_ERROR_SCENE,
+     S " <bsdf type='a' id='x'><ref id='y'/></bsdf>\n <bsdf type='a' id='y'><ref id='x'/></bsdf></scene>",
      ":3:24: reference cycle"},
     {REY_ERROR_SCENE, S " <alias id='x' as='y'/><bsdf type='a' id='x'/></scene>", ":2:9: unknown id 'x' in <alias>"},
     {REY_ERROR_SCENE, S " <bsdf type='a' id='x'/><alias id='x' as='x'/></scene>", ":2:39: duplicate id 'x'"},
@@ -380,8 +381,7 @@ static void test_bad_documents(void **state) {
     for (int i = 0; i < COUNT_OF(bad_cases); i++) {
         const BadCase *c = &bad_cases[i];
         rey_xml_document *document = NULL;
-        rey_result result =
-            rey_xml_read_memory(ctx, DATA "bad.xml", c->text, strlen(c->text), NULL, 0, &document);
+        rey_result result = rey_xml_read_memory(ctx, DATA "bad.xml", c->text, strlen(c->text), NULL, 0, &document);
         char expected[512];
         snprintf(expected, sizeof expected, "%s%s", DATA "bad.xml", c->message);
         if (result != c->code || strncmp(rey_error(ctx), expected, strlen(expected)) != 0) {

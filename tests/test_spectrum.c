@@ -217,14 +217,10 @@ static void test_metal_spectra(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_worked_values),
-        cmocka_unit_test(test_clipping),
-        cmocka_unit_test(test_tables),
-        cmocka_unit_test(test_blackbody),
-        cmocka_unit_test(test_materials),
-        cmocka_unit_test_setup_teardown(test_text, setup, teardown),
-        cmocka_unit_test(test_metal_facts),
-        cmocka_unit_test_setup_teardown(test_metal_spectra, setup, teardown),
+        cmocka_unit_test(test_worked_values), cmocka_unit_test(test_clipping),
+        cmocka_unit_test(test_tables),        cmocka_unit_test(test_blackbody),
+        cmocka_unit_test(test_materials),     cmocka_unit_test_setup_teardown(test_text, setup, teardown),
+        cmocka_unit_test(test_metal_facts),   cmocka_unit_test_setup_teardown(test_metal_spectra, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

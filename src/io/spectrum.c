@@ -56,7 +56,8 @@ double rey_luminance(const double rgb[3]) {
     return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
 }
 
-// Linear between the pairs, 0 outside. *at is where the last look-up ended; wavelengths must not decrease between calls.
+// Linear between the pairs, 0 outside. *at is where the last look-up ended; wavelengths must not decrease between
+// calls.
 static double pair_value(const rey_spectrum *s, double wavelength, int *at) {
     if (wavelength < s->wavelengths[0] || wavelength > s->wavelengths[s->count - 1]) {
         return 0;
@@ -166,8 +167,8 @@ static size_t count_lines(const char *text, size_t bytes) {
 }
 
 // Fills wavelengths and values, each with room for every line of the text.
-static rey_result read_pairs(rey_context *ctx, const char *file, const char *text, size_t bytes,
-                             double *wavelengths, double *values, size_t *pairs) {
+static rey_result read_pairs(rey_context *ctx, const char *file, const char *text, size_t bytes, double *wavelengths,
+                             double *values, size_t *pairs) {
     char line[256];
     int number = 1;
     for (size_t at = 0; at < bytes; number++) {
@@ -180,8 +181,8 @@ static rey_result read_pairs(rey_context *ctx, const char *file, const char *tex
         size_t before = *pairs;
         bool comment = line[strspn(line, " \t\r")] == '#';
         if (!comment && (shown < length || strlen(line) != shown || !read_line(line, pair, pairs))) {
-            return rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: bad line '%.60s', expected 'wavelength value'", file,
-                            number, line);
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: bad line '%.60s', expected 'wavelength value'", file, number,
+                            line);
         }
         if (*pairs > before) {
             wavelengths[before] = pair[0];
@@ -193,9 +194,10 @@ static rey_result read_pairs(rey_context *ctx, const char *file, const char *tex
         }
         at += length + 1;
     }
-    return *pairs >= 2 ? REY_OK
-                       : rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: the spectrum ends after %zu pairs, expected at least 2",
-                                  file, number, *pairs);
+    return *pairs >= 2
+               ? REY_OK
+               : rey_fail(ctx, REY_ERROR_FORMAT, "%s:%d: the spectrum ends after %zu pairs, expected at least 2", file,
+                          number, *pairs);
 }
 
 rey_result rey_spectrum_read_memory(rey_context *ctx, const char *file, const char *text, size_t bytes,

@@ -159,10 +159,9 @@ static rey_result run_parser(XmlFile *file) {
             result = file->reader->result;
             if (!result) {
                 enum XML_Error error = XML_GetErrorCode(file->parser);
-                result = error == XML_ERROR_NO_MEMORY
-                             ? rey_fail_memory(ctx, 0)
-                             : rey_xml_fail(ctx, parser_position(file), REY_ERROR_FORMAT,
-                                            "not well-formed XML: %s", XML_ErrorString(error));
+                result = error == XML_ERROR_NO_MEMORY ? rey_fail_memory(ctx, 0)
+                                                      : rey_xml_fail(ctx, parser_position(file), REY_ERROR_FORMAT,
+                                                                     "not well-formed XML: %s", XML_ErrorString(error));
             }
         }
         if (last) {

@@ -6,27 +6,27 @@
 #include "io/spectrum.h"
 
 // Object tags: X(symbol, tag in the file).
-#define REY_XML_TAGS(X)                                                                                               \
-    X(SCENE, "scene")                                                                                                 \
-    X(BSDF, "bsdf")                                                                                                   \
-    X(EMITTER, "emitter")                                                                                             \
-    X(FILM, "film")                                                                                                   \
-    X(INTEGRATOR, "integrator")                                                                                       \
-    X(MEDIUM, "medium")                                                                                               \
-    X(PHASE, "phase")                                                                                                 \
-    X(RFILTER, "rfilter")                                                                                             \
-    X(SAMPLER, "sampler")                                                                                             \
-    X(SENSOR, "sensor")                                                                                               \
-    X(SHAPE, "shape")                                                                                                 \
-    X(TEXTURE, "texture")                                                                                             \
-    X(VOLUME, "volume")                                                                                               \
+#define REY_XML_TAGS(X)                                                                                                \
+    X(SCENE, "scene")                                                                                                  \
+    X(BSDF, "bsdf")                                                                                                    \
+    X(EMITTER, "emitter")                                                                                              \
+    X(FILM, "film")                                                                                                    \
+    X(INTEGRATOR, "integrator")                                                                                        \
+    X(MEDIUM, "medium")                                                                                                \
+    X(PHASE, "phase")                                                                                                  \
+    X(RFILTER, "rfilter")                                                                                              \
+    X(SAMPLER, "sampler")                                                                                              \
+    X(SENSOR, "sensor")                                                                                                \
+    X(SHAPE, "shape")                                                                                                  \
+    X(TEXTURE, "texture")                                                                                              \
+    X(VOLUME, "volume")                                                                                                \
     X(SPECTRUM, "spectrum")
 
 typedef enum rey_xml_tag {
 #define REY_XML_TAG_ENUM(symbol, name) REY_XML_##symbol,
     REY_XML_TAGS(REY_XML_TAG_ENUM)
 #undef REY_XML_TAG_ENUM
-    REY_XML_TAG_COUNT
+        REY_XML_TAG_COUNT
 } rey_xml_tag;
 #define REY_XML_BIT(tag) (1u << (tag)) // sets of tags
 // Whatever can stand for a texture: <texture> and <spectrum type=...>.
@@ -53,8 +53,8 @@ typedef struct rey_xml_property {
     const char *name;
     rey_xml_position at;
     rey_xml_kind kind;
-    bool used;  // set by the getters
-    int order;  // running number over properties and children of the node, in document order
+    bool used; // set by the getters
+    int order; // running number over properties and children of the node, in document order
     bool boolean;
     int64_t integer;
     double number;         // float; also set for an integer
@@ -83,9 +83,9 @@ typedef struct rey_xml_node {
     int property_count;
     rey_xml_child *children; // document order
     int child_count;
-    int index;   // position in the document's list of nodes
-    int built;   // free for the builder: -1 at first. Nodes are shared: build each once.
-    int height;  // longest chain of children below, references included; at most REY_XML_DEEPEST
+    int index;  // position in the document's list of nodes
+    int built;  // free for the builder: -1 at first. Nodes are shared: build each once.
+    int height; // longest chain of children below, references included; at most REY_XML_DEEPEST
 } rey_xml_node;
 
 typedef struct rey_xml_document rey_xml_document;
@@ -108,7 +108,7 @@ void rey_xml_free(rey_context *ctx, rey_xml_document *document); // accepts null
 
 rey_xml_node *rey_xml_root(const rey_xml_document *document);
 int rey_xml_node_count(const rey_xml_document *document);
-rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index); // order of declaration
+rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index);      // order of declaration
 rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id); // ids and aliases; null if unknown
 const char *rey_xml_tag_name(rey_xml_tag tag);
 const char *rey_xml_kind_name(rey_xml_kind kind);
@@ -126,7 +126,7 @@ rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *
 // property that is present is marked used. *out is written in every case but failure.
 
 rey_xml_property *rey_xml_find(const rey_xml_node *node, const char *name); // null when absent; does not mark
-bool rey_xml_has(const rey_xml_node *node, const char *name);              // a property or a named child
+bool rey_xml_has(const rey_xml_node *node, const char *name);               // a property or a named child
 rey_result rey_xml_require(rey_context *ctx, const rey_xml_node *node, const char *name); // error when !rey_xml_has
 
 rey_result rey_xml_get_bool(rey_context *ctx, const rey_xml_node *node, const char *name, bool otherwise, bool *out);

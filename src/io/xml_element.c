@@ -66,8 +66,7 @@ static rey_result add_property(XmlReader *reader, rey_xml_property property) {
     XmlFrame *frame = xml_object_frame(reader);
     rey_result result = xml_claim_name(reader, frame, property.name, property.at);
     property.order = next_order(frame);
-    rey_xml_property *slot =
-        result ? NULL : rey_array_push(reader->ctx, &frame->properties, sizeof property, 1);
+    rey_xml_property *slot = result ? NULL : rey_array_push(reader->ctx, &frame->properties, sizeof property, 1);
     if (!slot) {
         return result ? result : REY_ERROR_MEMORY;
     }
@@ -87,8 +86,7 @@ static rey_result add_child(XmlReader *reader, XmlFrame *frame, rey_xml_child ch
 }
 
 // Copies an attribute into the document; null when absent or empty. A name of an old file is brought up to date.
-static rey_result keep_attribute(XmlFile *file, const XmlAttributes *attributes, const char *name,
-                                 const char **out) {
+static rey_result keep_attribute(XmlFile *file, const XmlAttributes *attributes, const char *name, const char **out) {
     *out = NULL;
     const XmlAttribute *attribute = xml_attribute(attributes, name);
     if (!attribute || !attribute->value[0]) {
@@ -125,8 +123,7 @@ static rey_result check_version(XmlFile *file, const XmlTag *tag, const XmlAttri
     }
     if (file->version[0] > 3) {
         return rey_xml_fail(ctx, attribute->at, REY_ERROR_SCENE,
-                            "version %.100s of the scene format is not known, expected 3.x or older",
-                            attribute->value);
+                            "version %.100s of the scene format is not known, expected 3.x or older", attribute->value);
     }
     return REY_OK;
 }
@@ -234,8 +231,7 @@ static rey_result do_alias(XmlFile *file, const XmlAttributes *attributes) {
     rey_xml_node *node = xml_find_id(&reader->document->ids, id->value);
     if (!node) {
         return rey_xml_fail(reader->ctx, id->at, REY_ERROR_SCENE,
-                            "unknown id '%.100s' in <alias>, expected an object declared before this line",
-                            id->value);
+                            "unknown id '%.100s' in <alias>, expected an object declared before this line", id->value);
     }
     const char *other = NULL;
     rey_result result = keep_attribute(file, attributes, "as", &other);
@@ -337,9 +333,9 @@ static rey_result check_place(XmlFile *file, const XmlTag *tag, const XmlFrame *
     rey_context *ctx = file->reader->ctx;
     rey_xml_position at = xml_element_position(file);
     if (!parent) {
-        return tag->class == XML_OBJECT ? REY_OK
-                                        : rey_xml_fail(ctx, at, REY_ERROR_SCENE,
-                                                       "<%s> cannot be the root, expected <scene>", tag->name);
+        return tag->class == XML_OBJECT
+                   ? REY_OK
+                   : rey_xml_fail(ctx, at, REY_ERROR_SCENE, "<%s> cannot be the root, expected <scene>", tag->name);
     }
     bool in_object = parent->tag->class == XML_OBJECT;
     bool in_transform = parent->tag->class == XML_VALUE && parent->tag->which == REY_XML_TRANSFORM_VALUE;

@@ -46,8 +46,8 @@ static const char *search_folder(const rey_xml_document *document, const char *f
     return i == count ? document->folder : NULL;
 }
 
-rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,
-                      const char *path, char **out) {
+rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder, const char *path,
+                      char **out) {
     *out = NULL;
     const char *folder;
     for (size_t i = 0; (folder = search_folder(document, first_folder, i)); i++) {

@@ -40,9 +40,8 @@ static rey_result take(rey_context *ctx, const rey_xml_node *node, const char *n
     *out = rey_xml_find(node, name);
     const rey_xml_child *child = *out ? NULL : find_child(node, name);
     if (child) {
-        return rey_xml_fail(ctx, child->at, REY_ERROR_SCENE, "'%s' of %s '%.100s' is an object (%s), expected %s",
-                            name, rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag),
-                            expected);
+        return rey_xml_fail(ctx, child->at, REY_ERROR_SCENE, "'%s' of %s '%.100s' is an object (%s), expected %s", name,
+                            rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag), expected);
     }
     if (*out && !(kinds >> (*out)->kind & 1)) {
         return rey_xml_fail(ctx, (*out)->at, REY_ERROR_SCENE, "'%s' of %s '%.100s' is of kind %s, expected %s", name,
@@ -59,8 +58,7 @@ enum {
     COLOURS = NUMBERS | 1 << REY_XML_RGB_VALUE | 1 << REY_XML_SPECTRUM_VALUE,
 };
 
-rey_result rey_xml_get_bool(rey_context *ctx, const rey_xml_node *node, const char *name, bool otherwise,
-                            bool *out) {
+rey_result rey_xml_get_bool(rey_context *ctx, const rey_xml_node *node, const char *name, bool otherwise, bool *out) {
     rey_xml_property *property;
     rey_result result = take(ctx, node, name, 1 << REY_XML_BOOLEAN_VALUE, "boolean", &property);
     *out = !result && property ? property->boolean : otherwise;
@@ -240,8 +238,7 @@ static rey_result fail_child(rey_context *ctx, const rey_xml_node *node, const r
                                  child->node->type, child->name);
     }
     return rey_xml_fail(ctx, child->at, REY_ERROR_SCENE, "%s '%.100s' has no use for the %s '%.100s'",
-                        rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag),
-                        child->node->type);
+                        rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag), child->node->type);
 }
 
 rey_result rey_xml_check_unused(rey_context *ctx, const rey_xml_node *node, const char *(*known)(void *user, int i),

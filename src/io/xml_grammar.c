@@ -11,7 +11,7 @@ static const XmlTag tags[] = {
 #define OBJECT_TAG(symbol, name) {name, XML_OBJECT, REY_XML_##symbol, 1, {"type", "id", "name"}},
     REY_XML_TAGS(OBJECT_TAG)
 #undef OBJECT_TAG
-    {"boolean", XML_VALUE, REY_XML_BOOLEAN_VALUE, 2, {"name", "value"}},
+        {"boolean", XML_VALUE, REY_XML_BOOLEAN_VALUE, 2, {"name", "value"}},
     {"integer", XML_VALUE, REY_XML_INTEGER_VALUE, 2, {"name", "value"}},
     {"float", XML_VALUE, REY_XML_FLOAT_VALUE, 2, {"name", "value"}},
     {"string", XML_VALUE, REY_XML_STRING_VALUE, 2, {"name", "value"}},
@@ -133,8 +133,8 @@ rey_result xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *ext
     for (int i = 0; i < tag->required; i++) {
         const XmlAttribute *item = xml_attribute(out, tag->attributes[i]);
         if (!item) {
-            return rey_xml_fail(ctx, xml_element_position(file), REY_ERROR_SCENE,
-                                "<%s> lacks the attribute '%s'", tag->name, tag->attributes[i]);
+            return rey_xml_fail(ctx, xml_element_position(file), REY_ERROR_SCENE, "<%s> lacks the attribute '%s'",
+                                tag->name, tag->attributes[i]);
         }
         if (!item->value[0] && strcmp(item->name, "value") != 0) {
             return rey_xml_fail(ctx, item->at, REY_ERROR_SCENE, "attribute '%s' of <%s> is empty", item->name,

@@ -27,9 +27,9 @@ typedef struct XmlIds { // hash table, open addressing
 struct rey_xml_document {
     XmlBlock *blocks;
     rey_xml_node *root;
-    Array nodes;      // rey_xml_node *
-    Array folders;    // const char *, in the order of the <path> tags
-    Array spectra;    // double *, data of spectra read from files
+    Array nodes;   // rey_xml_node *
+    Array folders; // const char *, in the order of the <path> tags
+    Array spectra; // double *, data of spectra read from files
     XmlIds ids;
     const char *folder; // of the scene file
 };
@@ -41,10 +41,10 @@ char *xml_keep_text(rey_context *ctx, rey_xml_document *document, const char *te
 // ---- reader ------------------------------------------------------------------------------------------------------
 
 enum {
-    XML_LARGEST_FILE = 1 << 30,  // bytes, all files of a scene together
-    XML_MOST_INCLUDES = 4096,    // files of a scene
-    XML_MOST_NAMES = 4096,       // named properties and children of one object; <default>s of one scene
-    XML_LONGEST_VALUE = 1 << 20, // bytes of an attribute after substitution
+    XML_LARGEST_FILE = 1 << 30,     // bytes, all files of a scene together
+    XML_MOST_INCLUDES = 4096,       // files of a scene
+    XML_MOST_NAMES = 4096,          // named properties and children of one object; <default>s of one scene
+    XML_LONGEST_VALUE = 1 << 20,    // bytes of an attribute after substitution
     XML_MOST_SUBSTITUTED = 1 << 26, // bytes that substitution may produce in one scene
     XML_MOST_ATTRIBUTES = 8,
 };
@@ -68,11 +68,11 @@ typedef struct XmlFile { // one file being parsed; a chain from the innermost to
 
 typedef struct XmlFrame { // one open element
     const struct XmlTag *tag;
-    rey_xml_node *node;        // objects
-    bool splice;               // root <scene> of an included file: its content goes to the object around
-    Array properties;          // rey_xml_property
-    Array children;            // rey_xml_child
-    Array names;               // const char *: taken in this object
+    rey_xml_node *node;         // objects
+    bool splice;                // root <scene> of an included file: its content goes to the object around
+    Array properties;           // rey_xml_property
+    Array children;             // rey_xml_child
+    Array names;                // const char *: taken in this object
     rey_xml_property transform; // of an open <transform>
 } XmlFrame;
 
@@ -87,7 +87,8 @@ typedef struct XmlReader {
     size_t bytes_read, substituted;
 } XmlReader;
 
-// ---- elements (xml_grammar.c, xml_element.c) ---------------------------------------------------------------------------------
+// ---- elements (xml_grammar.c, xml_element.c)
+// ---------------------------------------------------------------------------------
 
 typedef enum XmlClass {
     XML_OBJECT,    // becomes a node
@@ -102,9 +103,9 @@ typedef enum XmlOperation { XML_TRANSLATE, XML_SCALE, XML_ROTATE, XML_LOOKAT, XM
 typedef struct XmlTag {
     const char *name;
     XmlClass class;
-    int which; // rey_xml_tag, rey_xml_kind, XmlOperation or XmlSpecial
-    int required;                  // that many of the attributes must be given
-    const char *attributes[6];     // null at the end
+    int which;                 // rey_xml_tag, rey_xml_kind, XmlOperation or XmlSpecial
+    int required;              // that many of the attributes must be given
+    const char *attributes[6]; // null at the end
 } XmlTag;
 
 typedef struct XmlAttribute {
@@ -140,8 +141,8 @@ rey_result xml_parse_text(XmlReader *reader, const char *name, const char *text,
 rey_result xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
                     size_t *bytes);
 // path when absolute, else the first of the folders that has it; null in *out when none has (xml_file.c).
-rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,
-                      const char *path, char **out);
+rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder, const char *path,
+                      char **out);
 // Error that a file was not found, with the folders searched (xml_file.c).
 rey_result xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
                          const char *first_folder, const char *path);

@@ -99,8 +99,8 @@ static rey_result measure(XmlReader *reader, rey_xml_node *node, int depth) {
     for (int i = 0; i < node->child_count; i++) {
         rey_xml_child *child = &node->children[i];
         if (child->node->height == OPEN) {
-            return rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE,
-                                "reference cycle: '%.100s' contains itself", child->ref ? child->ref : "object");
+            return rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE, "reference cycle: '%.100s' contains itself",
+                                child->ref ? child->ref : "object");
         }
         if (depth >= REY_XML_DEEPEST) {
             return rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE,
@@ -129,8 +129,7 @@ static rey_result load_spectrum(XmlReader *reader, rey_xml_property *property) {
     double **storage = rey_array_push(ctx, &reader->document->spectra, sizeof(double *), 1);
     char *path = NULL, *text = NULL;
     size_t bytes = 0;
-    rey_result result =
-        storage ? xml_search(ctx, reader->document, NULL, property->string, &path) : REY_ERROR_MEMORY;
+    rey_result result = storage ? xml_search(ctx, reader->document, NULL, property->string, &path) : REY_ERROR_MEMORY;
     if (!result && !path) {
         result = xml_not_found(ctx, reader->document, property->at, NULL, property->string);
     }

@@ -97,14 +97,13 @@ static const char *lookat(const double origin[3], const double target[3], const 
 static rey_result read_point(XmlReader *reader, const XmlAttribute *attribute, double out[3]) {
     int count = 0;
     rey_result result = xml_read_numbers(reader, attribute, 3, out, &count);
-    return result || count == 3 ? result
-                                : rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE,
-                                               "bad %s '%.60s', expected three numbers", attribute->name,
-                                               attribute->value);
+    return result || count == 3
+               ? result
+               : rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s', expected three numbers",
+                              attribute->name, attribute->value);
 }
 
-static rey_result read_lookat(XmlReader *reader, const XmlAttributes *attributes, rey_xml_position at,
-                              double out[16]) {
+static rey_result read_lookat(XmlReader *reader, const XmlAttributes *attributes, rey_xml_position at, double out[16]) {
     double points[3][3] = {{0}};
     static const char *const names[] = {"origin", "target", "up"};
     for (int i = 0; i < 3; i++) {
@@ -126,8 +125,7 @@ static rey_result read_matrix(XmlReader *reader, const XmlAttribute *value, doub
         return result;
     }
     if (count != 9 && count != 16) {
-        return rey_xml_fail(reader->ctx, value->at, REY_ERROR_SCENE, "%d numbers in a matrix, expected 16 or 9",
-                            count);
+        return rey_xml_fail(reader->ctx, value->at, REY_ERROR_SCENE, "%d numbers in a matrix, expected 16 or 9", count);
     }
     xml_identity(out);
     for (int i = 0; i < count; i++) {

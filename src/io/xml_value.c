@@ -25,8 +25,8 @@ static const char *skip_separators(const char *text) {
 }
 
 static rey_result fail_value(XmlReader *reader, const XmlAttribute *attribute, const char *expected) {
-    return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s', expected %s",
-                        attribute->name, attribute->value, strlen(attribute->value) > 60 ? "..." : "", expected);
+    return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s', expected %s", attribute->name,
+                        attribute->value, strlen(attribute->value) > 60 ? "..." : "", expected);
 }
 
 // Numbers separated by blanks and commas; *count becomes -1 when something else is in the list or there are more than
@@ -121,8 +121,7 @@ static rey_result read_spectrum(XmlReader *reader, const XmlAttributes *attribut
                             "<spectrum> needs either 'value' or 'filename'");
     }
     if (filename) { // loaded when the whole scene has been read
-        property->string =
-            xml_keep_text(reader->ctx, reader->document, filename->value, strlen(filename->value));
+        property->string = xml_keep_text(reader->ctx, reader->document, filename->value, strlen(filename->value));
         return property->string ? REY_OK : REY_ERROR_MEMORY;
     }
     int pairs = count_pairs(value->value);
