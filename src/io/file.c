@@ -1,0 +1,146 @@
+// file.c: whole files in and out.
+#define _GNU_SOURCE // mkostemp and the GNU strerror_r
+#include "io/file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static rey_result fail_errno(rey_context *ctx, const char *path, const char *action) {
+    int code = errno;
+    char reason[128] = "";
+    const char *text = strerror_r(code, reason, sizeof reason); // the GNU form: may return a constant instead
+    return rey_fail(ctx, REY_ERROR_IO, "%s: cannot %s: %s", path, action, text);
+}
+
+// Makes room for more bytes: the size already read plus half of it again, at least `least` in all.
+static unsigned char *grow(rey_context *ctx, unsigned char *bytes, size_t size, size_t *capacity, size_t least) {
+    size_t larger = *capacity + *capacity / 2;
+    larger = larger < least ? least : larger;
+    unsigned char *grown = rey_alloc(ctx, larger);
+    if (grown) {
+        if (size) {
+            memcpy(grown, bytes, size);
+        }
+        *capacity = larger;
+    }
+    rey_free(ctx, bytes);
+    return grown;
+}
+
+// Reads until the end of the file. The size that the system states is only a hint: pipes and /proc files state 0.
+static rey_result read_all(rey_context *ctx, const char *path, int file, size_t hint, unsigned char **out,
+                           size_t *out_size) {
+    enum { STEP = 1 << 16, MOST = 1 << 30 };
+    size_t size = 0, capacity = hint + 1;
+    unsigned char *bytes = rey_alloc(ctx, capacity);
+    while (bytes) {
+        size_t room = capacity - size - 1; // one byte stays for the closing zero
+        if (room == 0) {
+            // A file that filled its stated size usually ends here: look before growing.
+            unsigned char extra;
+            ssize_t more = read(file, &extra, 1);
+            if (more == 0) {
+                break;
+            }
+            if (more > 0) {
+                bytes = grow(ctx, bytes, size, &capacity, size + STEP);
+                if (bytes) {
+                    bytes[size++] = extra;
+                }
+            } else if (errno != EINTR) {
+                rey_free(ctx, bytes);
+                return fail_errno(ctx, path, "read");
+            }
+            continue;
+        }
+        ssize_t got = read(file, bytes + size, room < MOST ? room : MOST);
+        if (got == 0) {
+            break;
+        }
+        if (got > 0) {
+            size += (size_t)got;
+        } else if (errno != EINTR) {
+            rey_free(ctx, bytes);
+            return fail_errno(ctx, path, "read");
+        }
+    }
+    if (!bytes) {
+        return rey_fail(ctx, REY_ERROR_MEMORY, "%s: out of memory reading the file", path);
+    }
+    bytes[size] = 0;
+    *out = bytes;
+    *out_size = size;
+    return REY_OK;
+}
+
+rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size) {
+    *bytes = NULL;
+    *size = 0;
+    int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file < 0) {
+        return fail_errno(ctx, path, "open");
+    }
+    struct stat status;
+    rey_result result = REY_OK;
+    if (fstat(file, &status) != 0) {
+        result = fail_errno(ctx, path, "read");
+    } else if (S_ISDIR(status.st_mode)) {
+        result = rey_fail(ctx, REY_ERROR_IO, "%s: cannot read: is a directory, expected a file", path);
+    } else {
+        size_t hint = S_ISREG(status.st_mode) && status.st_size > 0 ? (size_t)status.st_size : 0;
+        result = read_all(ctx, path, file, hint, bytes, size);
+    }
+    close(file);
+    return result;
+}
+
+static rey_result write_all(rey_context *ctx, const char *path, int file, const unsigned char *bytes, size_t size) {
+    enum { MOST = 1 << 30 };
+    while (size) {
+        ssize_t put = write(file, bytes, size < MOST ? size : MOST);
+        if (put > 0) {
+            bytes += put;
+            size -= (size_t)put;
+        } else if (put == 0 || errno != EINTR) {
+            return fail_errno(ctx, path, "write");
+        }
+    }
+    return fsync(file) == 0 || errno == EINVAL || errno == EROFS ? REY_OK : fail_errno(ctx, path, "write");
+}
+
+rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size) {
+    static const char suffix[] = ".XXXXXX";
+    size_t length = strlen(path);
+    char *temporary = rey_alloc(ctx, length + sizeof suffix);
+    if (!temporary) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(temporary, path, length);
+    memcpy(temporary + length, suffix, sizeof suffix);
+    int file = mkostemp(temporary, O_CLOEXEC);
+    rey_result result = file < 0 ? fail_errno(ctx, path, "create") : write_all(ctx, path, file, bytes, size);
+    if (file >= 0) {
+        // mkostemp makes files private; give the modes an ordinary new file, or the replaced file, would have.
+        struct stat status;
+        mode_t mode = stat(path, &status) == 0 ? status.st_mode & 0777 : 0644;
+        if (result == REY_OK && fchmod(file, mode) != 0) {
+            result = fail_errno(ctx, path, "create");
+        }
+        if (close(file) != 0 && result == REY_OK) {
+            result = fail_errno(ctx, path, "write");
+        }
+        if (result == REY_OK && rename(temporary, path) != 0) {
+            result = fail_errno(ctx, path, "replace");
+        }
+        if (result != REY_OK) {
+            unlink(temporary);
+        }
+    }
+    rey_free(ctx, temporary);
+    return result;
+}

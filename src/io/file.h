@@ -1,0 +1,13 @@
+// file.h: whole files in and out, with errors that name the path.
+#pragma once
+
+#include "base/context.h"
+
+// Reads a whole file (or pipe). *bytes holds *size bytes and one zero byte after them, so text readers may stop there;
+// the caller frees it with rey_free. Directories and files that cannot be opened or read are REY_ERROR_IO; on failure
+// *bytes is null and *size 0.
+rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size);
+
+// Writes a file so that path holds either its former content or all of the new: a temporary file beside it is
+// written, flushed to the device and renamed over it. On failure the temporary file is removed.
+rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size);
