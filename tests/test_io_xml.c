@@ -1,4 +1,5 @@
 // test_io_xml.c: the XML reader: what good documents become, where bad ones are wrong, and that nothing leaks.
+#define _GNU_SOURCE // mkdtemp
 #include "base/context.h"
 #include "io/xml.h"
 #include "io/xml_parts.h"
@@ -373,6 +374,10 @@ static const BadCase bad_cases[] = {
     {REY_ERROR_IO, S " <include filename='.'/></scene>", ":2:11: file '.' was not found"},
     {REY_ERROR_IO, S " <path value='none'/></scene>", ":2:8: '"},
     {REY_ERROR_SCENE, S " <film type='a'><path value='.'/></film></scene>", ":2:17: <path> must stand directly"},
+    {REY_ERROR_SCENE,
+     "<scene version='0.6.0'>\n <bsdf type='diffuse'><rgb name='reflectance' value='1'/>\n"
+     "<rgb name='diffuseReflectance' value='1'/></bsdf></scene>",
+     ":3:1: 'reflectance' is given twice in bsdf 'diffuse'"},
     {REY_ERROR_SCENE, "<!DOCTYPE s [<!ENTITY a 'b'>]>\n" S "</scene>", ":1:13: document type declarations"},
 };
 
@@ -519,6 +524,40 @@ static void test_limits(void **state) {
     free(text);
 }
 
+// Writes files f0.xml, f1.xml, ... that each include the next `times` times, reads the first, and removes them again.
+static void read_chain(rey_context *ctx, int files, int times, const char *message) {
+    char folder[] = "/tmp/reynolds-test-XXXXXX", path[128];
+    assert_non_null(mkdtemp(folder));
+    for (int i = 0; i < files; i++) {
+        snprintf(path, sizeof path, "%s/f%d.xml", folder, i);
+        FILE *stream = fopen(path, "w");
+        assert_non_null(stream);
+        fprintf(stream, "<scene version='3.0.0'>");
+        for (int k = 0; k < times && i + 1 < files; k++) {
+            fprintf(stream, "<include filename='f%d.xml'/>", i + 1);
+        }
+        fprintf(stream, "</scene>");
+        fclose(stream);
+    }
+    snprintf(path, sizeof path, "%s/f0.xml", folder);
+    rey_xml_document *document = NULL;
+    rey_result result = rey_xml_read(ctx, path, NULL, 0, &document);
+    rey_xml_free(ctx, document);
+    for (int i = 0; i < files; i++) {
+        snprintf(path, sizeof path, "%s/f%d.xml", folder, i);
+        remove(path);
+    }
+    remove(folder);
+    assert_int_equal(result, message ? REY_ERROR_SCENE : REY_OK);
+    assert_true(!message || strstr(rey_error(ctx), message));
+}
+
+static void test_include_limits(void **state) {
+    read_chain(*state, 60, 1, NULL);
+    read_chain(*state, 70, 1, "files are included more than 64 deep");
+    read_chain(*state, 20, 2, "more than 4096 files are included");
+}
+
 // ---- truncation, failing memory ----------------------------------------------------------------------------------
 
 static const char small_scene[] =
@@ -636,7 +675,7 @@ static void parse_folder(rey_context *ctx, const char *folder) {
 static void test_conformance(void **state) {
     const char *folder = getenv("REYNOLDS_CONFORMANCE_DIR");
     folder = folder ? folder : PROJECT_DIR "/../shared/conformance";
-    if (!xml_is_folder(folder)) {
+    if (!rey_xml_is_folder(folder)) {
         print_message("skipped: no folder %s\n", folder);
         skip();
     }
@@ -660,6 +699,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_wrong_kinds, setup, teardown),
         cmocka_unit_test_setup_teardown(test_bad_files, setup, teardown),
         cmocka_unit_test_setup_teardown(test_limits, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_include_limits, setup, teardown),
         cmocka_unit_test_setup_teardown(test_truncated, setup, teardown),
         cmocka_unit_test(test_failing_memory),
         cmocka_unit_test_setup_teardown(test_conformance, setup, teardown),

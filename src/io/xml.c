@@ -6,7 +6,7 @@
 
 // ---- memory ------------------------------------------------------------------------------------------------------
 
-void *xml_keep(rey_context *ctx, rey_xml_document *document, size_t bytes) {
+void *rey_xml_keep(rey_context *ctx, rey_xml_document *document, size_t bytes) {
     enum { BLOCK = 1 << 14 };
     size_t size = (bytes + 15) / 16 * 16;
     XmlBlock *block = document->blocks;
@@ -25,8 +25,8 @@ void *xml_keep(rey_context *ctx, rey_xml_document *document, size_t bytes) {
     return memory;
 }
 
-char *xml_keep_text(rey_context *ctx, rey_xml_document *document, const char *text, size_t length) {
-    char *copy = xml_keep(ctx, document, length + 1);
+char *rey_xml_keep_text(rey_context *ctx, rey_xml_document *document, const char *text, size_t length) {
+    char *copy = rey_xml_keep(ctx, document, length + 1);
     if (copy) {
         memcpy(copy, text, length);
         copy[length] = '\0';
@@ -55,8 +55,8 @@ void rey_xml_free(rey_context *ctx, rey_xml_document *document) {
 
 // ---- messages ----------------------------------------------------------------------------------------------------
 
-rey_result xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result code, const char *format,
-                             va_list arguments) {
+rey_result rey_xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result code, const char *format,
+                                 va_list arguments) {
     char text[1536];
     vsnprintf(text, sizeof text, format, arguments);
     return rey_fail(ctx, code, "%s:%d:%d: %s", at.file ? at.file : "scene", at.line, at.column, text);
@@ -65,7 +65,7 @@ rey_result xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result c
 rey_result rey_xml_fail(rey_context *ctx, rey_xml_position at, rey_result code, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    xml_fail_position(ctx, at, code, format, arguments);
+    rey_xml_fail_position(ctx, at, code, format, arguments);
     va_end(arguments);
     return code;
 }
@@ -101,7 +101,7 @@ static void stop_on(XmlFile *file, rey_result result) {
 static void XMLCALL on_start(void *user, const XML_Char *name, const XML_Char **attributes) {
     XmlFile *file = user;
     if (!file->reader->result) {
-        stop_on(file, xml_start_element(file, name, attributes));
+        stop_on(file, rey_xml_start_element(file, name, attributes));
     }
 }
 
@@ -109,7 +109,7 @@ static void XMLCALL on_end(void *user, const XML_Char *name) {
     UNUSED(name);
     XmlFile *file = user;
     if (!file->reader->result) {
-        stop_on(file, xml_end_element(file));
+        stop_on(file, rey_xml_end_element(file));
     }
 }
 
@@ -172,11 +172,11 @@ static rey_result run_parser(XmlFile *file) {
     return result;
 }
 
-rey_result xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes) {
+rey_result rey_xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes) {
     XmlFile file = {.reader = reader,
                     .parent = reader->file,
-                    .name = xml_keep_text(reader->ctx, reader->document, name, strlen(name)),
-                    .folder = xml_folder_of(reader->ctx, reader->document, name),
+                    .name = rey_xml_keep_text(reader->ctx, reader->document, name, strlen(name)),
+                    .folder = rey_xml_folder_of(reader->ctx, reader->document, name),
                     .text = text,
                     .bytes = bytes,
                     .base = reader->frames.count,
@@ -198,7 +198,7 @@ static rey_result take_defines(XmlReader *reader, const rey_define *defines, int
         if (!defines[i].name || !defines[i].value || !defines[i].name[0]) {
             return rey_xml_fail(reader->ctx, at, REY_ERROR_ARGUMENT, "a define needs a name and a value");
         }
-        rey_result result = xml_add_define(reader, defines[i].name, defines[i].value, true, at);
+        rey_result result = rey_xml_add_define(reader, defines[i].name, defines[i].value, true, at);
         if (result) {
             return result;
         }
@@ -209,24 +209,24 @@ static rey_result take_defines(XmlReader *reader, const rey_define *defines, int
 static rey_result read_document(XmlReader *reader, const char *path, const char *text, size_t bytes,
                                 const rey_define *defines, int count) {
     rey_xml_document *document = reader->document;
-    rey_xml_position at = {xml_keep_text(reader->ctx, document, path, strlen(path)), 1, 1};
-    document->folder = xml_folder_of(reader->ctx, document, path);
+    rey_xml_position at = {rey_xml_keep_text(reader->ctx, document, path, strlen(path)), 1, 1};
+    document->folder = rey_xml_folder_of(reader->ctx, document, path);
     if (!at.file || !document->folder) {
         return REY_ERROR_MEMORY;
     }
     char *loaded = NULL;
     rey_result result = take_defines(reader, defines, count, at);
     if (!result && !text) {
-        result = xml_load(reader, at, path, true, &loaded, &bytes);
+        result = rey_xml_load(reader, at, path, true, &loaded, &bytes);
     }
     if (!result) {
-        result = xml_parse_text(reader, path, text ? text : loaded, bytes);
+        result = rey_xml_parse_text(reader, path, text ? text : loaded, bytes);
     }
     if (!result) {
-        result = xml_resolve_references(reader);
+        result = rey_xml_resolve_references(reader);
     }
     if (!result) {
-        result = xml_check_defines(reader, at);
+        result = rey_xml_check_defines(reader, at);
     }
     rey_free(reader->ctx, loaded);
     return result;
@@ -241,7 +241,7 @@ rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *t
     }
     rey_result result = read_document(&reader, path, text, bytes, defines, define_count);
     for (size_t i = 0; i < reader.frames.count; i++) {
-        xml_free_frame(ctx, &ARRAY_AT(reader.frames, XmlFrame, i));
+        rey_xml_free_frame(ctx, &ARRAY_AT(reader.frames, XmlFrame, i));
     }
     rey_array_free(ctx, &reader.frames);
     rey_array_free(ctx, &reader.defines);
@@ -273,7 +273,7 @@ rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index) {
 }
 
 rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id) {
-    return xml_find_id(&document->ids, id);
+    return rey_xml_lookup_id(&document->ids, id);
 }
 
 const char *rey_xml_tag_name(rey_xml_tag tag) {

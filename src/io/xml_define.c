@@ -13,8 +13,8 @@ static XmlDefine *find_define(XmlReader *reader, const char *name) {
     return NULL;
 }
 
-rey_result xml_add_define(XmlReader *reader, const char *name, const char *value, bool from_caller,
-                          rey_xml_position at) {
+rey_result rey_xml_add_define(XmlReader *reader, const char *name, const char *value, bool from_caller,
+                              rey_xml_position at) {
     if (find_define(reader, name)) {
         return from_caller ? rey_xml_fail(reader->ctx, at, REY_ERROR_ARGUMENT, "'%.100s' is defined twice", name)
                            : REY_OK; // the caller or an earlier <default> goes first
@@ -22,8 +22,8 @@ rey_result xml_add_define(XmlReader *reader, const char *name, const char *value
     if (reader->defines.count >= XML_MOST_NAMES) {
         return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "more than %d defaults", XML_MOST_NAMES);
     }
-    XmlDefine define = {.name = xml_keep_text(reader->ctx, reader->document, name, strlen(name)),
-                        .value = xml_keep_text(reader->ctx, reader->document, value, strlen(value)),
+    XmlDefine define = {.name = rey_xml_keep_text(reader->ctx, reader->document, name, strlen(name)),
+                        .value = rey_xml_keep_text(reader->ctx, reader->document, value, strlen(value)),
                         .from_caller = from_caller};
     XmlDefine *slot =
         define.name && define.value ? rey_array_push(reader->ctx, &reader->defines, sizeof define, 1) : NULL;
@@ -83,7 +83,7 @@ static rey_result append(XmlReader *reader, Array *out, const char *text, size_t
     return REY_OK;
 }
 
-rey_result xml_substitute(XmlReader *reader, const char *text, rey_xml_position at, const char **out) {
+rey_result rey_xml_substitute(XmlReader *reader, const char *text, rey_xml_position at, const char **out) {
     *out = text;
     if (!strchr(text, '$')) {
         return REY_OK;
@@ -110,7 +110,7 @@ rey_result xml_substitute(XmlReader *reader, const char *text, rey_xml_position 
         }
     }
     if (!result) {
-        *out = xml_keep_text(reader->ctx, reader->document, buffer.data ? buffer.data : "", buffer.count);
+        *out = rey_xml_keep_text(reader->ctx, reader->document, buffer.data ? buffer.data : "", buffer.count);
         result = *out ? REY_OK : REY_ERROR_MEMORY;
     }
     rey_array_free(reader->ctx, &buffer);
@@ -128,7 +128,7 @@ static const char *unclaimed_name(void *user, int i) { // names that the file it
     return NULL;
 }
 
-rey_result xml_check_defines(XmlReader *reader, rey_xml_position at) {
+rey_result rey_xml_check_defines(XmlReader *reader, rey_xml_position at) {
     for (size_t i = 0; i < reader->defines.count; i++) {
         XmlDefine *define = &ARRAY_AT(reader->defines, XmlDefine, i);
         if (define->from_caller && !define->used) {

@@ -8,11 +8,11 @@
 
 // ---- frames ------------------------------------------------------------------------------------------------------
 
-XmlFrame *xml_top_frame(XmlReader *reader) {
+XmlFrame *rey_xml_top_frame(XmlReader *reader) {
     return reader->frames.count ? &ARRAY_AT(reader->frames, XmlFrame, reader->frames.count - 1) : NULL;
 }
 
-XmlFrame *xml_object_frame(XmlReader *reader) {
+XmlFrame *rey_xml_object_frame(XmlReader *reader) {
     for (size_t i = reader->frames.count; i > 0; i--) {
         XmlFrame *frame = &ARRAY_AT(reader->frames, XmlFrame, i - 1);
         if (frame->node) {
@@ -22,7 +22,7 @@ XmlFrame *xml_object_frame(XmlReader *reader) {
     return NULL;
 }
 
-void xml_free_frame(rey_context *ctx, XmlFrame *frame) {
+void rey_xml_free_frame(rey_context *ctx, XmlFrame *frame) {
     rey_array_free(ctx, &frame->properties);
     rey_array_free(ctx, &frame->children);
     rey_array_free(ctx, &frame->names);
@@ -39,7 +39,7 @@ static rey_result push_frame(XmlReader *reader, const XmlTag *tag, rey_xml_node 
     return REY_OK;
 }
 
-rey_result xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *name, rey_xml_position at) {
+rey_result rey_xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *name, rey_xml_position at) {
     for (size_t i = 0; i < frame->names.count; i++) {
         if (strcmp(ARRAY_AT(frame->names, const char *, i), name) == 0) {
             return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "'%.100s' is given twice in %s '%.100s'", name,
@@ -63,8 +63,8 @@ static int next_order(const XmlFrame *frame) {
 }
 
 static rey_result add_property(XmlReader *reader, rey_xml_property property) {
-    XmlFrame *frame = xml_object_frame(reader);
-    rey_result result = xml_claim_name(reader, frame, property.name, property.at);
+    XmlFrame *frame = rey_xml_object_frame(reader);
+    rey_result result = rey_xml_claim_name(reader, frame, property.name, property.at);
     property.order = next_order(frame);
     rey_xml_property *slot = result ? NULL : rey_array_push(reader->ctx, &frame->properties, sizeof property, 1);
     if (!slot) {
@@ -75,7 +75,7 @@ static rey_result add_property(XmlReader *reader, rey_xml_property property) {
 }
 
 static rey_result add_child(XmlReader *reader, XmlFrame *frame, rey_xml_child child) {
-    rey_result result = child.name ? xml_claim_name(reader, frame, child.name, child.at) : REY_OK;
+    rey_result result = child.name ? rey_xml_claim_name(reader, frame, child.name, child.at) : REY_OK;
     child.order = next_order(frame);
     rey_xml_child *slot = result ? NULL : rey_array_push(reader->ctx, &frame->children, sizeof child, 1);
     if (!slot) {
@@ -88,24 +88,24 @@ static rey_result add_child(XmlReader *reader, XmlFrame *frame, rey_xml_child ch
 // Copies an attribute into the document; null when absent or empty. A name of an old file is brought up to date.
 static rey_result keep_attribute(XmlFile *file, const XmlAttributes *attributes, const char *name, const char **out) {
     *out = NULL;
-    const XmlAttribute *attribute = xml_attribute(attributes, name);
+    const XmlAttribute *attribute = rey_xml_attribute_named(attributes, name);
     if (!attribute || !attribute->value[0]) {
         return REY_OK;
     }
-    *out = xml_keep_text(file->reader->ctx, file->reader->document, attribute->value, strlen(attribute->value));
+    *out = rey_xml_keep_text(file->reader->ctx, file->reader->document, attribute->value, strlen(attribute->value));
     if (!*out) {
         return REY_ERROR_MEMORY;
     }
-    return file->version[0] < 2 && strcmp(name, "name") == 0 ? xml_upgrade_name(file->reader, out) : REY_OK;
+    return file->version[0] < 2 && strcmp(name, "name") == 0 ? rey_xml_upgrade_name(file->reader, out) : REY_OK;
 }
 
 // ---- root --------------------------------------------------------------------------------------------------------
 
 static rey_result check_version(XmlFile *file, const XmlTag *tag, const XmlAttributes *attributes) {
     rey_context *ctx = file->reader->ctx;
-    const XmlAttribute *attribute = xml_attribute(attributes, "version");
+    const XmlAttribute *attribute = rey_xml_attribute_named(attributes, "version");
     if (!attribute) {
-        return rey_xml_fail(ctx, xml_element_position(file), REY_ERROR_SCENE,
+        return rey_xml_fail(ctx, rey_xml_element_position(file), REY_ERROR_SCENE,
                             "<%s> lacks the attribute 'version', expected for example version=\"3.0.0\"", tag->name);
     }
     const char *c = attribute->value;
@@ -132,7 +132,7 @@ static rey_result check_version(XmlFile *file, const XmlTag *tag, const XmlAttri
 
 static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    rey_xml_node *node = xml_keep(reader->ctx, reader->document, sizeof *node);
+    rey_xml_node *node = rey_xml_keep(reader->ctx, reader->document, sizeof *node);
     rey_xml_node **listed =
         node ? rey_array_push(reader->ctx, &reader->document->nodes, sizeof(rey_xml_node *), 1) : NULL;
     if (!listed) {
@@ -140,7 +140,7 @@ static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttrib
     }
     *listed = node;
     node->tag = (rey_xml_tag)tag->which;
-    node->at = xml_element_position(file);
+    node->at = rey_xml_element_position(file);
     rey_result result = keep_attribute(file, attributes, "id", &node->id);
     if (!result) {
         result = keep_attribute(file, attributes, "name", &node->name);
@@ -152,9 +152,9 @@ static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttrib
         node->type = "scene";
     }
     if (!result && node->id) {
-        result = xml_add_id(reader, node->id, node, xml_attribute(attributes, "id")->at);
+        result = rey_xml_add_id(reader, node->id, node, rey_xml_attribute_named(attributes, "id")->at);
     }
-    XmlFrame *parent = xml_object_frame(reader);
+    XmlFrame *parent = rey_xml_object_frame(reader);
     if (!result && parent) {
         result = add_child(reader, parent, (rey_xml_child){.node = node, .name = node->name, .at = node->at});
     }
@@ -167,7 +167,7 @@ static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttrib
 static rey_result end_object(XmlFile *file, XmlFrame *frame) {
     XmlReader *reader = file->reader;
     if (file->version[0] < 2) {
-        rey_result result = xml_upgrade_object(reader, frame);
+        rey_result result = rey_xml_upgrade_object(reader, frame);
         if (result) {
             return result;
         }
@@ -175,8 +175,8 @@ static rey_result end_object(XmlFile *file, XmlFrame *frame) {
     rey_xml_node *node = frame->node;
     size_t property_bytes = frame->properties.count * sizeof(rey_xml_property);
     size_t child_bytes = frame->children.count * sizeof(rey_xml_child);
-    node->properties = xml_keep(reader->ctx, reader->document, property_bytes);
-    node->children = xml_keep(reader->ctx, reader->document, child_bytes);
+    node->properties = rey_xml_keep(reader->ctx, reader->document, property_bytes);
+    node->children = rey_xml_keep(reader->ctx, reader->document, child_bytes);
     if (!node->properties || !node->children) {
         return REY_ERROR_MEMORY;
     }
@@ -195,18 +195,18 @@ static rey_result end_object(XmlFile *file, XmlFrame *frame) {
 
 static rey_result begin_value(XmlFile *file, const XmlTag *tag, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    rey_xml_property property = {.at = xml_element_position(file), .kind = (rey_xml_kind)tag->which};
+    rey_xml_property property = {.at = rey_xml_element_position(file), .kind = (rey_xml_kind)tag->which};
     rey_result result = keep_attribute(file, attributes, "name", &property.name);
     if (!result && property.kind == REY_XML_TRANSFORM_VALUE) {
-        xml_identity(property.matrix);
+        rey_xml_identity(property.matrix);
         result = push_frame(reader, tag, NULL, false);
         if (!result) {
-            xml_top_frame(reader)->transform = property; // becomes a property when it is complete
+            rey_xml_top_frame(reader)->transform = property; // becomes a property when it is complete
         }
         return result;
     }
     if (!result) {
-        result = xml_read_value(reader, tag, attributes, &property);
+        result = rey_xml_read_value(reader, tag, attributes, &property);
     }
     if (!result) {
         result = add_property(reader, property);
@@ -217,43 +217,43 @@ static rey_result begin_value(XmlFile *file, const XmlTag *tag, const XmlAttribu
 // ---- ref, default, include, path, alias --------------------------------------------------------------------------
 
 static rey_result do_ref(XmlFile *file, const XmlAttributes *attributes) {
-    rey_xml_child child = {.at = xml_element_position(file)};
+    rey_xml_child child = {.at = rey_xml_element_position(file)};
     rey_result result = keep_attribute(file, attributes, "id", &child.ref);
     if (!result) {
         result = keep_attribute(file, attributes, "name", &child.name);
     }
-    return result ? result : add_child(file->reader, xml_object_frame(file->reader), child);
+    return result ? result : add_child(file->reader, rey_xml_object_frame(file->reader), child);
 }
 
 static rey_result do_alias(XmlFile *file, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    const XmlAttribute *id = xml_attribute(attributes, "id");
-    rey_xml_node *node = xml_find_id(&reader->document->ids, id->value);
+    const XmlAttribute *id = rey_xml_attribute_named(attributes, "id");
+    rey_xml_node *node = rey_xml_lookup_id(&reader->document->ids, id->value);
     if (!node) {
         return rey_xml_fail(reader->ctx, id->at, REY_ERROR_SCENE,
                             "unknown id '%.100s' in <alias>, expected an object declared before this line", id->value);
     }
     const char *other = NULL;
     rey_result result = keep_attribute(file, attributes, "as", &other);
-    return result ? result : xml_add_id(reader, other, node, xml_attribute(attributes, "as")->at);
+    return result ? result : rey_xml_add_id(reader, other, node, rey_xml_attribute_named(attributes, "as")->at);
 }
 
 static rey_result do_path(XmlFile *file, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    const XmlAttribute *value = xml_attribute(attributes, "value");
-    if (xml_top_frame(reader)->tag->which != REY_XML_SCENE) {
-        return rey_xml_fail(reader->ctx, xml_element_position(file), REY_ERROR_SCENE,
+    const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
+    if (rey_xml_top_frame(reader)->tag->which != REY_XML_SCENE) {
+        return rey_xml_fail(reader->ctx, rey_xml_element_position(file), REY_ERROR_SCENE,
                             "<path> must stand directly within <scene>");
     }
-    char *joined = xml_join(reader->ctx, file->folder, value->value);
+    char *joined = rey_xml_join(reader->ctx, file->folder, value->value);
     if (!joined) {
         return REY_ERROR_MEMORY;
     }
     rey_result result = REY_OK;
-    if (!xml_is_folder(joined)) {
+    if (!rey_xml_is_folder(joined)) {
         result = rey_xml_fail(reader->ctx, value->at, REY_ERROR_IO, "'%.400s' is not a folder", joined);
     } else {
-        const char *kept = xml_keep_text(reader->ctx, reader->document, joined, strlen(joined));
+        const char *kept = rey_xml_keep_text(reader->ctx, reader->document, joined, strlen(joined));
         const char **slot = kept ? rey_array_push(reader->ctx, &reader->document->folders, sizeof *slot, 1) : NULL;
         if (slot) {
             *slot = kept;
@@ -283,21 +283,21 @@ static rey_result check_include(XmlFile *file, rey_xml_position at, const char *
 
 static rey_result do_include(XmlFile *file, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    const XmlAttribute *name = xml_attribute(attributes, "filename");
+    const XmlAttribute *name = rey_xml_attribute_named(attributes, "filename");
     char *path = NULL, *text = NULL;
     size_t bytes = 0;
-    rey_result result = xml_search(reader->ctx, reader->document, file->folder, name->value, &path);
+    rey_result result = rey_xml_search(reader->ctx, reader->document, file->folder, name->value, &path);
     if (!result && !path) {
-        result = xml_not_found(reader->ctx, reader->document, name->at, file->folder, name->value);
+        result = rey_xml_not_found(reader->ctx, reader->document, name->at, file->folder, name->value);
     }
     if (!result) {
         result = check_include(file, name->at, path);
     }
     if (!result) {
-        result = xml_load(reader, name->at, path, false, &text, &bytes);
+        result = rey_xml_load(reader, name->at, path, false, &text, &bytes);
     }
     if (!result) {
-        result = xml_parse_text(reader, path, text ? text : "", bytes);
+        result = rey_xml_parse_text(reader, path, text ? text : "", bytes);
     }
     rey_free(reader->ctx, text);
     rey_free(reader->ctx, path);
@@ -311,8 +311,9 @@ static rey_result do_special(XmlFile *file, const XmlTag *tag, const XmlAttribut
         result = do_ref(file, attributes);
         break;
     case XML_DEFAULT:
-        result = xml_add_define(file->reader, xml_attribute(attributes, "name")->value,
-                                xml_attribute(attributes, "value")->value, false, xml_element_position(file));
+        result = rey_xml_add_define(file->reader, rey_xml_attribute_named(attributes, "name")->value,
+                                    rey_xml_attribute_named(attributes, "value")->value, false,
+                                    rey_xml_element_position(file));
         break;
     case XML_INCLUDE:
         result = do_include(file, attributes);
@@ -331,7 +332,7 @@ static rey_result do_special(XmlFile *file, const XmlTag *tag, const XmlAttribut
 
 static rey_result check_place(XmlFile *file, const XmlTag *tag, const XmlFrame *parent) {
     rey_context *ctx = file->reader->ctx;
-    rey_xml_position at = xml_element_position(file);
+    rey_xml_position at = rey_xml_element_position(file);
     if (!parent) {
         return tag->class == XML_OBJECT
                    ? REY_OK
@@ -350,7 +351,7 @@ static rey_result check_place(XmlFile *file, const XmlTag *tag, const XmlFrame *
                         parent->tag->name, expected);
 }
 
-rey_result xml_start_element(XmlFile *file, const char *name, const char **given) {
+rey_result rey_xml_start_element(XmlFile *file, const char *name, const char **given) {
     XmlReader *reader = file->reader;
     bool root = reader->frames.count == file->base;
     bool has_type = false;
@@ -359,16 +360,16 @@ rey_result xml_start_element(XmlFile *file, const char *name, const char **given
     }
     const XmlTag *tag = NULL;
     XmlAttributes attributes;
-    rey_result result = xml_find_tag(file, name, has_type, &tag);
+    rey_result result = rey_xml_find_tag(file, name, has_type, &tag);
     if (!result) {
-        result = check_place(file, tag, root ? NULL : xml_top_frame(reader));
+        result = check_place(file, tag, root ? NULL : rey_xml_top_frame(reader));
     }
     if (!result && reader->frames.count >= REY_XML_DEEPEST) {
-        result = rey_xml_fail(reader->ctx, xml_element_position(file), REY_ERROR_SCENE,
+        result = rey_xml_fail(reader->ctx, rey_xml_element_position(file), REY_ERROR_SCENE,
                               "elements are nested more than %d deep", REY_XML_DEEPEST);
     }
     if (!result) {
-        result = xml_take_attributes(file, tag, root ? "version" : NULL, given, &attributes);
+        result = rey_xml_take_attributes(file, tag, root ? "version" : NULL, given, &attributes);
     }
     if (!result && root) {
         result = check_version(file, tag, &attributes);
@@ -383,8 +384,8 @@ rey_result xml_start_element(XmlFile *file, const char *name, const char **given
     case XML_VALUE:
         return begin_value(file, tag, &attributes);
     case XML_OPERATION:
-        result = xml_apply_operation(reader, tag, &attributes, xml_element_position(file),
-                                     xml_top_frame(reader)->transform.matrix);
+        result = rey_xml_apply_operation(reader, tag, &attributes, rey_xml_element_position(file),
+                                         rey_xml_top_frame(reader)->transform.matrix);
         return result ? result : push_frame(reader, tag, NULL, false);
     case XML_SPECIAL:
         break;
@@ -392,17 +393,17 @@ rey_result xml_start_element(XmlFile *file, const char *name, const char **given
     return do_special(file, tag, &attributes);
 }
 
-rey_result xml_end_element(XmlFile *file) {
+rey_result rey_xml_end_element(XmlFile *file) {
     XmlReader *reader = file->reader;
-    XmlFrame *frame = xml_top_frame(reader);
+    XmlFrame *frame = rey_xml_top_frame(reader);
     rey_result result = REY_OK;
     if (frame->node) {
         result = end_object(file, frame);
     } else if (frame->tag->class == XML_VALUE && frame->tag->which == REY_XML_TRANSFORM_VALUE) {
         result = add_property(reader, frame->transform);
-        frame = xml_top_frame(reader);
+        frame = rey_xml_top_frame(reader);
     }
-    xml_free_frame(reader->ctx, frame);
+    rey_xml_free_frame(reader->ctx, frame);
     reader->frames.count--;
     return result;
 }

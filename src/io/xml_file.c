@@ -6,20 +6,20 @@
 #include <string.h>
 #include <sys/stat.h>
 
-bool xml_is_folder(const char *path) {
+bool rey_xml_is_folder(const char *path) {
     struct stat info;
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
 }
 
-char *xml_folder_of(rey_context *ctx, rey_xml_document *document, const char *path) {
+char *rey_xml_folder_of(rey_context *ctx, rey_xml_document *document, const char *path) {
     const char *slash = strrchr(path, '/');
     if (!slash) {
-        return xml_keep_text(ctx, document, ".", 1);
+        return rey_xml_keep_text(ctx, document, ".", 1);
     }
-    return xml_keep_text(ctx, document, path, slash == path ? 1 : (size_t)(slash - path));
+    return rey_xml_keep_text(ctx, document, path, slash == path ? 1 : (size_t)(slash - path));
 }
 
-char *xml_join(rey_context *ctx, const char *folder, const char *path) {
+char *rey_xml_join(rey_context *ctx, const char *folder, const char *path) {
     if (path[0] == '/' || strcmp(folder, ".") == 0) {
         return rey_strdup(ctx, path);
     }
@@ -46,12 +46,12 @@ static const char *search_folder(const rey_xml_document *document, const char *f
     return i == count ? document->folder : NULL;
 }
 
-rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder, const char *path,
-                      char **out) {
+rey_result rey_xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,
+                          const char *path, char **out) {
     *out = NULL;
     const char *folder;
     for (size_t i = 0; (folder = search_folder(document, first_folder, i)); i++) {
-        char *candidate = xml_join(ctx, folder, path);
+        char *candidate = rey_xml_join(ctx, folder, path);
         if (!candidate) {
             return REY_ERROR_MEMORY;
         }
@@ -65,8 +65,8 @@ rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const 
     return REY_OK;
 }
 
-rey_result xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
-                         const char *first_folder, const char *path) {
+rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
+                             const char *first_folder, const char *path) {
     if (path[0] == '/') {
         return rey_xml_fail(ctx, at, REY_ERROR_IO, "there is no file '%.400s'", path);
     }
@@ -106,8 +106,8 @@ static rey_result read_all(XmlReader *reader, rey_xml_position at, const char *p
     }
 }
 
-rey_result xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
-                    size_t *bytes) {
+rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
+                        size_t *bytes) {
     *text = NULL;
     *bytes = 0;
     struct stat info;
@@ -148,9 +148,9 @@ rey_result rey_xml_resolve_file(rey_context *ctx, const rey_xml_document *docume
     if (!path) {
         return rey_xml_fail(ctx, node->at, REY_ERROR_SCENE, "'%s' must be a string, not an object", name);
     }
-    result = xml_search(ctx, document, NULL, path, out);
+    result = rey_xml_search(ctx, document, NULL, path, out);
     if (!result && !*out) {
-        result = xml_not_found(ctx, document, rey_xml_find(node, name)->at, NULL, path);
+        result = rey_xml_not_found(ctx, document, rey_xml_find(node, name)->at, NULL, path);
     }
     return result;
 }

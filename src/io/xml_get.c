@@ -126,7 +126,7 @@ rey_result rey_xml_get_vec3(rey_context *ctx, const rey_xml_node *node, const ch
 rey_result rey_xml_get_transform(rey_context *ctx, const rey_xml_node *node, const char *name, double out[16]) {
     rey_xml_property *property;
     rey_result result = take(ctx, node, name, 1 << REY_XML_TRANSFORM_VALUE, "transform", &property);
-    xml_identity(out);
+    rey_xml_identity(out);
     if (!result && property) {
         memcpy(out, property->matrix, sizeof property->matrix);
     }

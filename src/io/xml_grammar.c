@@ -41,12 +41,12 @@ static const char *next_attribute(void *user, int i) {
     return i < COUNT_OF(tag->attributes) ? tag->attributes[i] : NULL;
 }
 
-rey_xml_position xml_element_position(const XmlFile *file) {
+rey_xml_position rey_xml_element_position(const XmlFile *file) {
     return (rey_xml_position){file->name, (int)XML_GetCurrentLineNumber(file->parser),
                               (int)XML_GetCurrentColumnNumber(file->parser) + 1};
 }
 
-rey_result xml_find_tag(XmlFile *file, const char *name, bool has_type, const XmlTag **out) {
+rey_result rey_xml_find_tag(XmlFile *file, const char *name, bool has_type, const XmlTag **out) {
     if (file->version[0] < 2 && file->reader->frames.count > file->base && strcmp(name, "lookAt") == 0) {
         name = "lookat"; // spelling of version 0.x
     }
@@ -57,7 +57,7 @@ rey_result xml_find_tag(XmlFile *file, const char *name, bool has_type, const Xm
             return REY_OK;
         }
     }
-    return rey_xml_fail_word(file->reader->ctx, xml_element_position(file), name, next_tag, NULL,
+    return rey_xml_fail_word(file->reader->ctx, rey_xml_element_position(file), name, next_tag, NULL,
                              "unknown tag <%.100s>, expected an object, a value, or one of ref, default, include, "
                              "path, alias",
                              name);
@@ -66,7 +66,7 @@ rey_result xml_find_tag(XmlFile *file, const char *name, bool has_type, const Xm
 // Position of the attribute's name, found in the text of the start tag. The tag's own position when the file is in an
 // encoding where ASCII is not ASCII. expat has checked the tag, so its text is well-formed.
 static rey_xml_position attribute_position(const XmlFile *file, const char *name) {
-    rey_xml_position at = xml_element_position(file), here = at;
+    rey_xml_position at = rey_xml_element_position(file), here = at;
     XML_Index index = XML_GetCurrentByteIndex(file->parser);
     size_t length = strlen(name);
     if (index < 0 || (size_t)index >= file->bytes || file->text[index] != '<') {
@@ -93,7 +93,7 @@ static rey_xml_position attribute_position(const XmlFile *file, const char *name
     return at;
 }
 
-const XmlAttribute *xml_attribute(const XmlAttributes *attributes, const char *name) {
+const XmlAttribute *rey_xml_attribute_named(const XmlAttributes *attributes, const char *name) {
     for (int i = 0; i < attributes->count; i++) {
         if (strcmp(attributes->items[i].name, name) == 0) {
             return &attributes->items[i];
@@ -112,8 +112,8 @@ static bool takes(const XmlTag *tag, const char *name) {
     return false;
 }
 
-rey_result xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *extra, const char **given,
-                               XmlAttributes *out) {
+rey_result rey_xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *extra, const char **given,
+                                   XmlAttributes *out) {
     rey_context *ctx = file->reader->ctx;
     out->count = 0;
     for (; given[0]; given += 2) {
@@ -125,15 +125,15 @@ rey_result xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *ext
         XmlAttribute *item = &out->items[out->count++];
         item->name = name;
         item->at = attribute_position(file, name);
-        rey_result result = xml_substitute(file->reader, given[1], item->at, &item->value);
+        rey_result result = rey_xml_substitute(file->reader, given[1], item->at, &item->value);
         if (result) {
             return result;
         }
     }
     for (int i = 0; i < tag->required; i++) {
-        const XmlAttribute *item = xml_attribute(out, tag->attributes[i]);
+        const XmlAttribute *item = rey_xml_attribute_named(out, tag->attributes[i]);
         if (!item) {
-            return rey_xml_fail(ctx, xml_element_position(file), REY_ERROR_SCENE, "<%s> lacks the attribute '%s'",
+            return rey_xml_fail(ctx, rey_xml_element_position(file), REY_ERROR_SCENE, "<%s> lacks the attribute '%s'",
                                 tag->name, tag->attributes[i]);
         }
         if (!item->value[0] && strcmp(item->name, "value") != 0) {

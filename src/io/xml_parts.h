@@ -35,8 +35,8 @@ struct rey_xml_document {
 };
 
 // Memory that lives as long as the document; null (and a recorded message) on failure.
-void *xml_keep(rey_context *ctx, rey_xml_document *document, size_t bytes);
-char *xml_keep_text(rey_context *ctx, rey_xml_document *document, const char *text, size_t length);
+void *rey_xml_keep(rey_context *ctx, rey_xml_document *document, size_t bytes);
+char *rey_xml_keep_text(rey_context *ctx, rey_xml_document *document, const char *text, size_t length);
 
 // ---- reader ------------------------------------------------------------------------------------------------------
 
@@ -87,8 +87,7 @@ typedef struct XmlReader {
     size_t bytes_read, substituted;
 } XmlReader;
 
-// ---- elements (xml_grammar.c, xml_element.c)
-// ---------------------------------------------------------------------------------
+// ---- grammar (xml_grammar.c) and elements (xml_element.c) --------------------------------------------------------
 
 typedef enum XmlClass {
     XML_OBJECT,    // becomes a node
@@ -118,62 +117,62 @@ typedef struct XmlAttributes {
     int count;
 } XmlAttributes;
 
-const XmlAttribute *xml_attribute(const XmlAttributes *attributes, const char *name); // null when absent
+const XmlAttribute *rey_xml_attribute_named(const XmlAttributes *attributes, const char *name); // null when absent
 
-rey_result xml_start_element(XmlFile *file, const char *name, const char **attributes);
-rey_xml_position xml_element_position(const XmlFile *file);
+rey_result rey_xml_start_element(XmlFile *file, const char *name, const char **attributes);
+rey_xml_position rey_xml_element_position(const XmlFile *file);
 // Tag by name; an error with the nearest tag when there is none. has_type tells <spectrum type> from <spectrum value>.
-rey_result xml_find_tag(XmlFile *file, const char *name, bool has_type, const XmlTag **out);
+rey_result rey_xml_find_tag(XmlFile *file, const char *name, bool has_type, const XmlTag **out);
 // Substitutes in, and checks, the attributes of a tag. extra: one more name that is allowed, or null.
-rey_result xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *extra, const char **given,
-                               XmlAttributes *out);
-rey_result xml_end_element(XmlFile *file);
-XmlFrame *xml_top_frame(XmlReader *reader);    // null when none
-XmlFrame *xml_object_frame(XmlReader *reader); // innermost object that takes properties; null when none
-void xml_free_frame(rey_context *ctx, XmlFrame *frame);
-rey_result xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *name, rey_xml_position at);
+rey_result rey_xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *extra, const char **given,
+                                   XmlAttributes *out);
+rey_result rey_xml_end_element(XmlFile *file);
+XmlFrame *rey_xml_top_frame(XmlReader *reader);    // null when none
+XmlFrame *rey_xml_object_frame(XmlReader *reader); // innermost object that takes properties; null when none
+void rey_xml_free_frame(rey_context *ctx, XmlFrame *frame);
+rey_result rey_xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *name, rey_xml_position at);
 
 // ---- the others --------------------------------------------------------------------------------------------------
 
 // Parses one file's text into the open frames (xml.c).
-rey_result xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes);
+rey_result rey_xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes);
 // Reads a file into rey_alloc'ed memory. Only regular files unless any_kind (xml_file.c).
-rey_result xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
-                    size_t *bytes);
+rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
+                        size_t *bytes);
 // path when absolute, else the first of the folders that has it; null in *out when none has (xml_file.c).
-rey_result xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder, const char *path,
-                      char **out);
+rey_result rey_xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,
+                          const char *path, char **out);
 // Error that a file was not found, with the folders searched (xml_file.c).
-rey_result xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
-                         const char *first_folder, const char *path);
-char *xml_folder_of(rey_context *ctx, rey_xml_document *document, const char *path); // kept by the document
-char *xml_join(rey_context *ctx, const char *folder, const char *path);              // freed by the caller
-bool xml_is_folder(const char *path);
+rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
+                             const char *first_folder, const char *path);
+char *rey_xml_folder_of(rey_context *ctx, rey_xml_document *document, const char *path); // kept by the document
+char *rey_xml_join(rey_context *ctx, const char *folder, const char *path);              // freed by the caller
+bool rey_xml_is_folder(const char *path);
 
 // $name (xml_define.c).
-rey_result xml_add_define(XmlReader *reader, const char *name, const char *value, bool from_caller,
-                          rey_xml_position at);
-rey_result xml_substitute(XmlReader *reader, const char *text, rey_xml_position at, const char **out);
-rey_result xml_check_defines(XmlReader *reader, rey_xml_position at);
+rey_result rey_xml_add_define(XmlReader *reader, const char *name, const char *value, bool from_caller,
+                              rey_xml_position at);
+rey_result rey_xml_substitute(XmlReader *reader, const char *text, rey_xml_position at, const char **out);
+rey_result rey_xml_check_defines(XmlReader *reader, rey_xml_position at);
 
 // Values and transforms (xml_value.c, xml_transform.c).
-rey_result xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
-                          rey_xml_property *property);
-rey_result xml_read_vector(XmlReader *reader, const XmlAttributes *attributes, double otherwise, double out[3]);
-rey_result xml_read_numbers(XmlReader *reader, const XmlAttribute *attribute, int most, double *out, int *count);
-rey_result xml_apply_operation(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
-                               rey_xml_position at, double matrix[16]);
-void xml_identity(double matrix[16]);
-void xml_multiply_left(double matrix[16], const double left[16]); // matrix = left * matrix
+rey_result rey_xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
+                              rey_xml_property *property);
+rey_result rey_xml_read_vector(XmlReader *reader, const XmlAttributes *attributes, double otherwise, double out[3]);
+rey_result rey_xml_read_numbers(XmlReader *reader, const XmlAttribute *attribute, int most, double *out, int *count);
+rey_result rey_xml_apply_operation(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
+                                   rey_xml_position at, double matrix[16]);
+void rey_xml_identity(double matrix[16]);
+void rey_xml_multiply_left(double matrix[16], const double left[16]); // matrix = left * matrix
 
 // Ids and references (xml_refs.c).
-rey_result xml_add_id(XmlReader *reader, const char *id, rey_xml_node *node, rey_xml_position at);
-rey_xml_node *xml_find_id(const XmlIds *ids, const char *id);
-rey_result xml_resolve_references(XmlReader *reader);
+rey_result rey_xml_add_id(XmlReader *reader, const char *id, rey_xml_node *node, rey_xml_position at);
+rey_xml_node *rey_xml_lookup_id(const XmlIds *ids, const char *id);
+rey_result rey_xml_resolve_references(XmlReader *reader);
 
 // Files older than version 2 (xml_upgrade.c). The name is rewritten into memory of the document.
-rey_result xml_upgrade_name(XmlReader *reader, const char **name);
-rey_result xml_upgrade_object(XmlReader *reader, XmlFrame *frame);
+rey_result rey_xml_upgrade_name(XmlReader *reader, const char **name);
+rey_result rey_xml_upgrade_object(XmlReader *reader, XmlFrame *frame);
 
-rey_result xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result code, const char *format,
-                             va_list arguments);
+rey_result rey_xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result code, const char *format,
+                                 va_list arguments);

@@ -21,7 +21,7 @@ static XmlId *id_slot(const XmlIds *ids, const char *id) {
     return &ids->slots[i];
 }
 
-rey_xml_node *xml_find_id(const XmlIds *ids, const char *id) {
+rey_xml_node *rey_xml_lookup_id(const XmlIds *ids, const char *id) {
     return ids->capacity ? id_slot(ids, id)->node : NULL;
 }
 
@@ -41,7 +41,7 @@ static rey_result grow(rey_context *ctx, XmlIds *ids) {
     return REY_OK;
 }
 
-rey_result xml_add_id(XmlReader *reader, const char *id, rey_xml_node *node, rey_xml_position at) {
+rey_result rey_xml_add_id(XmlReader *reader, const char *id, rey_xml_node *node, rey_xml_position at) {
     XmlIds *ids = &reader->document->ids;
     if (ids->count >= ids->capacity / 2 && grow(reader->ctx, ids)) {
         return REY_ERROR_MEMORY;
@@ -79,7 +79,7 @@ static rey_result link_children(XmlReader *reader, rey_xml_node *node) {
         if (!child->ref) {
             continue;
         }
-        child->node = xml_find_id(&reader->document->ids, child->ref);
+        child->node = rey_xml_lookup_id(&reader->document->ids, child->ref);
         if (!child->node) {
             IdCursor cursor = {&reader->document->ids, 0};
             return rey_xml_fail_word(reader->ctx, child->at, child->ref, next_id, &cursor,
@@ -129,12 +129,13 @@ static rey_result load_spectrum(XmlReader *reader, rey_xml_property *property) {
     double **storage = rey_array_push(ctx, &reader->document->spectra, sizeof(double *), 1);
     char *path = NULL, *text = NULL;
     size_t bytes = 0;
-    rey_result result = storage ? xml_search(ctx, reader->document, NULL, property->string, &path) : REY_ERROR_MEMORY;
+    rey_result result =
+        storage ? rey_xml_search(ctx, reader->document, NULL, property->string, &path) : REY_ERROR_MEMORY;
     if (!result && !path) {
-        result = xml_not_found(ctx, reader->document, property->at, NULL, property->string);
+        result = rey_xml_not_found(ctx, reader->document, property->at, NULL, property->string);
     }
     if (!result) {
-        result = xml_load(reader, property->at, path, false, &text, &bytes);
+        result = rey_xml_load(reader, property->at, path, false, &text, &bytes);
     }
     if (!result) {
         result = rey_spectrum_read_memory(ctx, path, text, bytes, &property->spectrum, storage);
@@ -156,7 +157,7 @@ static rey_result load_spectra(XmlReader *reader, rey_xml_node *node) {
     return result;
 }
 
-rey_result xml_resolve_references(XmlReader *reader) {
+rey_result rey_xml_resolve_references(XmlReader *reader) {
     const Array *nodes = &reader->document->nodes;
     for (size_t i = 0; i < nodes->count; i++) {
         rey_xml_node *node = ARRAY_AT(*nodes, rey_xml_node *, i);

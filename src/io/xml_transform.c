@@ -4,13 +4,13 @@
 #include <math.h>
 #include <string.h>
 
-void xml_identity(double matrix[16]) {
+void rey_xml_identity(double matrix[16]) {
     for (int i = 0; i < 16; i++) {
         matrix[i] = i % 5 == 0;
     }
 }
 
-void xml_multiply_left(double matrix[16], const double left[16]) {
+void rey_xml_multiply_left(double matrix[16], const double left[16]) {
     double product[16];
     for (int row = 0; row < 4; row++) {
         for (int column = 0; column < 4; column++) {
@@ -51,7 +51,7 @@ static void rotation(const double a[3], double degrees, double out[16]) {
     double radians = degrees * (3.14159265358979323846 / 180);
     double c = cos(radians), s = sin(radians);
     const double skew[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
-    xml_identity(out);
+    rey_xml_identity(out);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             out[i * 4 + j] = (i == j) * c + s * skew[i * 3 + j] + (1 - c) * a[i] * a[j];
@@ -84,7 +84,7 @@ static const char *lookat(const double origin[3], const double target[3], const 
         return "'up' is parallel to the viewing direction";
     }
     cross(direction, left, new_up);
-    xml_identity(out);
+    rey_xml_identity(out);
     for (int i = 0; i < 3; i++) {
         out[i * 4] = left[i];
         out[i * 4 + 1] = new_up[i];
@@ -96,7 +96,7 @@ static const char *lookat(const double origin[3], const double target[3], const 
 
 static rey_result read_point(XmlReader *reader, const XmlAttribute *attribute, double out[3]) {
     int count = 0;
-    rey_result result = xml_read_numbers(reader, attribute, 3, out, &count);
+    rey_result result = rey_xml_read_numbers(reader, attribute, 3, out, &count);
     return result || count == 3
                ? result
                : rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s', expected three numbers",
@@ -107,7 +107,7 @@ static rey_result read_lookat(XmlReader *reader, const XmlAttributes *attributes
     double points[3][3] = {{0}};
     static const char *const names[] = {"origin", "target", "up"};
     for (int i = 0; i < 3; i++) {
-        const XmlAttribute *attribute = xml_attribute(attributes, names[i]);
+        const XmlAttribute *attribute = rey_xml_attribute_named(attributes, names[i]);
         rey_result result = attribute ? read_point(reader, attribute, points[i]) : REY_OK;
         if (result) {
             return result;
@@ -120,14 +120,14 @@ static rey_result read_lookat(XmlReader *reader, const XmlAttributes *attributes
 static rey_result read_matrix(XmlReader *reader, const XmlAttribute *value, double out[16]) {
     double numbers[16] = {0};
     int count = 0;
-    rey_result result = xml_read_numbers(reader, value, 16, numbers, &count);
+    rey_result result = rey_xml_read_numbers(reader, value, 16, numbers, &count);
     if (result) {
         return result;
     }
     if (count != 9 && count != 16) {
         return rey_xml_fail(reader->ctx, value->at, REY_ERROR_SCENE, "%d numbers in a matrix, expected 16 or 9", count);
     }
-    xml_identity(out);
+    rey_xml_identity(out);
     for (int i = 0; i < count; i++) {
         out[count == 16 ? i : i / 3 * 4 + i % 3] = numbers[i];
     }
@@ -142,10 +142,10 @@ static rey_result read_rotation(XmlReader *reader, const XmlAttributes *attribut
                                 double out[16]) {
     double axis[3], angle = 0;
     int count = 0;
-    const XmlAttribute *attribute = xml_attribute(attributes, "angle");
-    rey_result result = xml_read_vector(reader, attributes, 0, axis);
+    const XmlAttribute *attribute = rey_xml_attribute_named(attributes, "angle");
+    rey_result result = rey_xml_read_vector(reader, attributes, 0, axis);
     if (!result) {
-        result = xml_read_numbers(reader, attribute, 1, &angle, &count);
+        result = rey_xml_read_numbers(reader, attribute, 1, &angle, &count);
     }
     if (result) {
         return result;
@@ -161,20 +161,20 @@ static rey_result read_rotation(XmlReader *reader, const XmlAttributes *attribut
     return REY_OK;
 }
 
-rey_result xml_apply_operation(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
-                               rey_xml_position at, double matrix[16]) {
+rey_result rey_xml_apply_operation(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
+                                   rey_xml_position at, double matrix[16]) {
     double operation[16], v[3];
     rey_result result = REY_OK;
-    xml_identity(operation);
+    rey_xml_identity(operation);
     switch ((XmlOperation)tag->which) {
     case XML_TRANSLATE:
-        result = xml_read_vector(reader, attributes, 0, v);
+        result = rey_xml_read_vector(reader, attributes, 0, v);
         for (int i = 0; i < 3 && !result; i++) {
             operation[i * 4 + 3] = v[i];
         }
         break;
     case XML_SCALE:
-        result = xml_read_vector(reader, attributes, 1, v);
+        result = rey_xml_read_vector(reader, attributes, 1, v);
         for (int i = 0; i < 3 && !result; i++) {
             operation[i * 5] = v[i];
         }
@@ -186,13 +186,13 @@ rey_result xml_apply_operation(XmlReader *reader, const XmlTag *tag, const XmlAt
         result = read_lookat(reader, attributes, at, operation);
         break;
     case XML_MATRIX:
-        result = read_matrix(reader, xml_attribute(attributes, "value"), operation);
+        result = read_matrix(reader, rey_xml_attribute_named(attributes, "value"), operation);
         break;
     }
     if (result) {
         return result;
     }
-    xml_multiply_left(matrix, operation);
+    rey_xml_multiply_left(matrix, operation);
     for (int i = 0; i < 16; i++) {
         if (!isfinite(matrix[i])) {
             return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "the transform overflows");

@@ -12,9 +12,9 @@ static bool is_upper(char c) {
 }
 
 // camelCase to snake_case: toWorld -> to_world, intIOR -> int_ior. A name that begins with a capital stays.
-rey_result xml_upgrade_name(XmlReader *reader, const char **name) {
+rey_result rey_xml_upgrade_name(XmlReader *reader, const char **name) {
     const char *old = *name;
-    char *new = xml_keep(reader->ctx, reader->document, 2 * strlen(old) + 1);
+    char *new = rey_xml_keep(reader->ctx, reader->document, 2 * strlen(old) + 1);
     if (!new) {
         return REY_ERROR_MEMORY;
     }
@@ -33,15 +33,23 @@ rey_result xml_upgrade_name(XmlReader *reader, const char **name) {
     return REY_OK;
 }
 
-static void rename_in(XmlFrame *frame, const char *from, const char *to) {
+// Renames the property or child `from`, if there is one; an error when the name is taken.
+static rey_result rename_in(XmlReader *reader, XmlFrame *frame, const char *from, const char *to) {
     for (size_t i = 0; i < frame->properties.count; i++) {
         rey_xml_property *property = &ARRAY_AT(frame->properties, rey_xml_property, i);
-        property->name = strcmp(property->name, from) == 0 ? to : property->name;
+        if (strcmp(property->name, from) == 0) {
+            property->name = to;
+            return rey_xml_claim_name(reader, frame, to, property->at);
+        }
     }
     for (size_t i = 0; i < frame->children.count; i++) {
         rey_xml_child *child = &ARRAY_AT(frame->children, rey_xml_child, i);
-        child->name = child->name && strcmp(child->name, from) == 0 ? to : child->name;
+        if (child->name && strcmp(child->name, from) == 0) {
+            child->name = to;
+            return rey_xml_claim_name(reader, frame, to, child->at);
+        }
     }
+    return REY_OK;
 }
 
 // uoffset, voffset, uscale, vscale -> to_uv. Version 0.x looked a texture up at uv * scale + offset.
@@ -50,7 +58,7 @@ static rey_result collect_uv(XmlReader *reader, XmlFrame *frame) {
     static const int entries[] = {0, 5, 3, 7}; // of the matrix
     rey_xml_property *properties = frame->properties.data;
     rey_xml_property to_uv = {.name = "to_uv", .kind = REY_XML_TRANSFORM_VALUE};
-    xml_identity(to_uv.matrix);
+    rey_xml_identity(to_uv.matrix);
     size_t kept = 0;
     for (size_t i = 0; i < frame->properties.count; i++) {
         int which = 0;
@@ -71,15 +79,16 @@ static rey_result collect_uv(XmlReader *reader, XmlFrame *frame) {
     if (kept == frame->properties.count) {
         return REY_OK;
     }
-    rey_result result = xml_claim_name(reader, frame, to_uv.name, to_uv.at);
+    rey_result result = rey_xml_claim_name(reader, frame, to_uv.name, to_uv.at);
     properties[kept] = to_uv;
     frame->properties.count = kept + 1;
     return result;
 }
 
-rey_result xml_upgrade_object(XmlReader *reader, XmlFrame *frame) {
-    if (frame->node->tag == REY_XML_BSDF && strcmp(frame->node->type, "diffuse") == 0) {
-        rename_in(frame, "diffuse_reflectance", "reflectance");
+rey_result rey_xml_upgrade_object(XmlReader *reader, XmlFrame *frame) {
+    const rey_xml_node *node = frame->node;
+    if (node->tag == REY_XML_BSDF && strcmp(node->type, "diffuse") == 0) {
+        return rename_in(reader, frame, "diffuse_reflectance", "reflectance");
     }
-    return frame->node->tag == REY_XML_TEXTURE ? collect_uv(reader, frame) : REY_OK;
+    return node->tag == REY_XML_TEXTURE ? collect_uv(reader, frame) : REY_OK;
 }

@@ -42,16 +42,16 @@ static void read_list(const char *text, int most, double *out, int *count) {
     }
 }
 
-rey_result xml_read_numbers(XmlReader *reader, const XmlAttribute *attribute, int most, double *out, int *count) {
+rey_result rey_xml_read_numbers(XmlReader *reader, const XmlAttribute *attribute, int most, double *out, int *count) {
     read_list(attribute->value, most, out, count);
     return *count < 0 ? fail_value(reader, attribute, "numbers separated by blanks or commas") : REY_OK;
 }
 
-rey_result xml_read_vector(XmlReader *reader, const XmlAttributes *attributes, double otherwise, double out[3]) {
+rey_result rey_xml_read_vector(XmlReader *reader, const XmlAttributes *attributes, double otherwise, double out[3]) {
     static const char *const axes[] = {"x", "y", "z"};
-    const XmlAttribute *value = xml_attribute(attributes, "value");
+    const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
     for (int i = 0; i < 3; i++) {
-        const XmlAttribute *axis = xml_attribute(attributes, axes[i]);
+        const XmlAttribute *axis = rey_xml_attribute_named(attributes, axes[i]);
         int count = 1;
         out[i] = otherwise;
         if (axis && value) {
@@ -89,7 +89,7 @@ static int count_pairs(const char *text) {
 
 // "400:0.3, 500:0.4": wavelengths first, values after them, in one block of the document.
 static rey_result read_pairs(XmlReader *reader, const XmlAttribute *attribute, int count, rey_spectrum *out) {
-    double *wavelengths = xml_keep(reader->ctx, reader->document, (size_t)count * 2 * sizeof(double));
+    double *wavelengths = rey_xml_keep(reader->ctx, reader->document, (size_t)count * 2 * sizeof(double));
     if (!wavelengths) {
         return REY_ERROR_MEMORY;
     }
@@ -114,14 +114,14 @@ static rey_result read_pairs(XmlReader *reader, const XmlAttribute *attribute, i
 }
 
 static rey_result read_spectrum(XmlReader *reader, const XmlAttributes *attributes, rey_xml_property *property) {
-    const XmlAttribute *value = xml_attribute(attributes, "value");
-    const XmlAttribute *filename = xml_attribute(attributes, "filename");
+    const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
+    const XmlAttribute *filename = rey_xml_attribute_named(attributes, "filename");
     if (!value == !filename) {
         return rey_xml_fail(reader->ctx, property->at, REY_ERROR_SCENE,
                             "<spectrum> needs either 'value' or 'filename'");
     }
     if (filename) { // loaded when the whole scene has been read
-        property->string = xml_keep_text(reader->ctx, reader->document, filename->value, strlen(filename->value));
+        property->string = rey_xml_keep_text(reader->ctx, reader->document, filename->value, strlen(filename->value));
         return property->string ? REY_OK : REY_ERROR_MEMORY;
     }
     int pairs = count_pairs(value->value);
@@ -155,9 +155,9 @@ static rey_result read_float(XmlReader *reader, const XmlAttribute *value, doubl
     return rey_parse_real(end, &end, out) && !*skip_blanks(end) ? REY_OK : fail_value(reader, value, "a number");
 }
 
-rey_result xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
-                          rey_xml_property *property) {
-    const XmlAttribute *value = xml_attribute(attributes, "value");
+rey_result rey_xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
+                              rey_xml_property *property) {
+    const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
     switch ((rey_xml_kind)tag->which) {
     case REY_XML_BOOLEAN_VALUE:
         return read_boolean(reader, value, &property->boolean);
@@ -166,11 +166,11 @@ rey_result xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttribu
     case REY_XML_FLOAT_VALUE:
         return read_float(reader, value, &property->number);
     case REY_XML_STRING_VALUE:
-        property->string = xml_keep_text(reader->ctx, reader->document, value->value, strlen(value->value));
+        property->string = rey_xml_keep_text(reader->ctx, reader->document, value->value, strlen(value->value));
         return property->string ? REY_OK : REY_ERROR_MEMORY;
     case REY_XML_VECTOR_VALUE:
     case REY_XML_RGB_VALUE:
-        return xml_read_vector(reader, attributes, 0, property->vector);
+        return rey_xml_read_vector(reader, attributes, 0, property->vector);
     case REY_XML_SPECTRUM_VALUE:
         return read_spectrum(reader, attributes, property);
     case REY_XML_TRANSFORM_VALUE:
