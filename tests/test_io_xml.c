@@ -582,6 +582,29 @@ static void test_truncated(void **state) {
     }
 }
 
+// What fuzzing found worth keeping: nothing of it may crash or leak; all failures have a position.
+static void test_corpus(void **state) {
+    rey_context *ctx = *state;
+    DIR *listing = opendir(DATA "corpus");
+    assert_non_null(listing);
+    int count = 0;
+    for (struct dirent *entry; (entry = readdir(listing));) {
+        if (entry->d_name[0] == '.') {
+            continue;
+        }
+        char path[4096];
+        snprintf(path, sizeof path, "%s/%s", DATA "corpus", entry->d_name);
+        rey_xml_document *document = NULL;
+        rey_result result = rey_xml_read(ctx, path, NULL, 0, &document);
+        assert_int_equal(result == REY_OK, document != NULL);
+        assert_true(!result || strncmp(rey_error(ctx), path, strlen(path)) == 0);
+        rey_xml_free(ctx, document);
+        count++;
+    }
+    closedir(listing);
+    assert_true(count > 50);
+}
+
 typedef struct Counter {
     int until_failure, alive;
 } Counter;
@@ -701,6 +724,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_limits, setup, teardown),
         cmocka_unit_test_setup_teardown(test_include_limits, setup, teardown),
         cmocka_unit_test_setup_teardown(test_truncated, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_corpus, setup, teardown),
         cmocka_unit_test(test_failing_memory),
         cmocka_unit_test_setup_teardown(test_conformance, setup, teardown),
     };

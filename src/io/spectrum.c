@@ -1,11 +1,10 @@
 // spectrum.c: source spectra to linear sRGB, the text format of spectra, named materials.
 #include "io/spectrum.h"
 
+#include "io/file.h"
 #include "io/number.h"
 
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -223,31 +222,15 @@ rey_result rey_spectrum_read_memory(rey_context *ctx, const char *file, const ch
 }
 
 rey_result rey_spectrum_read(rey_context *ctx, const char *path, rey_spectrum *out, double **storage) {
-    enum { CHUNK = 1 << 14, LARGEST = 1 << 26 };
     *out = (rey_spectrum){0};
     *storage = NULL;
-    FILE *stream = fopen(path, "rb");
-    if (!stream) {
-        return rey_fail(ctx, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
-    }
-    Array content = {0};
-    rey_result result = REY_OK;
-    for (size_t got = 1; got > 0 && !result;) {
-        char *chunk = rey_array_push(ctx, &content, 1, CHUNK);
-        got = chunk ? fread(chunk, 1, CHUNK, stream) : 0;
-        content.count -= chunk ? CHUNK - got : 0;
-        if (!chunk) {
-            result = REY_ERROR_MEMORY;
-        } else if (ferror(stream) || content.count > LARGEST) {
-            result = rey_fail(ctx, REY_ERROR_IO, "cannot read '%.400s': %s", path,
-                              ferror(stream) ? strerror(errno) : "it is too long for a spectrum");
-        }
-    }
-    fclose(stream);
+    unsigned char *text = NULL;
+    size_t bytes = 0;
+    rey_result result = rey_file_read(ctx, path, &text, &bytes);
     if (!result) {
-        result = rey_spectrum_read_memory(ctx, path, content.data, content.count, out, storage);
+        result = rey_spectrum_read_memory(ctx, path, (const char *)text, bytes, out, storage);
     }
-    rey_array_free(ctx, &content);
+    rey_free(ctx, text);
     return result;
 }
 

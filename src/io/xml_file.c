@@ -1,6 +1,8 @@
 // xml_file.c: finding and loading the files that a scene names.
 #include "io/xml_parts.h"
 
+#include "io/file.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -84,54 +86,30 @@ rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document,
     return rey_xml_fail(ctx, at, REY_ERROR_IO, "file '%.400s' was not found, looked in %s", path, list);
 }
 
-static rey_result read_all(XmlReader *reader, rey_xml_position at, const char *path, FILE *stream, Array *content) {
-    enum { CHUNK = 1 << 16 };
-    for (;;) {
-        char *chunk = rey_array_push(reader->ctx, content, 1, CHUNK);
-        if (!chunk) {
-            return REY_ERROR_MEMORY;
-        }
-        size_t got = fread(chunk, 1, CHUNK, stream);
-        content->count -= CHUNK - got;
-        if (ferror(stream)) {
-            return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot read '%.400s': %s", path, strerror(errno));
-        }
-        if (content->count + reader->bytes_read > XML_LARGEST_FILE) {
-            return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "the scene's files together exceed %d bytes",
-                                XML_LARGEST_FILE);
-        }
-        if (got == 0) {
-            return REY_OK;
-        }
-    }
-}
-
 rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
                         size_t *bytes) {
+    rey_context *ctx = reader->ctx;
     *text = NULL;
     *bytes = 0;
     struct stat info;
     if (stat(path, &info) != 0) {
-        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+        return rey_xml_fail(ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
     }
     if (S_ISDIR(info.st_mode) || (!any_kind && !S_ISREG(info.st_mode))) {
-        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "'%.400s' is not a file", path);
+        return rey_xml_fail(ctx, at, REY_ERROR_IO, "'%.400s' is not a file", path);
     }
-    FILE *stream = fopen(path, "rb");
-    if (!stream) {
-        return rey_xml_fail(reader->ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+    if (info.st_size > (off_t)(XML_LARGEST_FILE - reader->bytes_read)) {
+        return rey_xml_fail(ctx, at, REY_ERROR_SCENE, "the scene's files together exceed %d bytes", XML_LARGEST_FILE);
     }
-    Array content = {0};
-    rey_result result = read_all(reader, at, path, stream, &content);
-    fclose(stream);
-    if (result) {
-        rey_array_free(reader->ctx, &content);
-        return result;
+    unsigned char *content = NULL;
+    rey_result result = rey_file_read(ctx, path, &content, bytes);
+    if (!result && *bytes > XML_LARGEST_FILE - reader->bytes_read) { // a pipe does not say its size beforehand
+        rey_free(ctx, content);
+        return rey_xml_fail(ctx, at, REY_ERROR_SCENE, "the scene's files together exceed %d bytes", XML_LARGEST_FILE);
     }
-    reader->bytes_read += content.count;
-    *text = content.data;
-    *bytes = content.count;
-    return REY_OK;
+    reader->bytes_read += *bytes;
+    *text = (char *)content;
+    return result;
 }
 
 rey_result rey_xml_resolve_file(rey_context *ctx, const rey_xml_document *document, const rey_xml_node *node,
