@@ -1,0 +1,104 @@
+// trace.h: ray packets of the kernel's own width through Embree. Dead lanes carry a harmless ray, because Embree
+// asserts on non-finite input, and non-finite rays are dropped before they get there.
+#pragma once
+
+#include "sensor/perspective.h"
+#include "shape/interaction.h"
+
+#include <embree3/rtcore.h>
+
+#if LANES == 16
+typedef struct RTCRayHit16 RayHitPacket;
+typedef struct RTCRay16 RayPacket;
+#elif LANES == 8
+typedef struct RTCRayHit8 RayHitPacket;
+typedef struct RTCRay8 RayPacket;
+#else
+typedef struct RTCRayHit RayHitPacket;
+typedef struct RTCRay RayPacket;
+#endif
+
+#if LANES == 1
+#define PACKET_F(field) (&(field))
+#define PACKET_I(field) ((int32_t *)&(field))
+#else
+#define PACKET_F(field) (field)
+#define PACKET_I(field) ((int32_t *)(field))
+#endif
+
+// Fills the packet and returns the lanes that may be traced.
+KFN Mask packet_set(RayPacket *packet, const Ray *ray, Mask m) {
+    m = m & m_finite(ray->o.x + ray->o.y + ray->o.z) & m_finite(ray->d.x + ray->d.y + ray->d.z) &
+        m_gt(ray->tmax, f_set(0));
+    f_store(PACKET_F(packet->org_x), f_zero_unless(m, ray->o.x));
+    f_store(PACKET_F(packet->org_y), f_zero_unless(m, ray->o.y));
+    f_store(PACKET_F(packet->org_z), f_zero_unless(m, ray->o.z));
+    f_store(PACKET_F(packet->dir_x), f_zero_unless(m, ray->d.x));
+    f_store(PACKET_F(packet->dir_y), f_zero_unless(m, ray->d.y));
+    f_store(PACKET_F(packet->dir_z), f_select(m, ray->d.z, f_set(1)));
+    f_store(PACKET_F(packet->tnear), f_set(0));
+    f_store(PACKET_F(packet->tfar), f_select(m, ray->tmax, f_set(-1)));
+    f_store(PACKET_F(packet->time), f_set(0));
+    i_store(PACKET_I(packet->mask), i_set(-1));
+    i_store(PACKET_I(packet->id), i_set(0));
+    i_store(PACKET_I(packet->flags), i_set(0));
+    return m;
+}
+
+// Closest hits. Lanes without one have shape -1.
+KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coherent) {
+    RayHitPacket ALIGNED(64) packet;
+    m = packet_set(&packet.ray, ray, m);
+    i_store(PACKET_I(packet.hit.geomID), i_set(-1));
+    i_store(PACKET_I(packet.hit.instID[0]), i_set(-1));
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+#if LANES == 1
+    if (m) {
+        rtcIntersect1(scene->embree, &context, &packet);
+    }
+#else
+    int32_t ALIGNED(64) valid[LANES];
+    i_store(valid, m);
+#if LANES == 16
+    rtcIntersect16(valid, scene->embree, &context, &packet);
+#else
+    rtcIntersect8(valid, scene->embree, &context, &packet);
+#endif
+#endif
+    Hit hit;
+    hit.shape = i_select(m, i_load(PACKET_I(packet.hit.geomID)), i_set(-1));
+    Mask found = mi_lt(i_set(-1), hit.shape);
+    hit.prim = i_select(found, i_load(PACKET_I(packet.hit.primID)), i_set(0));
+    hit.u = f_zero_unless(found, f_load(PACKET_F(packet.hit.u)));
+    hit.v = f_zero_unless(found, f_load(PACKET_F(packet.hit.v)));
+    hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
+    return hit;
+}
+
+// Transmittance along shadow rays: 1 where nothing is in the way, 0 behind a surface. A colour and not a bit, because
+// media will attenuate segment by segment.
+KFN Spec trace_transmittance(const SceneView *scene, const Ray *ray, Mask m) {
+    RayPacket ALIGNED(64) packet;
+    m = packet_set(&packet, ray, m);
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+#if LANES == 1
+    if (m) {
+        rtcOccluded1(scene->embree, &context, &packet);
+    }
+#else
+    int32_t ALIGNED(64) valid[LANES];
+    i_store(valid, m);
+#if LANES == 16
+    rtcOccluded16(valid, scene->embree, &context, &packet);
+#else
+    rtcOccluded8(valid, scene->embree, &context, &packet);
+#endif
+#endif
+    // Embree sets tfar to -infinity where it found something.
+    Mask open = m & m_ge(f_load(PACKET_F(packet.tfar)), f_set(0));
+    return spec_set(f_zero_unless(open, f_set(1)));
+}

@@ -1,0 +1,59 @@
+// api.c: the parts of the public interface that belong to no module: they check arguments and hold no logic.
+#include "io/mitsuba.h"
+#include "render/update.h"
+
+rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                          rey_scene **out) {
+    if (!ctx || !path || !out || (define_count && !defines)) {
+        return REY_ERROR_ARGUMENT;
+    }
+    rey_result result = rey_mitsuba_load(ctx, path, defines, define_count, out);
+    if (result == REY_OK) {
+        result = rey_scene_update(*out);
+    }
+    if (result != REY_OK) {
+        rey_scene_destroy(*out);
+        *out = NULL;
+    }
+    return result;
+}
+
+rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height) {
+    if (sensor < 0 || sensor >= scene->view.sensors_count) {
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", sensor,
+                        (int)scene->view.sensors_count);
+    }
+    *width = scene->view.sensors[sensor].crop_width;
+    *height = scene->view.sensors[sensor].crop_height;
+    return REY_OK;
+}
+
+int rey_scene_sensor_count(const rey_scene *scene) {
+    return (int)scene->view.sensors_count;
+}
+
+void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info) {
+    const SceneView *v = &scene->view;
+    *info = (rey_scene_info){.shapes = v->shapes_count,
+                             .bsdfs = v->bsdfs_count,
+                             .emitters = v->emitters_count,
+                             .textures = v->textures_count,
+                             .sensors = v->sensors_count,
+                             .triangles = v->triangles_count / 3,
+                             .parameters = (int64_t)scene->params.count,
+                             .bytes = (int64_t)scene->arena_bytes,
+                             .sample_count = v->sensors_count ? v->sensors[0].spp : 0,
+                             .max_depth = v->max_depth,
+                             .rr_depth = v->rr_depth,
+                             .integrator = scene->integrator ? scene->integrator : ""};
+    for (int64_t i = 0; i < v->shapes_count; i++) {
+        info->vertices += v->shapes[i].vertex_count;
+    }
+    for (size_t i = 0; i < scene->params.count; i++) {
+        info->parameter_floats += ARRAY_AT(scene->params, Param, i).count;
+    }
+    for (int k = 0; k < 3; k++) {
+        info->bounds[k] = (double)v->bounds_centre[k] - v->bounds_half[k];
+        info->bounds[3 + k] = (double)v->bounds_centre[k] + v->bounds_half[k];
+    }
+}

@@ -1,0 +1,154 @@
+// bsdf.h: dispatch over the scattering functions, generated from kinds.inl. The function is uniform over the lanes.
+#pragma once
+
+#include "bsdf/call.h"
+#include "bsdf/diffuse.h"
+#include "bsdf/mask.h"
+#include "bsdf/null.h"
+#include "bsdf/twosided.h"
+
+enum {
+#define BSDF_LEAF(ENUM, ...) BSDF_##ENUM,
+#define BSDF_ADAPTER(ENUM, ...) BSDF_##ENUM,
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    BSDF_KIND_COUNT
+};
+
+// ---- fetch: texture slots to record; scatter: record adjoint to textures -----------------------------------------
+
+#define FETCH_SPEC texture_eval
+#define FETCH_REAL texture_eval_real
+#define FETCH_IOR texture_eval_real
+#define FETCH_METAL_ETA texture_eval
+#define FETCH_METAL_K texture_eval
+#define FETCH_ALPHA_U texture_eval_real
+#define FETCH_ALPHA_V texture_eval_real
+#define SCATTER_SPEC texture_adj
+#define SCATTER_REAL texture_adj_real
+#define SCATTER_IOR texture_adj_real
+#define SCATTER_METAL_ETA texture_adj
+#define SCATTER_METAL_K texture_adj
+#define SCATTER_ALPHA_U texture_adj_real
+#define SCATTER_ALPHA_V texture_adj_real
+
+#define FETCH_FIELD(type, field, value, low, high, text, option)                                                       \
+    record.field = FETCH_##type(call->scene, node->slot[slot++], call->uv);
+#define FETCH_CONFIG(field, value, choices, text) record.field = node->config[config++];
+#define SCATTER_FIELD(type, field, value, low, high, text, option)                                                     \
+    if (duv || texture_wanted(call->scene, sink, node->slot[slot])) {                                                                     \
+        SCATTER_##type(call->scene, node->slot[slot], call->uv, adjoint.field, duv, sink, m);                          \
+    }                                                                                                                  \
+    slot++;
+
+#define DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)                                                                   \
+    KFN Record prefix##_fetch(const BsdfCall *call) {                                                                  \
+        const BsdfNode *node = call->scene->bsdfs + call->node;                                                        \
+        int slot = 0, config = 0;                                                                                      \
+        Record record = {.floor = call->floor};                                                                        \
+        record.table = node->table >= 0 ? call->scene->tables + node->table : NULL;                                    \
+        PARAMS(FETCH_FIELD) CONFIG(FETCH_CONFIG) UNUSED(slot), UNUSED(config);                                         \
+        return record;                                                                                                 \
+    }                                                                                                                  \
+    KFN void prefix##_scatter(const BsdfCall *call, Record adjoint, Sink *sink, Mask m, Vec2 *duv) {                   \
+        const BsdfNode *node = call->scene->bsdfs + call->node;                                                        \
+        int slot = 0;                                                                                                  \
+        PARAMS(SCATTER_FIELD) UNUSED(adjoint), UNUSED(node), UNUSED(slot), UNUSED(sink), UNUSED(m), UNUSED(duv);       \
+    }
+#define BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference) DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
+#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, reference)                              \
+    DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+
+// ---- dispatch ----------------------------------------------------------------------------------------------------
+
+// f cos_o of the smooth lobe, or the coefficient of a delta lobe. Directions are local; dead lanes hold valid ones.
+static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_eval(&p, wi, wo, lobe);                                                                        \
+    }
+#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_eval(call, &p, wi, wo, lobe);                                                                  \
+    }
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    default:
+        return spec_zero();
+    }
+}
+
+// Density of bsdf_sample per solid angle, or the probability of a delta lobe.
+static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_pdf(&p, wi, wo, lobe);                                                                         \
+    }
+#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_pdf(call, &p, wi, wo, lobe);                                                                   \
+    }
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    default:
+        return f_set(0);
+    }
+}
+
+// u1 selects lobes, u2 directions. Samples of no use have density 0.
+static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, Vec2 u2) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_sample(&p, wi, u1, u2);                                                                        \
+    }
+#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        return prefix##_sample(call, &p, wi, u1, u2);                                                                  \
+    }
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    default:
+        return (BsdfSample){wi, i_set(LOBE_NULL), f_set(1)};
+    }
+}
+
+static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
+                              Vec3 *dwo, Vec2 *duv) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call), dp = {0};                                                                     \
+        prefix##_adj(&p, wi, wo, lobe, df, &dp, dwi, dwo);                                                             \
+        prefix##_scatter(call, dp, sink, m, duv);                                                                      \
+        break;                                                                                                         \
+    }
+#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call), dp = {0};                                                                     \
+        prefix##_adj(call, &p, wi, wo, lobe, df, sink, m, &dp, dwi, dwo, duv);                                         \
+        prefix##_scatter(call, dp, sink, m, duv);                                                                      \
+        break;                                                                                                         \
+    }
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    default:
+        break;
+    }
+}

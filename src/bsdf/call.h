@@ -1,0 +1,24 @@
+// call.h: how adapters (functions made of other functions) call their children; defined in bsdf.h.
+#pragma once
+
+#include "bsdf/record.h"
+
+typedef struct BsdfCall {
+    const SceneView *scene;
+    int32_t node;
+    Vec2 uv;
+    real floor; // see KIND_RECORD
+} BsdfCall;
+
+static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);
+static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);
+static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, Vec2 u2);
+// Accumulates the adjoint df of bsdf_eval into the sink (lanes of m), dwi, dwo and duv (null: not asked for).
+static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
+                              Vec3 *dwo, Vec2 *duv);
+
+KFN BsdfCall bsdf_child(const BsdfCall *call, int child) {
+    BsdfCall c = *call;
+    c.node = call->scene->bsdfs[call->node].child[child];
+    return c;
+}

@@ -1,0 +1,43 @@
+// record.h: the record of one scattering function at one batch of hits, generated from its parameter list.
+#pragma once
+
+#include "scene/kind.h"
+#include "scene/texture.h"
+
+// Which part of a function a direction belongs to. Values of delta lobes are coefficients of the delta, their
+// densities discrete probabilities.
+enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL };
+
+typedef struct BsdfSample {
+    Vec3 wo;
+    Int lobe;
+    Float eta; // relative index of refraction along the sampled direction, 1 for reflection
+} BsdfSample;
+
+#define FIELD_SPEC Spec
+#define FIELD_REAL Float
+#define FIELD_IOR Float
+#define FIELD_METAL_ETA Spec
+#define FIELD_METAL_K Spec
+#define FIELD_ALPHA_U Float
+#define FIELD_ALPHA_V Float
+
+#define RECORD_FIELD(type, field, value, low, high, text, option) FIELD_##type field;
+#define RECORD_CONFIG(field, value, choices, text) int32_t field;
+
+// A record also knows its derived table and the smallest probability with which a lobe is to be selected: 0 for
+// pictures, positive for derivatives, which can be non-zero where a lobe's own weight is 0.
+#define KIND_RECORD(Type, PARAMS, CONFIG)                                                                              \
+    typedef struct Type {                                                                                              \
+        PARAMS(RECORD_FIELD) CONFIG(RECORD_CONFIG) const float *table;                                                 \
+        real floor;                                                                                                    \
+    } Type;
+
+#define NO_CONFIG(C)
+
+// Probability of the first of two lobes with weights a and b, kept at least `floor` away from 0 and 1.
+KFN Float lobe_probability(Float a, Float b, real floor) {
+    Float p = a * f_safe_rcp(a + b);
+    p = f_select(m_gt(a + b, f_set(1e-30f)), p, f_set(0.5f));
+    return f_clamp(p, f_set(floor), f_set(1 - floor));
+}

@@ -1,0 +1,24 @@
+// table.h: the scattering functions as data, for the reader, the writer, the documentation and the tests; and what they
+// derive from their parameters.
+#pragma once
+
+#include "scene/kind.h"
+
+typedef struct BsdfKind {
+    const char *name;
+    const ParamDesc *params;
+    int param_count;
+    const ConfigDesc *configs;
+    int config_count;
+    int fewest_children, most_children;
+    bool adapter;
+    const char *reference;
+} BsdfKind;
+
+extern const BsdfKind rey_bsdf_kinds[];
+extern const int rey_bsdf_kind_count;
+int rey_bsdf_kind_find(const char *name); // -1 when unknown
+
+// Numbers in `tables` that a function of this kind derives, 0 for most.
+int32_t rey_bsdf_table_size(int kind);
+rey_result rey_bsdf_update(rey_scene *scene, int32_t bsdf);

@@ -1,0 +1,38 @@
+// job.h: one unit of work, the same for every kernel width: the samples of one tile of one sensor.
+#pragma once
+
+#include "scene/scene.h"
+
+enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD };
+
+typedef struct PathJob {
+    const SceneView *scene;
+    int32_t sensor, mode;
+    int32_t x, y, width, height;  // tile in full-film pixels; may reach beyond the film with sample_border
+    int32_t spp;
+    uint32_t scramble;            // hash of (seed, set, sensor, term)
+    bool sobol;
+    // Film of the tile: (width + 2 border) x (height + 2 border) x 3, sums of filter weight times radiance.
+    double *film;
+    int32_t border;               // pixels by which filters reach over the tile's edge
+    // Derivatives: adjoint of the film's sums, for the delivered picture (crop window), and the compact vectors.
+    const float *adjoint;
+    double *gradient;
+    const float *tangent;
+    const int32_t *texture_at, *to_uv_at, *normals_at;
+    bool any_normals;
+    // Scratch memory of the worker: rey_kernel_workspace_bytes.
+    void *workspace;
+    size_t workspace_bytes;
+    // Results, added to.
+    int64_t paths, rays, nonfinite;
+    double trace_seconds;
+} PathJob;
+
+// The kernels of every width.
+#define KERNEL_ENTRY(lanes)                                                                                            \
+    void rey_kernel_run_w##lanes(PathJob *job);                                                                        \
+    size_t rey_kernel_workspace_bytes_w##lanes(int32_t mode);
+KERNEL_ENTRY(1)
+KERNEL_ENTRY(8)
+KERNEL_ENTRY(16)

@@ -1,0 +1,550 @@
+// path.h: the path tracer, forward half. A chunk of paths advances bounce by bounce through stages: trace, sort by
+// shading group, emission and shading per group, shadow rays. Power-heuristic MIS of scattering and light sampling
+// [veach1995]; depth, roulette and hide_emitters as Mitsuba defines them. In derivative modes every vertex is recorded
+// for path_adj.h. Sampling, densities, MIS weights and roulette are detached.
+#pragma once
+
+#include "accel/trace.h"
+#include "bsdf/bsdf.h"
+#include "emitter/emitter.h"
+#include "integrator/state.h"
+#include "math/rng.h"
+
+#include <time.h>
+
+// Dimensions of a sample: a pure function of bounce and purpose.
+enum { PURPOSE_FILM, PURPOSE_LIGHT_CHOICE, PURPOSE_LIGHT, PURPOSE_LOBE, PURPOSE_DIRECTION, PURPOSE_ROULETTE, PURPOSES };
+
+KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)bounce * PURPOSES + purpose; }
+
+// Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
+#define DERIVATIVE_FLOOR 0.05f
+
+typedef struct Tracer {
+    PathJob *job;
+    const SceneView *scene;
+    const SensorRecord *sensor;
+    Workspace ws;
+    bool derivative;
+    real floor;
+    int32_t active, current; // paths alive, and which of ws.paths holds them
+    int32_t shadow_count;
+    int32_t record_count, batch_count;
+    bool overflow;           // the chunk's vertices did not fit the records
+} Tracer;
+
+KFN double stage_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+KFN SampleKey slot_key(const Tracer *t, Int slot) {
+    SampleKey key;
+    key.pixel = (UInt)i_gather(t->ws.pixel, slot);
+    key.sample = (UInt)i_gather(t->ws.sample, slot);
+    key.scramble = t->job->scramble;
+    key.sobol = t->job->sobol;
+    return key;
+}
+
+KFN Float real_gather(const real *base, Int index) {
+#if LANES == 1
+    return base[index];
+#else
+    return f_gather(base, index);
+#endif
+}
+
+#define LOAD_V3(a, x, y, z, i) v3(real_gather((a).x, i), real_gather((a).y, i), real_gather((a).z, i))
+
+KFN Spec spec_of(Vec3 v) {
+    Spec s;
+    s.c[0] = v.x;
+    s.c[1] = v.y;
+    s.c[2] = v.z;
+    return s;
+}
+
+// ---- camera ------------------------------------------------------------------------------------------------------
+
+// Starts `count` paths: samples `first`... of the tile, pixel by pixel, so that packets are coherent.
+static void camera_stage(Tracer *t, int64_t first, int32_t count) {
+    PathJob *job = t->job;
+    Paths *p = &t->ws.paths[0];
+    for (int32_t i = 0; i < count; i++) {
+        int64_t at = first + i;
+        int32_t pixel = (int32_t)(at / job->spp);
+        // Numbers of pixels of the whole film with room for a border, so that they do not depend on the tiles.
+        int32_t x = job->x + pixel % job->width + 64, y = job->y + pixel / job->width + 64;
+        t->ws.pixel[i] = y * (t->sensor->width + 128) + x;
+        t->ws.sample[i] = (int32_t)(at % job->spp);
+    }
+    for (int32_t i = 0; i < count; i += LANES) {
+        Int slot = i_iota() + i;
+        SampleKey key = slot_key(t, slot);
+        Vec2 jitter = rng_2d(&key, dimension(0, PURPOSE_FILM));
+        Int stride = i_set(t->sensor->width + 128);
+        Int pixel = i_load(t->ws.pixel + i);
+        Int y = pixel / stride;
+        Int x = pixel - y * stride;
+        Float film_x = f_from_i(x - 64) + jitter.x, film_y = f_from_i(y - 64) + jitter.y;
+        f_store(t->ws.film_x + i, film_x);
+        f_store(t->ws.film_y + i, film_y);
+        Ray ray = perspective_ray(t->scene, t->sensor, film_x, film_y);
+        f_store(p->ox + i, ray.o.x);
+        f_store(p->oy + i, ray.o.y);
+        f_store(p->oz + i, ray.o.z);
+        f_store(p->dx + i, ray.d.x);
+        f_store(p->dy + i, ray.d.y);
+        f_store(p->dz + i, ray.d.z);
+        f_store(p->px + i, ray.o.x);
+        f_store(p->py + i, ray.o.y);
+        f_store(p->pz + i, ray.o.z);
+        f_store(p->tmax + i, ray.tmax);
+        real *const ones[] = {p->bx, p->by, p->bz, p->eta2, p->roulette};
+        for (int k = 0; k < COUNT_OF(ones); k++) {
+            f_store(ones[k] + i, f_set(1));
+        }
+        f_store(p->pdf + i, f_set(-1));
+        i_store(p->slot + i, slot);
+        i_store(p->medium + i, i_set(t->sensor->medium));
+        real *const zeros[] = {t->ws.lx, t->ws.ly, t->ws.lz, t->ws.sx, t->ws.sy, t->ws.sz};
+        for (int k = 0; k < COUNT_OF(zeros); k++) {
+            f_store(zeros[k] + i, f_set(0));
+        }
+    }
+    t->active = count;
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    job->paths += count;
+}
+
+// ---- trace and sort ----------------------------------------------------------------------------------------------
+
+KFN Ray path_ray(const Paths *p, int32_t k) {
+    Ray ray;
+    ray.o = v3(f_load(p->ox + k), f_load(p->oy + k), f_load(p->oz + k));
+    ray.d = v3(f_load(p->dx + k), f_load(p->dy + k), f_load(p->dz + k));
+    ray.tmax = f_load(p->tmax + k);
+    return ray;
+}
+
+// Camera rays of a sensor that hides emitters go on behind every area light that they meet.
+KFN Hit trace_past_emitters(Tracer *t, Ray ray, Mask m, Hit hit) {
+    enum { MOST_LIGHTS_IN_A_ROW = 64 };
+    for (int i = 0; i < MOST_LIGHTS_IN_A_ROW; i++) {
+        Mask found = m & mi_lt(i_set(-1), hit.shape);
+        Int emitter = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), emitter);
+        Mask again = found & mi_lt(i_set(-1), emitter);
+        if (!m_any(again)) {
+            break;
+        }
+        Float step = (1.0f + f_max(f_max(f_abs(hit.p.x), f_abs(hit.p.y)), f_abs(hit.p.z))) * 9e-5f;
+        Vec3 o = v3_madd(hit.p, step, ray.d);
+        Float passed = v3_dot(v3_sub(o, ray.o), ray.d);
+        ray.o = v3_select(again, o, ray.o);
+        ray.tmax = f_select(again, ray.tmax - passed, ray.tmax);
+        Hit next = trace_closest(t->scene, &ray, again, false);
+        t->job->rays += m_count(again);
+        hit.shape = i_select(again, next.shape, hit.shape);
+        hit.prim = i_select(again, next.prim, hit.prim);
+        hit.u = f_select(again, next.u, hit.u);
+        hit.v = f_select(again, next.v, hit.v);
+        hit.p = v3_select(again, next.p, hit.p);
+    }
+    return hit;
+}
+
+static void trace_stage(Tracer *t, int32_t bounce) {
+    Workspace *ws = &t->ws;
+    const Paths *p = &ws->paths[t->current];
+    double start = stage_seconds();
+    for (int32_t k = 0; k < t->active; k += LANES) {
+        Mask m = m_first_n(t->active - k);
+        Ray ray = path_ray(p, k);
+        Hit hit = trace_closest(t->scene, &ray, m, bounce == 0);
+        if (bounce == 0 && t->scene->hide_emitters) {
+            hit = trace_past_emitters(t, ray, m, hit);
+        }
+        Mask found = mi_lt(i_set(-1), hit.shape);
+        Int group = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), group);
+        i_store(ws->hit_shape + k, hit.shape);
+        i_store(ws->hit_prim + k, hit.prim);
+        i_store(ws->hit_group + k, i_select(found, group + 1, i_set(0)));
+        f_store(ws->hit_u + k, hit.u);
+        f_store(ws->hit_v + k, hit.v);
+        f_store(ws->hit_x + k, hit.p.x);
+        f_store(ws->hit_y + k, hit.p.y);
+        f_store(ws->hit_z + k, hit.p.z);
+    }
+    t->job->rays += t->active;
+    t->job->trace_seconds += stage_seconds() - start;
+}
+
+// ---- vertices ----------------------------------------------------------------------------------------------------
+
+// One batch of lanes at a vertex: indices into the path arrays, and what was found there.
+typedef struct Vertex {
+    Int at;          // positions in the path arrays
+    Mask m;
+    Int slot;
+    Hit hit;
+    Vec3 d, origin;  // incoming ray's direction, and the previous vertex
+    Spec beta;
+    Float pdf;
+} Vertex;
+
+KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count) {
+    const Workspace *ws = &t->ws;
+    const Paths *p = &ws->paths[t->current];
+    Vertex v;
+    v.m = m_first_n(count);
+    v.at = i_select(v.m, i_load(order), i_set(order[0]));
+    v.slot = i_gather(p->slot, v.at);
+    v.hit.shape = i_max(i_gather(ws->hit_shape, v.at), i_set(0));
+    v.hit.prim = i_gather(ws->hit_prim, v.at);
+    v.hit.u = real_gather(ws->hit_u, v.at);
+    v.hit.v = real_gather(ws->hit_v, v.at);
+    v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
+    v.d = LOAD_V3(*p, dx, dy, dz, v.at);
+    v.origin = LOAD_V3(*p, px, py, pz, v.at);
+    v.beta = spec_of(LOAD_V3(*p, bx, by, bz, v.at));
+    v.pdf = real_gather(p->pdf, v.at);
+    return v;
+}
+
+// Adds radiance to the slots' sums. Slots are distinct within a batch.
+KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) {
+    f_scatter_add(t->ws.lx, slot, l.c[0], m);
+    f_scatter_add(t->ws.ly, slot, l.c[1], m);
+    f_scatter_add(t->ws.lz, slot, l.c[2], m);
+}
+
+// Claims LANES record entries for a batch; -1 when there is no room.
+KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count) {
+    if (t->record_count + LANES > t->ws.record_capacity || t->batch_count == t->ws.batch_capacity) {
+        t->overflow = true;
+        return -1;
+    }
+    int32_t first = t->record_count;
+    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count};
+    t->record_count += LANES;
+    return first;
+}
+
+KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis) {
+    Records *r = &t->ws.records;
+    i_store(r->shape + at, v->hit.shape);
+    i_store(r->prim + at, v->hit.prim);
+    i_store(r->slot + at, v->slot);
+    f_store(r->u + at, v->hit.u);
+    f_store(r->v + at, v->hit.v);
+    f_store(r->px + at, v->hit.p.x);
+    f_store(r->py + at, v->hit.p.y);
+    f_store(r->pz + at, v->hit.p.z);
+    f_store(r->dx + at, v->d.x);
+    f_store(r->dy + at, v->d.y);
+    f_store(r->dz + at, v->d.z);
+    f_store(r->bx + at, v->beta.c[0]);
+    f_store(r->by + at, v->beta.c[1]);
+    f_store(r->bz + at, v->beta.c[2]);
+    f_store(r->mis + at, mis);
+    f_store(r->ltx + at, f_set(0));
+    f_store(r->lty + at, f_set(0));
+    f_store(r->ltz + at, f_set(0));
+    f_store(r->sw + at, f_set(0));
+}
+
+KFN Float power_heuristic(Float a, Float b) { return a * a * f_safe_rcp(a * a + b * b); }
+
+// Paths that left the scene: the environment, weighed against having been sampled as a light.
+static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
+    const SceneView *scene = t->scene;
+    if (scene->environment < 0 || (bounce == 0 && scene->hide_emitters)) {
+        return;
+    }
+    const EmitterRecord *e = scene->emitters + scene->environment;
+    Vertex v = vertex_load(t, order, count);
+    Vec2 uv = {f_set(0), f_set(0)};
+    Float pdf = f_set(INV_FOUR_PI);
+    if (e->kind == EMITTER_ENVMAP) {
+        uv = envmap_uv(scene, e, v.d);
+        pdf = envmap_pdf(scene, e, uv);
+    }
+    Float mis = f_select(m_lt(v.pdf, f_set(0)), f_set(1), power_heuristic(v.pdf, pdf * e->weight));
+    Spec l = emitter_eval(scene, e, uv, f_set(1));
+    slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), v.m);
+    if (t->derivative) {
+        int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
+        if (at >= 0) {
+            record_vertex(t, at, &v, mis);
+        }
+    }
+}
+
+// MIS weight of light that the ray met at an area light, against having sampled that light.
+KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex *v, const Interaction *si) {
+    Float pdf = area_pdf(t->scene, e, v->origin, v->d, si) * e->weight;
+    return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(v->pdf, pdf));
+}
+
+// Chooses an emitter per lane; returns its number and the probability of the choice.
+KFN Int emitter_choose(const SceneView *scene, Float u, Float *probability) {
+    int32_t n = (int32_t)scene->emitters_count;
+    if (scene->uniform_emitters) {
+        *probability = f_set(1.0f / (real)n);
+        return i_min(i_from_f(u * (real)n), i_set(n - 1));
+    }
+    Float fraction;
+    return cdf_search(scene, i_set(scene->emitter_cdf), n, u, &fraction, probability);
+}
+
+// Samples a light per lane: emitters are uniform in kernels, so each one present in the batch is sampled in turn.
+KFN LightSample light_sample(const SceneView *scene, Int light, Mask m, Vec3 ref, Vec2 u, Spec *radiance) {
+    LightSample s = {v3(f_set(0), f_set(0), f_set(1)), f_set(1), f_set(0), {f_set(0), f_set(0)}, m_set(false)};
+    *radiance = spec_zero();
+    for (Mask left = m; m_any(left);) {
+        int32_t id = i_lane(light, m_first(left));
+        Mask mine = left & mi_eq(light, i_set(id));
+        const EmitterRecord *e = scene->emitters + id;
+        LightSample one = emitter_sample(scene, e, ref, u);
+        Spec l = emitter_eval(scene, e, one.uv, one.distance);
+        s.d = v3_select(mine, one.d, s.d);
+        s.distance = f_select(mine, one.distance, s.distance);
+        s.pdf = f_select(mine, one.pdf, s.pdf);
+        s.uv.x = f_select(mine, one.uv.x, s.uv.x);
+        s.uv.y = f_select(mine, one.uv.y, s.uv.y);
+        s.valid = s.valid | (mine & one.valid);
+        *radiance = spec_select(mine, l, *radiance);
+        left = left & ~mine;
+    }
+    return s;
+}
+
+// Delta lights cannot be met by scattering, so their samples count whole.
+KFN Mask light_is_delta(const SceneView *scene, Int light) {
+    Int kind = i_gather((const int32_t *)scene->emitters, light * (int32_t)(sizeof(EmitterRecord) / 4) +
+                                                              (int32_t)(offsetof(EmitterRecord, kind) / 4));
+    return mi_eq(kind, i_set(EMITTER_POINT));
+}
+
+// Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
+KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
+                        const SampleKey *key, int32_t bounce, int32_t record) {
+    const SceneView *scene = t->scene;
+    Float choice;
+    Int light = emitter_choose(scene, rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), &choice);
+    Spec radiance;
+    LightSample s = light_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
+    Vec3 wo = frame_to_local(&si->sh, s.d);
+    Int smooth = i_set(LOBE_SMOOTH);
+    Float scatter_pdf = bsdf_pdf(call, wi, wo, smooth);
+    Spec f = bsdf_eval(call, wi, wo, smooth);
+    Float pdf = s.pdf * choice;
+    Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(pdf, scatter_pdf));
+    Float weight = mis * f_safe_rcp(pdf);
+    Spec l = spec_scale(spec_mul(spec_mul(v->beta, f), radiance), weight);
+    // A derivative may be non-zero where the value is 0, wherever scattering has a positive density.
+    Mask useful = t->derivative ? m_gt(scatter_pdf, f_set(0)) | m_gt(spec_max(f), f_set(0)) : m_gt(spec_max(l), f_set(0));
+    Mask m = v->m & s.valid & useful & m_gt(weight, f_set(0));
+    Shadows *q = &t->ws.shadows;
+    int32_t at = t->shadow_count;
+    Vec3 o = interaction_offset(si, s.d);
+    f_compress(q->ox + at, o.x, m);
+    f_compress(q->oy + at, o.y, m);
+    f_compress(q->oz + at, o.z, m);
+    f_compress(q->dx + at, s.d.x, m);
+    f_compress(q->dy + at, s.d.y, m);
+    f_compress(q->dz + at, s.d.z, m);
+    f_compress(q->tmax + at, s.distance * (1.0f - 9e-4f), m);
+    f_compress(q->lx + at, l.c[0], m);
+    f_compress(q->ly + at, l.c[1], m);
+    f_compress(q->lz + at, l.c[2], m);
+    i_compress(q->slot + at, v->slot, m);
+    i_compress(q->record + at, i_iota() + record, m);
+    t->shadow_count += m_count(m);
+    if (record >= 0) {
+        Records *r = &t->ws.records;
+        i_store(r->light + record, light);
+        f_store(r->ldx + record, s.d.x);
+        f_store(r->ldy + record, s.d.y);
+        f_store(r->ldz + record, s.d.z);
+        f_store(r->lu + record, s.uv.x);
+        f_store(r->lv + record, s.uv.y);
+        f_store(r->ldist + record, s.distance);
+        Float w = f_zero_unless(m, weight);
+        f_store(r->ltx + record, w); // times the transmittance, once it is known
+        f_store(r->lty + record, w);
+        f_store(r->ltz + record, w);
+    }
+}
+
+// Samples how the paths go on and appends the survivors to the next bounce's paths; returns their number.
+KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
+                          const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
+    const Paths *p = &t->ws.paths[t->current];
+    Paths *next = &t->ws.paths[1 - t->current];
+    BsdfSample s = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
+                               rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
+    Float pdf = bsdf_pdf(call, wi, s.wo, s.lobe);
+    Spec f = bsdf_eval(call, wi, s.wo, s.lobe);
+    Float rcp = f_safe_rcp(pdf);
+    Spec weight = spec_scale(f, rcp);
+    Spec beta = spec_mul(v->beta, weight);
+    Float eta2 = real_gather(p->eta2, v->at) * s.eta * s.eta;
+    Mask m = v->m & m_gt(pdf, f_set(0)) & m_finite(spec_sum(beta));
+    Float roulette = spec_max(beta);
+    if (t->derivative) {
+        // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
+        roulette = real_gather(p->roulette, v->at) * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
+    } else {
+        m = m & m_gt(roulette, f_set(0));
+    }
+    if (bounce + 1 >= t->scene->rr_depth) {
+        Float q = f_min(roulette * eta2, f_set(0.95f));
+        m = m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
+        Float survival = f_safe_rcp(q);
+        beta = spec_scale(beta, survival);
+        roulette = roulette * survival;
+        rcp = rcp * survival;
+    }
+    Vec3 d = frame_to_world(&si->sh, s.wo);
+    Vec3 o = interaction_offset(si, d);
+    f_compress(next->ox + next_count, o.x, m);
+    f_compress(next->oy + next_count, o.y, m);
+    f_compress(next->oz + next_count, o.z, m);
+    f_compress(next->dx + next_count, d.x, m);
+    f_compress(next->dy + next_count, d.y, m);
+    f_compress(next->dz + next_count, d.z, m);
+    f_compress(next->px + next_count, si->p.x, m);
+    f_compress(next->py + next_count, si->p.y, m);
+    f_compress(next->pz + next_count, si->p.z, m);
+    f_compress(next->tmax + next_count, f_set(INFINITY), m);
+    f_compress(next->bx + next_count, beta.c[0], m);
+    f_compress(next->by + next_count, beta.c[1], m);
+    f_compress(next->bz + next_count, beta.c[2], m);
+    f_compress(next->eta2 + next_count, eta2, m);
+    f_compress(next->roulette + next_count, roulette, m);
+    f_compress(next->pdf + next_count, f_select(mi_eq(s.lobe, i_set(LOBE_SMOOTH)), pdf, f_set(-1)), m);
+    i_compress(next->slot + next_count, v->slot, m);
+    i_compress(next->medium + next_count, i_gather(p->medium, v->at), m);
+    if (record >= 0) {
+        Records *r = &t->ws.records;
+        f_store(r->wox + record, d.x);
+        f_store(r->woy + record, d.y);
+        f_store(r->woz + record, d.z);
+        f_store(r->sw + record, f_zero_unless(m, rcp));
+        i_store(r->lobe + record, s.lobe);
+    }
+    return next_count + m_count(m);
+}
+
+// Emission, light sampling and scattering of lanes that share a group.
+static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, const int32_t *order, int32_t count,
+                             int32_t bounce, int32_t next_count) {
+    const SceneView *scene = t->scene;
+    Vertex v = vertex_load(t, order, count);
+    Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &v.hit);
+    Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
+    Float mis = f_set(0);
+    if (group->emitter >= 0) {
+        const EmitterRecord *e = scene->emitters + group->emitter;
+        Mask lit = v.m & m_gt(wi.z, f_set(0));
+        mis = f_zero_unless(lit, emission_weight(t, e, &v, &si));
+        Spec l = emitter_eval(scene, e, si.uv, f_set(1));
+        slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), lit);
+    }
+    int32_t record = -1;
+    if (t->derivative) {
+        record = record_claim(t, VERTEX_SURFACE, group_id, count);
+        if (record < 0) {
+            return next_count;
+        }
+        record_vertex(t, record, &v, mis);
+    }
+    if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth) {
+        return next_count;
+    }
+    SampleKey key = slot_key(t, v.slot);
+    BsdfCall call = {scene, group->bsdf, si.uv, t->floor};
+    if (scene->emitters_count > 0) {
+        connect_lights(t, &v, &si, &call, wi, &key, bounce, record);
+    }
+    return scatter_paths(t, &v, &si, &call, wi, &key, bounce, record, next_count);
+}
+
+// ---- bounces -----------------------------------------------------------------------------------------------------
+
+// Counting sort of the bounce's rays by group (0 = escaped): fills ws.order, and where each group begins.
+static void sort_stage(Tracer *t, int32_t *begin, int32_t groups) {
+    const Workspace *ws = &t->ws;
+    memset(begin, 0, (size_t)(groups + 1) * sizeof *begin);
+    for (int32_t k = 0; k < t->active; k++) {
+        begin[ws->hit_group[k] + 1]++;
+    }
+    for (int32_t g = 0; g < groups; g++) {
+        begin[g + 1] += begin[g];
+    }
+    for (int32_t k = 0; k < t->active; k++) {
+        ws->order[begin[ws->hit_group[k]]++] = k;
+    }
+    memmove(begin + 1, begin, (size_t)groups * sizeof *begin);
+    begin[0] = 0;
+}
+
+static void shadow_stage(Tracer *t) {
+    const Shadows *q = &t->ws.shadows;
+    double start = stage_seconds();
+    for (int32_t k = 0; k < t->shadow_count; k += LANES) {
+        Mask m = m_first_n(t->shadow_count - k);
+        Ray ray;
+        ray.o = v3(f_load(q->ox + k), f_load(q->oy + k), f_load(q->oz + k));
+        ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
+        ray.tmax = f_load(q->tmax + k);
+        Spec transmittance = trace_transmittance(t->scene, &ray, m);
+        Spec l = spec_of(v3(f_load(q->lx + k), f_load(q->ly + k), f_load(q->lz + k)));
+        Mask open = m & m_gt(spec_max(transmittance), f_set(0));
+        slot_add(t, i_load(q->slot + k), spec_mul(l, transmittance), open);
+        if (t->derivative) {
+            Int record = i_select(m, i_load(q->record + k), i_set(0));
+            Records *r = &t->ws.records;
+            real *const weights[SPEC_N] = {r->ltx, r->lty, r->ltz};
+            for (int c = 0; c < SPEC_N; c++) {
+                f_scatter(weights[c], record, real_gather(weights[c], record) * transmittance.c[c], m);
+            }
+        }
+    }
+    t->job->rays += t->shadow_count;
+    t->job->trace_seconds += stage_seconds() - start;
+}
+
+// Runs the chunk's paths to their ends. begin: scratch of group count + 2 entries.
+static void path_forward(Tracer *t, int32_t *begin) {
+    const SceneView *scene = t->scene;
+    int32_t groups = (int32_t)scene->groups_count + 1;
+    for (int32_t bounce = 0; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
+        if (scene->max_depth >= 0 && bounce >= scene->max_depth) {
+            return;
+        }
+        trace_stage(t, bounce);
+        sort_stage(t, begin, groups);
+        t->shadow_count = 0;
+        int32_t next_count = 0;
+        for (int32_t g = 0; g < groups; g++) {
+            for (int32_t k = begin[g]; k < begin[g + 1] && !t->overflow; k += LANES) {
+                int32_t count = begin[g + 1] - k < LANES ? begin[g + 1] - k : LANES;
+                if (g == 0) {
+                    escape_batch(t, t->ws.order + k, count, bounce);
+                } else {
+                    next_count = surface_batch(t, scene->groups + g - 1, g - 1, t->ws.order + k, count, bounce,
+                                               next_count);
+                }
+            }
+        }
+        shadow_stage(t);
+        t->current = 1 - t->current;
+        t->active = next_count;
+    }
+}

@@ -1,0 +1,216 @@
+// path_adj.h: the backward sweep over the recorded vertices of a chunk. With detached sampling the radiance leaving
+// vertex k is  L_k = w_e Le + sum_lights f Le T w_l + f w_s L_(k+1),  so that its derivative with respect to anything
+// in f and Le at that vertex is weighted by delta x throughput, and L is summed from the end of the path: no
+// subtraction, and no division by f, so that nothing is lost where f = 0.
+// NOT differentiated: visibility, positions, sampling decisions, chains of smooth mirrors and glass.
+#pragma once
+
+#include "integrator/path.h"
+
+KFN Vec3 record_v3(const real *x, const real *y, const real *z, int32_t at) {
+    return v3(f_load(x + at), f_load(y + at), f_load(z + at));
+}
+
+// The adjoint of one slot: in reverse mode the film's, in forward mode channel by channel 1.
+KFN Spec slot_adjoint(const Tracer *t, Int slot, int channel) {
+    if (t->job->mode == MODE_REVERSE) {
+        return spec_of(LOAD_V3(t->ws, ax, ay, az, slot));
+    }
+    Spec delta = spec_zero();
+    delta.c[channel] = f_set(1);
+    return delta;
+}
+
+// Forward mode: moves what the sink gathered to the slots' derivative of one channel.
+KFN void forward_flush(Tracer *t, Sink *sink, Int slot, int channel, Mask m) {
+    if (t->job->mode == MODE_FORWARD) {
+        real *const sums[SPEC_N] = {t->ws.lx, t->ws.ly, t->ws.lz};
+        f_scatter_add(sums[channel], slot, sink->derivative, m & m_finite(sink->derivative));
+        sink->derivative = f_set(0);
+    }
+}
+
+KFN int drives(const Tracer *t) { return t->job->mode == MODE_FORWARD ? SPEC_N : 1; }
+
+static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
+    const Records *r = &t->ws.records;
+    const EmitterRecord *e = t->scene->emitters + t->scene->environment;
+    int32_t at = batch->first;
+    Mask m = m_first_n(batch->count);
+    Int slot = i_select(m, i_load(r->slot + at), i_set(0));
+    Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
+    Spec beta = spec_of(record_v3(r->bx, r->by, r->bz, at));
+    Float mis = f_load(r->mis + at);
+    Vec2 uv = {f_set(0), f_set(0)};
+    if (e->kind == EMITTER_ENVMAP) {
+        uv = envmap_uv(t->scene, e, d);
+    }
+    Spec l = spec_scale(emitter_eval(t->scene, e, uv, f_set(1)), mis);
+    f_scatter(t->ws.sx, slot, l.c[0], m);
+    f_scatter(t->ws.sy, slot, l.c[1], m);
+    f_scatter(t->ws.sz, slot, l.c[2], m);
+    for (int c = 0; c < drives(t); c++) {
+        // L = w_e Le
+        Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
+        emitter_adj(t->scene, e, uv, f_set(1), spec_zero_unless(m, dl), sink, m);
+        forward_flush(t, sink, slot, c, m);
+    }
+}
+
+// What the sweep knows of a batch of surface vertices.
+typedef struct SurfaceSweep {
+    Mask m, lit, connected, scattered;
+    Int slot, light, lobe;
+    Spec beta, suffix, light_weight, light_value, f_light, f_scatter, emission;
+    Float mis, scatter_weight, light_distance;
+    Vec2 light_uv;
+    Vec3 d, wi, light_d, wo_d, wl, wo;
+    Hit hit;
+    Interaction si;
+    BsdfCall call;
+    const EmitterRecord *emitter;
+    const Group *group;
+} SurfaceSweep;
+
+// Radiance of each lane's light sample.
+KFN Spec lights_eval(const SceneView *scene, Int light, Mask m, Vec2 uv, Float distance) {
+    Spec radiance = spec_zero();
+    for (Mask left = m; m_any(left);) {
+        int32_t id = i_lane(light, m_first(left));
+        Mask mine = left & mi_eq(light, i_set(id));
+        radiance = spec_select(mine, emitter_eval(scene, scene->emitters + id, uv, distance), radiance);
+        left = left & ~mine;
+    }
+    return radiance;
+}
+
+KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Float distance, Spec dl, Sink *sink) {
+    for (Mask left = m; m_any(left);) {
+        int32_t id = i_lane(light, m_first(left));
+        Mask mine = left & mi_eq(light, i_set(id));
+        emitter_adj(scene, scene->emitters + id, uv, distance, spec_zero_unless(mine, dl), sink, mine);
+        left = left & ~mine;
+    }
+}
+
+KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
+    const Records *r = &t->ws.records;
+    int32_t at = batch->first;
+    SurfaceSweep s;
+    s.m = m_first_n(batch->count);
+    s.slot = i_select(s.m, i_load(r->slot + at), i_set(0));
+    s.group = t->scene->groups + batch->group;
+    s.hit.shape = i_load(r->shape + at);
+    s.hit.prim = i_load(r->prim + at);
+    s.hit.u = f_load(r->u + at);
+    s.hit.v = f_load(r->v + at);
+    s.hit.p = record_v3(r->px, r->py, r->pz, at);
+    s.d = record_v3(r->dx, r->dy, r->dz, at);
+    s.beta = spec_of(record_v3(r->bx, r->by, r->bz, at));
+    s.mis = f_load(r->mis + at);
+    s.suffix = spec_of(LOAD_V3(t->ws, sx, sy, sz, s.slot));
+    s.light_weight = spec_of(record_v3(r->ltx, r->lty, r->ltz, at));
+    s.scatter_weight = f_load(r->sw + at);
+    s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
+    s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
+    s.light = i_load(r->light + at);
+    s.lobe = i_load(r->lobe + at);
+    s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
+    s.light_distance = f_load(r->ldist + at);
+    // Lanes without a light sample or a continuation get directions that do no harm.
+    Vec3 back = v3_neg(s.d);
+    s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
+    s.wo_d = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), back);
+    s.lobe = i_select(s.scattered, s.lobe, i_set(LOBE_SMOOTH));
+    s.si = shape_interaction(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
+    s.wi = frame_to_local(&s.si.sh, back);
+    s.wl = frame_to_local(&s.si.sh, s.light_d);
+    s.wo = frame_to_local(&s.si.sh, s.wo_d);
+    s.call = (BsdfCall){t->scene, s.group->bsdf, s.si.uv, t->floor};
+    s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
+    return s;
+}
+
+// The vertex's outgoing radiance, from the parts that the adjoint needs as well.
+KFN Spec surface_primal(const Tracer *t, SurfaceSweep *s) {
+    Spec l = spec_zero();
+    s->lit = s->m & m_gt(s->mis, f_set(0));
+    if (s->emitter) {
+        s->emission = emitter_eval(t->scene, s->emitter, s->si.uv, f_set(1));
+        l = spec_zero_unless(s->lit, spec_scale(s->emission, s->mis));
+    }
+    s->f_light = s->f_scatter = s->light_value = spec_zero();
+    if (m_any(s->connected)) {
+        s->f_light = spec_zero_unless(s->connected, bsdf_eval(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH)));
+        s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_distance);
+        spec_acc(&l, spec_mul(spec_mul(s->f_light, s->light_value), s->light_weight));
+    }
+    if (m_any(s->scattered)) {
+        s->f_scatter = spec_zero_unless(s->scattered, bsdf_eval(&s->call, s->wi, s->wo, s->lobe));
+        spec_acc(&l, spec_scale(spec_mul(s->f_scatter, s->suffix), s->scatter_weight));
+    }
+    return l;
+}
+
+// Adjoint of surface_primal for one delta.
+KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *sink) {
+    Spec weight = spec_mul(delta, s->beta);
+    Vec3 dwi = v3_zero();
+    Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
+    Vec3 unused = v3_zero();
+    if (s->emitter) {
+        // L += w_e Le
+        emitter_adj(t->scene, s->emitter, s->si.uv, f_set(1), spec_zero_unless(s->lit, spec_scale(weight, s->mis)), sink,
+                    s->lit);
+    }
+    if (m_any(s->connected)) {
+        // L += f Le (T w_l)
+        Vec3 dwl = v3_zero();
+        Spec both = spec_mul(weight, s->light_weight);
+        Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
+        bsdf_adj(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
+        lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_distance, spec_mul(both, s->f_light), sink);
+        frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
+    }
+    if (m_any(s->scattered)) {
+        // L += f w_s L_next
+        Vec3 dwo = v3_zero();
+        Spec df = spec_zero_unless(s->scattered, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
+        bsdf_adj(&s->call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &dwi, &dwo, NULL);
+        frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &dframe, &unused);
+    }
+    if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
+        // wi = to_local(-d)
+        frame_to_local_adj(&s->si.sh, v3_neg(s->d), dwi, &dframe, &unused);
+        mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &dframe, sink, s->m);
+    }
+}
+
+// Sweeps the chunk's records from the last vertex to the first.
+static void path_backward(Tracer *t) {
+    PathJob *job = t->job;
+    Sink sink = {.gradient = job->gradient,
+                 .tangent = job->tangent,
+                 .texture_at = job->texture_at,
+                 .to_uv_at = job->to_uv_at,
+                 .normals_at = job->normals_at,
+                 .any_normals = job->any_normals,
+                 .derivative = f_set(0)};
+    for (int32_t b = t->batch_count - 1; b >= 0; b--) {
+        const RecordBatch *batch = t->ws.batches + b;
+        if (batch->tag == VERTEX_ESCAPED) {
+            escape_adj(t, &sink, batch);
+            continue;
+        }
+        SurfaceSweep s = surface_load(t, batch);
+        Spec l = surface_primal(t, &s);
+        Mask finite = s.m & m_finite(spec_sum(l));
+        for (int c = 0; c < drives(t); c++) {
+            surface_adj(t, &s, spec_zero_unless(finite, slot_adjoint(t, s.slot, c)), &sink);
+            forward_flush(t, &sink, s.slot, c, s.m);
+        }
+        f_scatter(t->ws.sx, s.slot, f_zero_unless(finite, l.c[0]), s.m);
+        f_scatter(t->ws.sy, s.slot, f_zero_unless(finite, l.c[1]), s.m);
+        f_scatter(t->ws.sz, s.slot, f_zero_unless(finite, l.c[2]), s.m);
+    }
+}

@@ -1,0 +1,110 @@
+// state.h: where a chunk of paths lives: structure-of-arrays in one block of scratch memory, listed once.
+// A path state is compacted at every bounce; per-slot sums stay where they are. In derivative modes the vertices of the
+// whole chunk are recorded, bounce after bounce, for the backward sweep.
+#pragma once
+
+#include "integrator/job.h"
+#include "math/lanes.h"
+
+enum {
+    CHUNK = 2048,              // paths per chunk in pictures
+    CHUNK_ADJOINT = 512,       // paths per chunk in derivatives, so that their records stay in the cache
+    RECORDS_PER_PATH = 64,     // a chunk that needs more is run again in halves
+    MAX_BOUNCES = 1 << 20
+};
+
+// A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot.
+#define PATH_FLOATS(F)                                                                                                 \
+    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(bx) F(by) F(bz) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz)
+#define PATH_INTS(I) I(slot) I(medium)
+
+// A shadow ray: ray, what it brings if nothing is in the way, whom.
+#define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(lx) F(ly) F(lz)
+#define SHADOW_INTS(I) I(slot) I(record)
+
+// A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
+// the light sample (direction, where the light's texture was read, distance, transmittance over density),
+// the sampled direction (world) and 1 / (density x survival).
+#define RECORD_FLOATS(F)                                                                                               \
+    F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(bx) F(by) F(bz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist)     \
+    F(ltx) F(lty) F(ltz) F(wox) F(woy) F(woz) F(sw)
+#define RECORD_INTS(I) I(shape) I(prim) I(slot) I(light) I(lobe)
+
+#define DECLARE_FLOAT(name) real *name;
+#define DECLARE_INT(name) int32_t *name;
+typedef struct Paths {
+    PATH_FLOATS(DECLARE_FLOAT) PATH_INTS(DECLARE_INT)
+} Paths;
+typedef struct Shadows {
+    SHADOW_FLOATS(DECLARE_FLOAT) SHADOW_INTS(DECLARE_INT)
+} Shadows;
+typedef struct Records {
+    RECORD_FLOATS(DECLARE_FLOAT) RECORD_INTS(DECLARE_INT)
+} Records;
+
+// Tags of path vertices.
+enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL };
+
+// A run of recorded vertices that share tag and group; `count` lanes of the LANES from `first` on are alive.
+typedef struct RecordBatch {
+    int32_t tag, group, first, count;
+} RecordBatch;
+
+typedef struct Workspace {
+    Paths paths[2];
+    Shadows shadows;
+    Records records;
+    RecordBatch *batches;
+    int32_t batch_capacity, record_capacity;
+    int32_t chunk;
+    // per ray of the current bounce
+    int32_t *hit_shape, *hit_prim, *hit_group, *order;
+    real *hit_u, *hit_v, *hit_x, *hit_y, *hit_z;
+    // per slot: radiance (or derivative), film position, pixel and sample numbers, adjoint, suffix radiance
+    real *lx, *ly, *lz, *film_x, *film_y, *ax, *ay, *az, *sx, *sy, *sz;
+    int32_t *pixel, *sample;
+} Workspace;
+
+// Lays the workspace out in a block; with block null only measures. Returns the bytes needed.
+static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
+    size_t at = 0;
+    bool derivative = mode != MODE_PRIMAL;
+    ws->chunk = derivative ? CHUNK_ADJOINT : CHUNK;
+    size_t n = (size_t)ws->chunk + 2 * LANES;
+    ws->record_capacity = derivative ? CHUNK_ADJOINT * RECORDS_PER_PATH : 0;
+    ws->batch_capacity = derivative ? ws->record_capacity / 8 : 0;
+    size_t m = (size_t)ws->record_capacity + 2 * LANES;
+#define CARVE(pointer, count)                                                                                          \
+    {                                                                                                                  \
+        (pointer) = block ? (void *)(block + at) : NULL;                                                               \
+        at += ((count) * sizeof *(pointer) + 63) / 64 * 64;                                                            \
+    }
+#define CARVE_PATH(name) CARVE(ws->paths[i].name, n)
+    for (int i = 0; i < 2; i++) {
+        PATH_FLOATS(CARVE_PATH) PATH_INTS(CARVE_PATH)
+    }
+#define CARVE_SHADOW(name) CARVE(ws->shadows.name, n)
+    SHADOW_FLOATS(CARVE_SHADOW) SHADOW_INTS(CARVE_SHADOW)
+    if (derivative) {
+#define CARVE_RECORD(name) CARVE(ws->records.name, m)
+        RECORD_FLOATS(CARVE_RECORD) RECORD_INTS(CARVE_RECORD)
+        CARVE(ws->batches, (size_t)ws->batch_capacity)
+    }
+    CARVE(ws->hit_shape, n)
+    CARVE(ws->hit_prim, n)
+    CARVE(ws->hit_group, n)
+    CARVE(ws->order, n)
+    CARVE(ws->hit_u, n)
+    CARVE(ws->hit_v, n)
+    CARVE(ws->hit_x, n)
+    CARVE(ws->hit_y, n)
+    CARVE(ws->hit_z, n)
+    real **const slots[] = {&ws->lx, &ws->ly, &ws->lz, &ws->film_x, &ws->film_y, &ws->ax,
+                            &ws->ay, &ws->az, &ws->sx, &ws->sy,     &ws->sz};
+    for (int i = 0; i < COUNT_OF(slots); i++) {
+        CARVE(*slots[i], n)
+    }
+    CARVE(ws->pixel, n)
+    CARVE(ws->sample, n)
+    return at;
+}

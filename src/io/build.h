@@ -1,0 +1,82 @@
+// build.h: from the checked XML tree to the flat scene: what the parts of the builder share.
+#pragma once
+
+#include "bsdf/table.h"
+#include "io/xml.h"
+#include "scene/scene.h"
+
+// Where a texture's values came from, so that the scene can be written back: a property of `node`, or the texture
+// object `node` itself when property is null.
+typedef struct TextureSource {
+    rey_xml_node *node;
+    const char *property;
+    int32_t texture;
+} TextureSource;
+
+// Which shape a <shape> became.
+typedef struct ShapeSource {
+    rey_xml_node *node;
+    int32_t shape;
+} ShapeSource;
+
+// The source document; it lives as long as the scene, which is written back from it.
+typedef struct SceneSource {
+    rey_context *ctx;
+    rey_xml_document *document;
+    Array textures, shapes; // of TextureSource, ShapeSource
+} SceneSource;
+
+typedef struct Builder {
+    rey_context *ctx;
+    rey_scene *scene;
+    SceneSource *source;
+    Array prefixes; // of Prefix: the first parameter path of each object
+} Builder;
+
+#define TRY(expression)                                                                                                \
+    do {                                                                                                               \
+        rey_result try_result_ = (expression);                                                                         \
+        if (try_result_ != REY_OK) {                                                                                   \
+            return try_result_;                                                                                        \
+        }                                                                                                              \
+    } while (0)
+
+enum { MAX_PATH_NAME = 512 };
+
+// "a.b" into out.
+void build_join(char out[MAX_PATH_NAME], const char *a, const char *b);
+
+// First visit of an object: remembers its path and returns true. Later visits: names the object's parameters under
+// the new path as well and returns false. Objects with an id are known under it, too.
+rey_result build_visit(Builder *b, rey_xml_node *node, const char *path, bool *first);
+rey_result build_finish(Builder *b, rey_xml_node *node, const char *path);
+
+// Refuses a plugin: by name where it is one of the format's that does not exist yet, else with the nearest known name.
+rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user);
+
+// What a texture-valued slot expects.
+typedef struct TextureUse {
+    rey_colour_use colour;
+    bool real;             // a number is wanted: a plain float stays one number
+    float low, high;
+    const char *unit, *text;
+} TextureUse;
+
+// The texture of slot `name` of a node: a child, a value, or the default (grey, when count is 1). path: of the slot.
+rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double *value, int count,
+                      const char *path, int32_t *out);
+// A texture object.
+rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
+// A constant with its parameter `path`.value (alias `path`). node and property say where it came from, may be null.
+rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, TextureUse use, const double *values,
+                          int count, const char *path, int32_t *out);
+// A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.
+rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param param, int32_t *out);
+
+rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
+rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
+rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);
+// shape: of an area light, else -1.
+rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out);
+rey_result build_sensor(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_integrator(Builder *b, rey_xml_node *node);

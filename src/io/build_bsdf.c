@@ -1,0 +1,195 @@
+// build_bsdf.c: scattering functions, driven by the table of their kinds.
+#include "io/build.h"
+
+#include <string.h>
+
+static const char *bsdf_word(void *user, int i) {
+    UNUSED(user);
+    return i < rey_bsdf_kind_count ? rey_bsdf_kinds[i].name : NULL;
+}
+
+static TextureUse slot_use(const ParamDesc *p) {
+    bool real = p->type != PARAM_SPEC && p->type != PARAM_METAL_ETA && p->type != PARAM_METAL_K;
+    bool bounded = p->type == PARAM_SPEC && p->high <= 1;
+    return (TextureUse){bounded ? REY_COLOUR_REFLECTANCE : REY_COLOUR_UNBOUNDED, real, p->low, p->high, "", p->text};
+}
+
+// Ratio of int_ior and ext_ior.
+static rey_result ior_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t *out) {
+    double inside, outside;
+    TRY(rey_xml_get_ior(b->ctx, node, "int_ior", p->option, &inside));
+    TRY(rey_xml_get_ior(b->ctx, node, "ext_ior", "air", &outside));
+    if (!(inside > 0) || !(outside > 0)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "indices of refraction must be positive, found %g and %g",
+                            inside, outside);
+    }
+    double eta = inside / outside;
+    return build_constant(b, node, "int_ior", slot_use(p), &eta, 1, path, out);
+}
+
+// eta or k of a conductor: written out, or from `material`.
+static rey_result metal_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t *out) {
+    const char *material;
+    double eta[3] = {0, 0, 0}, k[3] = {1, 1, 1};
+    bool written = rey_xml_has(node, "eta") || rey_xml_has(node, "k");
+    TRY(rey_xml_get_string(b->ctx, node, "material", "none", &material));
+    if (written && rey_xml_find(node, "material")) {
+        return rey_xml_fail(b->ctx, rey_xml_find(node, "material")->at, REY_ERROR_SCENE,
+                            "either 'material' or 'eta' and 'k' may be given, not both");
+    }
+    if (!written && !rey_named_metal(material, eta, k)) {
+        return rey_xml_fail_word(b->ctx, rey_xml_find(node, "material")->at, material, rey_named_metal_name, NULL,
+                                 "there is no conductor '%s'", material);
+    }
+    return build_slot(b, node, p->name, slot_use(p), p->type == PARAM_METAL_ETA ? eta : k, 3, path, out);
+}
+
+// alpha_u or alpha_v; a single alpha serves both.
+static rey_result alpha_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t first,
+                             int32_t *out) {
+    double value = (double)p->value;
+    char name[MAX_PATH_NAME];
+    bool both = rey_xml_has(node, "alpha_u") || rey_xml_has(node, "alpha_v");
+    if (both) {
+        if (rey_xml_has(node, "alpha")) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'alpha' or 'alpha_u' and 'alpha_v' may be given");
+        }
+        TRY(rey_xml_require(b->ctx, node, p->name));
+        build_join(name, path, p->name);
+        return build_slot(b, node, p->name, slot_use(p), &value, 1, name, out);
+    }
+    if (p->type == PARAM_ALPHA_V) {
+        *out = first;
+        return REY_OK;
+    }
+    build_join(name, path, "alpha");
+    return build_slot(b, node, "alpha", slot_use(p), &value, 1, name, out);
+}
+
+static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *kind, const char *path, BsdfNode *bsdf) {
+    for (int i = 0; i < kind->param_count; i++) {
+        const ParamDesc *p = &kind->params[i];
+        double value = (double)p->value;
+        char name[MAX_PATH_NAME];
+        build_join(name, path, p->name);
+        switch (p->type) {
+        case PARAM_IOR:
+            TRY(ior_slot(b, node, p, name, &bsdf->slot[i]));
+            break;
+        case PARAM_METAL_ETA:
+        case PARAM_METAL_K:
+            TRY(metal_slot(b, node, p, name, &bsdf->slot[i]));
+            break;
+        case PARAM_ALPHA_U:
+        case PARAM_ALPHA_V:
+            TRY(alpha_slot(b, node, p, path, i ? bsdf->slot[i - 1] : -1, &bsdf->slot[i]));
+            break;
+        default:
+            TRY(build_slot(b, node, p->name, slot_use(p), &value, 1, name, &bsdf->slot[i]));
+        }
+    }
+    return REY_OK;
+}
+
+// Position of the property's word in "a|b|c"; booleans are "false|true".
+static rey_result build_config(Builder *b, rey_xml_node *node, const ConfigDesc *c, int32_t *out) {
+    char words[128];
+    const char *list[8];
+    int count = 0, choice = c->value;
+    if (strcmp(c->choices, "false|true") == 0) {
+        bool on;
+        TRY(rey_xml_get_bool(b->ctx, node, c->name, c->value != 0, &on));
+        *out = on;
+        return REY_OK;
+    }
+    strncpy(words, c->choices, sizeof words - 1);
+    words[sizeof words - 1] = 0;
+    for (char *word = words; word && count < COUNT_OF(list);) {
+        char *bar = strchr(word, '|');
+        list[count++] = word;
+        if (bar) {
+            *bar++ = 0;
+        }
+        word = bar;
+    }
+    TRY(rey_xml_get_choice(b->ctx, node, c->name, list, count, c->value, &choice));
+    *out = choice;
+    return REY_OK;
+}
+
+// Children in document order: brdf_0 and brdf_1 of twosided, nested_bsdf where there can be only one.
+static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind *kind, const char *path, BsdfNode *bsdf) {
+    int count = rey_xml_count_children(node, REY_XML_BIT(REY_XML_BSDF));
+    if (count < kind->fewest_children || count > kind->most_children) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' takes %d%s nested bsdf, found %d", kind->name,
+                            kind->fewest_children, kind->most_children > kind->fewest_children ? " or 2" : "", count);
+    }
+    for (int i = 0; i < count; i++) {
+        char name[MAX_PATH_NAME];
+        build_join(name, path, kind->most_children == 1 ? "nested_bsdf" : i ? "brdf_1" : "brdf_0");
+        TRY(build_bsdf(b, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), i)->node, name, &bsdf->child[i]));
+    }
+    return REY_OK;
+}
+
+static rey_result add_bsdf(Builder *b, int kind, BsdfNode bsdf, int32_t *out) {
+    rey_scene *scene = b->scene;
+    int32_t size = rey_bsdf_table_size(kind);
+    bsdf.kind = kind;
+    bsdf.table = -1;
+    if (size > 0) {
+        bsdf.table = rey_scene_append(scene, &scene->build.tables, sizeof(float), size);
+        if (bsdf.table < 0) {
+            return REY_ERROR_MEMORY;
+        }
+    }
+    *out = rey_scene_append(scene, &scene->build.bsdfs, sizeof bsdf, 1);
+    if (*out < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    ARRAY_AT(scene->build.bsdfs, BsdfNode, *out) = bsdf;
+    return REY_OK;
+}
+
+static BsdfNode empty_bsdf(void) {
+    BsdfNode bsdf = {.child = {-1, -1}};
+    for (int i = 0; i < MAX_SLOTS; i++) {
+        bsdf.slot[i] = -1;
+    }
+    return bsdf;
+}
+
+rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out) {
+    int kind = rey_bsdf_kind_find("diffuse");
+    const ParamDesc *p = &rey_bsdf_kinds[kind].params[0];
+    BsdfNode bsdf = empty_bsdf();
+    char name[MAX_PATH_NAME];
+    double rgb[3] = {reflectance, reflectance, reflectance};
+    build_join(name, path, "reflectance");
+    TRY(build_constant(b, node, "bsdf", slot_use(p), rgb, 3, name, &bsdf.slot[0]));
+    return add_bsdf(b, kind, bsdf, out);
+}
+
+rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out) {
+    bool first;
+    TRY(build_visit(b, node, path, &first));
+    if (!first) {
+        *out = node->built;
+        return REY_OK;
+    }
+    int index = rey_bsdf_kind_find(node->type);
+    if (index < 0) {
+        return build_unknown(b, node, bsdf_word, NULL);
+    }
+    const BsdfKind *kind = &rey_bsdf_kinds[index];
+    BsdfNode bsdf = empty_bsdf();
+    TRY(build_slots(b, node, kind, path, &bsdf));
+    for (int i = 0; i < kind->config_count; i++) {
+        TRY(build_config(b, node, &kind->configs[i], &bsdf.config[i]));
+    }
+    TRY(build_children(b, node, kind, path, &bsdf));
+    TRY(add_bsdf(b, index, bsdf, out));
+    node->built = *out;
+    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    return build_finish(b, node, path);
+}

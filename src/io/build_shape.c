@@ -1,0 +1,311 @@
+// build_shape.c: shapes, and the shading groups that they fall into.
+#include "io/build.h"
+#include "io/mesh.h"
+#include "shape/update.h"
+
+#include <string.h>
+
+static const char *const moving_why = "moving geometry moves silhouettes, seen by the camera and by other path vertices";
+static const char *const normals_why = "the picture jumps where a shading normal turns away from the viewer or the light";
+
+enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
+
+static const char *shape_word(void *user, int i) {
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "obj", "ply", "serialized"};
+    UNUSED(user);
+    return i < COUNT_OF(words) ? words[i] : NULL;
+}
+
+// Room for numbers in theta with a parameter path.name (alias path.old), shape count x width.
+static rey_result vertex_param(Builder *b, const char *path, const char *name, const char *old, int64_t count, int width,
+                               Param p, int32_t *theta) {
+    char full[MAX_PATH_NAME];
+    *theta = rey_scene_append(b->scene, &b->scene->build.theta, sizeof(float), count * width);
+    if (*theta < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    p.theta = *theta;
+    p.count = (int32_t)(count * width);
+    p.dims = 2;
+    p.shape[0] = (int32_t)count;
+    p.shape[1] = width;
+    build_join(full, path, name);
+    int param = rey_scene_add_param(b->scene, full, p);
+    if (param < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    build_join(full, path, old);
+    return rey_scene_add_alias(b->scene, full, param);
+}
+
+static double determinant(const double m[16]) {
+    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+           m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+// World vertices; normals by the cofactor matrix, which is the inverse transpose up to a positive factor once its sign
+// follows the determinant's; a mirroring pose turns the winding over so that outside stays outside.
+static void mesh_transform(rey_mesh *mesh, const double m[16]) {
+    bool mirrored = determinant(m) < 0;
+    for (int64_t i = 0; i < mesh->vertex_count; i++) {
+        float *p = mesh->positions + 3 * i;
+        double x = p[0], y = p[1], z = p[2];
+        for (int k = 0; k < 3; k++) {
+            p[k] = (float)(m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z + m[4 * k + 3]);
+        }
+        if (mesh->normals) {
+            float *n = mesh->normals + 3 * i;
+            double v[3] = {n[0], n[1], n[2]}, r[3], length = 0;
+            for (int k = 0; k < 3; k++) {
+                int a = (k + 1) % 3, c = (k + 2) % 3;
+                r[k] = 0;
+                for (int j = 0; j < 3; j++) {
+                    int d = (j + 1) % 3, e = (j + 2) % 3;
+                    r[k] += (m[4 * a + d] * m[4 * c + e] - m[4 * a + e] * m[4 * c + d]) * v[j];
+                }
+                length += r[k] * r[k];
+            }
+            double scale = length > 0 ? (mirrored ? -1 : 1) / sqrt(length) : 0;
+            for (int k = 0; k < 3; k++) {
+                n[k] = (float)(r[k] * scale);
+            }
+        }
+    }
+    for (int64_t i = 0; i < mesh->face_count && mirrored; i++) {
+        uint32_t *f = mesh->faces + 3 * i, first = f[1];
+        f[1] = f[2];
+        f[2] = first;
+    }
+}
+
+static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh) {
+    char *file = NULL;
+    bool obj = strcmp(node->type, "obj") == 0, ply = strcmp(node->type, "ply") == 0, flip, flat;
+    int64_t index = 0;
+    double pose[16];
+    TRY(rey_xml_get_bool(b->ctx, node, "flip_tex_coords", obj, &flip));
+    TRY(rey_xml_get_bool(b->ctx, node, "face_normals", false, &flat));
+    TRY(rey_xml_get_transform(b->ctx, node, "to_world", pose));
+    if (!obj && !ply) {
+        TRY(rey_xml_get_int(b->ctx, node, "shape_index", 0, 1 << 20, 0, &index));
+    }
+    if (determinant(pose) == 0) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
+    }
+    TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
+    rey_result result = obj   ? rey_mesh_read_obj(b->ctx, file, flip, mesh)
+                        : ply ? rey_mesh_read_ply(b->ctx, file, flip, mesh)
+                              : rey_mesh_read_serialized(b->ctx, file, (int)index, mesh);
+    rey_free(b->ctx, file);
+    TRY(result);
+    mesh_transform(mesh, pose);
+    if (flat || mesh->had_face_normals) {
+        rey_free(b->ctx, mesh->normals);
+        mesh->normals = NULL;
+    } else if (!mesh->normals) {
+        TRY(rey_mesh_compute_normals(b->ctx, mesh));
+    }
+    return REY_OK;
+}
+
+static rey_result copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const char *path, ShapeRecord *shape) {
+    rey_scene *scene = b->scene;
+    int64_t v = mesh->vertex_count, f = mesh->face_count;
+    Param positions = {PARAM_DEFAULTS, .unit = "scene units", .description = "vertex positions", .terms = GEOMETRY_TERMS,
+                       .why = moving_why, .geometry = id};
+    Param normals = {PARAM_DEFAULTS, .description = "vertex normals", .terms = REY_TERM_INTERIOR | REY_TERM_TERMINATOR,
+                     .why = normals_why, .normals = id};
+    Param uvs = {PARAM_DEFAULTS, .description = "texture coordinates", .terms = 0,
+                 .why = "texture coordinates are not parameters of the derivative yet"};
+    shape->vertex_count = (int32_t)v;
+    shape->triangle_count = (int32_t)f;
+    TRY(vertex_param(b, path, "positions", "vertex_positions", v, 3, positions, &shape->positions));
+    memcpy(&ARRAY_AT(scene->build.theta, float, shape->positions), mesh->positions, (size_t)v * 3 * sizeof(float));
+    if (mesh->normals) {
+        shape->flags |= SHAPE_HAS_NORMALS;
+        TRY(vertex_param(b, path, "normals", "vertex_normals", v, 3, normals, &shape->normals));
+        memcpy(&ARRAY_AT(scene->build.theta, float, shape->normals), mesh->normals, (size_t)v * 3 * sizeof(float));
+    }
+    if (mesh->uvs) {
+        shape->flags |= SHAPE_HAS_UVS;
+        TRY(vertex_param(b, path, "texcoords", "vertex_texcoords", v, 2, uvs, &shape->uvs));
+        memcpy(&ARRAY_AT(scene->build.theta, float, shape->uvs), mesh->uvs, (size_t)v * 2 * sizeof(float));
+    }
+    int32_t triangles = rey_scene_append(scene, &scene->build.triangles, sizeof(int32_t), 3 * f);
+    shape->welded = rey_scene_append(scene, &scene->build.welded, sizeof(int32_t), v);
+    if (triangles < 0 || shape->welded < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    shape->triangle = triangles / 3;
+    memcpy(&ARRAY_AT(scene->build.triangles, int32_t, triangles), mesh->faces, (size_t)f * 3 * sizeof(int32_t));
+    for (int64_t i = 0; i < v; i++) {
+        ARRAY_AT(scene->build.welded, int32_t, shape->welded + i) = (int32_t)mesh->position_index[i];
+    }
+    return REY_OK;
+}
+
+static rey_result build_mesh(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
+    rey_mesh mesh = {0};
+    rey_result result = mesh_load(b, node, &mesh);
+    if (result == REY_OK) {
+        result = copy_mesh(b, &mesh, id, path, shape);
+    }
+    rey_mesh_free(b->ctx, &mesh);
+    return result;
+}
+
+// Rectangle or cube: a mesh whose vertices follow to_world; only the pose is a parameter.
+static rey_result build_posed_mesh(Builder *b, bool cube, ShapeRecord *shape) {
+    rey_scene *scene = b->scene;
+    float vertices[CUBE_VERTICES][8];
+    int32_t triangles[CUBE_TRIANGLES][3];
+    if (cube) {
+        rey_cube_mesh(vertices, triangles);
+    } else {
+        rey_rectangle_mesh(vertices, triangles);
+    }
+    shape->vertex_count = cube ? CUBE_VERTICES : RECTANGLE_VERTICES;
+    shape->triangle_count = cube ? CUBE_TRIANGLES : RECTANGLE_TRIANGLES;
+    shape->flags |= SHAPE_HAS_UVS;
+    shape->positions = rey_scene_append(scene, &scene->build.theta, sizeof(float), 3 * shape->vertex_count);
+    shape->uvs = rey_scene_append(scene, &scene->build.theta, sizeof(float), 2 * shape->vertex_count);
+    int32_t at = rey_scene_append(scene, &scene->build.triangles, sizeof(int32_t), 3 * shape->triangle_count);
+    shape->welded = rey_scene_append(scene, &scene->build.welded, sizeof(int32_t), shape->vertex_count);
+    if (shape->positions < 0 || shape->uvs < 0 || at < 0 || shape->welded < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    shape->triangle = at / 3;
+    for (int32_t i = 0; i < shape->vertex_count; i++) {
+        int32_t first = 0;
+        while (memcmp(vertices[first], vertices[i], 3 * sizeof(float)) != 0) {
+            first++;
+        }
+        ARRAY_AT(scene->build.welded, int32_t, shape->welded + i) = first;
+        memcpy(&ARRAY_AT(scene->build.theta, float, shape->uvs + 2 * i), vertices[i] + 6, 2 * sizeof(float));
+    }
+    return REY_OK;
+}
+
+// Sphere: centre and radius become part of the pose.
+static rey_result sphere_pose(Builder *b, rey_xml_node *node, double m[16]) {
+    double centre[3] = {0, 0, 0}, radius;
+    TRY(rey_xml_get_vec3(b->ctx, node, "center", centre, centre));
+    TRY(rey_xml_get_float(b->ctx, node, "radius", 1, &radius));
+    if (!(radius > 0)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the radius is %g, expected a positive number", radius);
+    }
+    for (int k = 0; k < 3; k++) {
+        m[4 * k + 3] += m[4 * k] * centre[0] + m[4 * k + 1] * centre[1] + m[4 * k + 2] * centre[2];
+    }
+    for (int k = 0; k < 3; k++) {
+        for (int c = 0; c < 3; c++) {
+            m[4 * k + c] *= radius;
+        }
+    }
+    return REY_OK;
+}
+
+static rey_result build_analytic(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
+    double m[16];
+    bool sphere = strcmp(node->type, "sphere") == 0, disk = strcmp(node->type, "disk") == 0;
+    TRY(rey_xml_get_transform(b->ctx, node, "to_world", m));
+    if (sphere) {
+        TRY(sphere_pose(b, node, m));
+    }
+    if (determinant(m) == 0) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
+    }
+    Param pose = {PARAM_DEFAULTS, .terms = GEOMETRY_TERMS, .why = moving_why, .geometry = id};
+    TRY(build_pose(b, m, path, pose, &shape->to_world));
+    if (sphere || disk) {
+        shape->kind = sphere ? SHAPE_SPHERE : SHAPE_DISK;
+        if (sphere && determinant(m) < 0) {
+            shape->flags ^= SHAPE_FLIP_NORMALS;
+        }
+        shape->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), sphere ? 13 : 24);
+        return shape->table >= 0 ? REY_OK : REY_ERROR_MEMORY;
+    }
+    return build_posed_mesh(b, strcmp(node->type, "cube") == 0, shape);
+}
+
+static rey_result assign_group(Builder *b, ShapeRecord *shape) {
+    rey_scene *scene = b->scene;
+    Group g = {shape->bsdf, shape->emitter, shape->kind, shape->flags, shape->interior, shape->exterior};
+    for (size_t i = 0; i < scene->build.groups.count; i++) {
+        if (memcmp(&ARRAY_AT(scene->build.groups, Group, i), &g, sizeof g) == 0) {
+            shape->group = (int32_t)i;
+            return REY_OK;
+        }
+    }
+    shape->group = rey_scene_append(scene, &scene->build.groups, sizeof g, 1);
+    if (shape->group < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    ARRAY_AT(scene->build.groups, Group, shape->group) = g;
+    return REY_OK;
+}
+
+// The scattering function and the light of a shape.
+static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
+    char name[MAX_PATH_NAME];
+    if (rey_xml_count_children(node, REY_XML_BIT(REY_XML_BSDF)) > 1 ||
+        rey_xml_count_children(node, REY_XML_BIT(REY_XML_EMITTER)) > 1) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape can have one bsdf and one emitter");
+    }
+    rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
+    if (medium) {
+        return rey_xml_fail(b->ctx, medium->at, REY_ERROR_UNSUPPORTED, "participating media are not supported yet");
+    }
+    rey_xml_child *bsdf = rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0);
+    rey_xml_child *emitter = rey_xml_child_of(node, REY_XML_BIT(REY_XML_EMITTER), 0);
+    build_join(name, path, "bsdf");
+    if (bsdf) {
+        TRY(build_bsdf(b, bsdf->node, name, &shape->bsdf));
+    } else {
+        TRY(build_default_bsdf(b, node, emitter ? 0 : 0.5, name, &shape->bsdf));
+    }
+    if (emitter) {
+        build_join(name, path, "emitter");
+        TRY(build_emitter(b, emitter->node, id, name, &shape->emitter));
+        if (shape->kind == SHAPE_MESH) {
+            shape->area_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), shape->triangle_count);
+            if (shape->area_cdf < 0) {
+                return REY_ERROR_MEMORY;
+            }
+        }
+    }
+    return assign_group(b, shape);
+}
+
+rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
+    ShapeRecord shape = {.emitter = -1, .interior = -1, .exterior = -1, .positions = -1, .normals = -1, .uvs = -1,
+                         .to_world = -1, .table = -1, .area_cdf = -1};
+    bool first, flip;
+    double weight;
+    TRY(build_visit(b, node, path, &first));
+    int32_t id = rey_scene_append(b->scene, &b->scene->build.shapes, sizeof shape, 1);
+    if (id < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    TRY(rey_xml_get_bool(b->ctx, node, "flip_normals", false, &flip));
+    TRY(rey_xml_get_float(b->ctx, node, "silhouette_sampling_weight", 1, &weight));
+    shape.flags = flip ? SHAPE_FLIP_NORMALS : 0;
+    if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
+        TRY(build_mesh(b, node, id, path, &shape));
+    } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 ||
+               strcmp(node->type, "sphere") == 0 || strcmp(node->type, "disk") == 0) {
+        TRY(build_analytic(b, node, id, path, &shape));
+    } else {
+        return build_unknown(b, node, shape_word, NULL);
+    }
+    TRY(build_surface(b, node, id, path, &shape));
+    ARRAY_AT(b->scene->build.shapes, ShapeRecord, id) = shape;
+    ShapeSource *source = rey_array_push(b->ctx, &b->source->shapes, sizeof *source, 1);
+    if (!source) {
+        return REY_ERROR_MEMORY;
+    }
+    *source = (ShapeSource){node, id};
+    node->built = id;
+    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    return build_finish(b, node, path);
+}

@@ -1,0 +1,251 @@
+// build_texture.c: textures and constants of the scene, with their parameters.
+#include "io/build.h"
+#include "io/image.h"
+
+#include <string.h>
+
+static rey_result note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture) {
+    TextureSource *s = rey_array_push(b->ctx, &b->source->textures, sizeof *s, 1);
+    if (!s) {
+        return REY_ERROR_MEMORY;
+    }
+    *s = (TextureSource){node, property, texture};
+    return REY_OK;
+}
+
+// Appends a texture node with identity mapping; *theta has room for count numbers.
+static rey_result add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta) {
+    rey_scene *scene = b->scene;
+    int32_t at = rey_scene_append(scene, &scene->build.theta, sizeof(float), count);
+    *id = rey_scene_append(scene, &scene->build.textures, sizeof(TextureNode), 1);
+    if (at < 0 || *id < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    TextureNode *t = &ARRAY_AT(scene->build.textures, TextureNode, *id);
+    *t = (TextureNode){.kind = kind, .theta = at, .width = 1, .height = 1, .channels = 1, .to_uv = -1, .child = {-1, -1}};
+    *theta = &ARRAY_AT(scene->build.theta, float, at);
+    return REY_OK;
+}
+
+static Param texture_param(TextureUse use, int32_t texture, int32_t theta, int64_t count) {
+    return (Param){PARAM_DEFAULTS, .theta = theta, .count = (int32_t)count, .low = use.low, .high = use.high,
+                   .terms = REY_TERM_INTERIOR, .unit = use.unit, .description = use.text, .texture = texture};
+}
+
+// Parameters are differentiable where their derivative is not 0: an open range loses infinity, and bounds of 0 stay.
+rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, TextureUse use, const double *values,
+                          int count, const char *path, int32_t *out) {
+    float *theta;
+    char name[MAX_PATH_NAME];
+    TRY(add_texture(b, TEXTURE_CONSTANT, count, out, &theta));
+    TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+    t->channels = count;
+    for (int i = 0; i < count; i++) {
+        theta[i] = (float)values[i];
+        if (!(theta[i] >= use.low && theta[i] <= use.high)) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "%s is %g, expected a number in [%g, %g]",
+                                property ? property : path, values[i], (double)use.low, (double)use.high);
+        }
+    }
+    Param p = texture_param(use, *out, t->theta, count);
+    p.dims = count > 1;
+    p.shape[0] = count;
+    build_join(name, path, "value");
+    int param = rey_scene_add_param(b->scene, name, p);
+    if (param < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    TRY(rey_scene_add_alias(b->scene, path, param));
+    return note_source(b, node, property, *out);
+}
+
+static const char *texture_word(void *user, int i) {
+    static const char *const words[] = {"bitmap", "checkerboard", "rawconstant", "srgb", "uniform", "d65", "blackbody",
+                                        "regular", "irregular"};
+    UNUSED(user);
+    return i < COUNT_OF(words) ? words[i] : NULL;
+}
+
+// The image's values: RGB or one channel, linear.
+static rey_result bitmap_load(Builder *b, rey_xml_node *node, rey_image *image) {
+    char *path = NULL;
+    bool raw;
+    TRY(rey_xml_get_bool(b->ctx, node, "raw", false, &raw));
+    TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &path));
+    rey_result result = rey_image_read(b->ctx, path, image);
+    rey_free(b->ctx, path);
+    TRY(result);
+    if (image->channels != 1) {
+        result = rey_image_to_rgb(b->ctx, image);
+    }
+    if (result == REY_OK && image->srgb && !raw) {
+        rey_image_decode_srgb(image);
+    }
+    for (int64_t i = 0; i < (int64_t)image->width * image->height * image->channels && result == REY_OK; i++) {
+        if (!isfinite(image->data[i])) {
+            result = rey_xml_fail(b->ctx, node->at, REY_ERROR_FORMAT, "the image has a value that is not finite");
+        }
+    }
+    return result;
+}
+
+static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path, int32_t texture, bool smooth) {
+    static const char *const why = "nearest texels and clamped borders jump where uv moves across them";
+    double m[6];
+    if (!rey_xml_has(node, "to_uv")) {
+        return REY_OK;
+    }
+    TRY(rey_xml_get_transform2(b->ctx, node, "to_uv", m));
+    int32_t at = rey_scene_append(b->scene, &b->scene->build.theta, sizeof(float), 9);
+    char name[MAX_PATH_NAME];
+    build_join(name, path, "to_uv");
+    Param p = {PARAM_DEFAULTS, .theta = at, .count = 9, .dims = 2, .shape = {3, 3}, .to_uv = texture,
+               .description = "texture coordinates to the texture's own", .terms = REY_TERM_INTERIOR};
+    if (!smooth) {
+        p.terms |= REY_TERM_PRIMARY;
+        p.why = why;
+    }
+    if (at < 0 || rey_scene_add_param(b->scene, name, p) < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    float *theta = &ARRAY_AT(b->scene->build.theta, float, at);
+    for (int k = 0; k < 6; k++) {
+        theta[k] = (float)m[k];
+    }
+    theta[8] = 1;
+    ARRAY_AT(b->scene->build.textures, TextureNode, texture).to_uv = at;
+    return REY_OK;
+}
+
+static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
+    static const char *const filters[] = {"nearest", "bilinear"}, *const wraps[] = {"repeat", "mirror", "clamp"};
+    static const char *const formats[] = {"auto", "variant", "float16", "uint8"};
+    int filter, wrap, format;
+    bool accel;
+    rey_image image = {0};
+    TRY(rey_xml_get_choice(b->ctx, node, "filter_type", filters, 2, FILTER_BILINEAR, &filter));
+    TRY(rey_xml_get_choice(b->ctx, node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
+    TRY(rey_xml_get_choice(b->ctx, node, "format", formats, 4, 0, &format));
+    TRY(rey_xml_get_bool(b->ctx, node, "accel", true, &accel));
+    rey_result result = bitmap_load(b, node, &image);
+    float *theta;
+    int64_t count = (int64_t)image.width * image.height * image.channels;
+    if (result == REY_OK) {
+        result = add_texture(b, TEXTURE_BITMAP, count, out, &theta);
+    }
+    if (result == REY_OK) {
+        memcpy(theta, image.data, (size_t)count * sizeof *theta);
+        TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+        t->width = image.width;
+        t->height = image.height;
+        t->channels = image.channels;
+        t->filter = filter;
+        t->wrap = wrap;
+        char name[MAX_PATH_NAME];
+        build_join(name, path, "data");
+        Param p = texture_param(use, *out, t->theta, count);
+        p.dims = 3;
+        p.shape[0] = image.height;
+        p.shape[1] = image.width;
+        p.shape[2] = image.channels;
+        int param = rey_scene_add_param(b->scene, name, p);
+        result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR && wrap != WRAP_CLAMP);
+    }
+    rey_image_free(b->ctx, &image);
+    return result == REY_OK ? note_source(b, node, NULL, *out) : result;
+}
+
+static rey_result build_checkerboard(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
+    double c0 = 0.4, c1 = 0.2;
+    char name[MAX_PATH_NAME];
+    int32_t child[2];
+    float *theta;
+    build_join(name, path, "color0");
+    TRY(build_slot(b, node, "color0", use, &c0, 1, name, &child[0]));
+    build_join(name, path, "color1");
+    TRY(build_slot(b, node, "color1", use, &c1, 1, name, &child[1]));
+    TRY(add_texture(b, TEXTURE_CHECKERBOARD, 0, out, &theta));
+    TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+    t->child[0] = child[0];
+    t->child[1] = child[1];
+    TRY(bitmap_to_uv(b, node, path, *out, false));
+    return note_source(b, node, NULL, *out);
+}
+
+// Spectra written as objects become constants.
+static rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
+    double rgb[3] = {1, 1, 1};
+    int count = 3;
+    const char *property = NULL;
+    if (strcmp(node->type, "rawconstant") == 0 || strcmp(node->type, "uniform") == 0) {
+        rey_xml_property *p = rey_xml_find(node, "value");
+        property = "value";
+        if (p && p->kind == REY_XML_VECTOR_VALUE) {
+            TRY(rey_xml_get_vec3(b->ctx, node, "value", rgb, rgb));
+        } else {
+            TRY(rey_xml_get_float(b->ctx, node, "value", 1, &rgb[0]));
+            rgb[1] = rgb[2] = rgb[0];
+            count = use.real ? 1 : 3;
+        }
+    } else if (strcmp(node->type, "srgb") == 0) {
+        property = "color";
+        TRY(rey_xml_require(b->ctx, node, "color"));
+        TRY(rey_xml_get_colour(b->ctx, node, "color", use.colour, rgb, rgb));
+        bool unbounded;
+        TRY(rey_xml_get_bool(b->ctx, node, "unbounded", false, &unbounded));
+    } else if (strcmp(node->type, "d65") == 0) {
+        double scale;
+        TRY(rey_xml_get_float(b->ctx, node, "scale", 1, &scale));
+        if (rey_xml_has(node, "color")) {
+            TRY(rey_xml_get_colour(b->ctx, node, "color", REY_COLOUR_EMISSION, rgb, rgb));
+        }
+        for (int k = 0; k < 3; k++) {
+            rgb[k] *= scale;
+        }
+    } else {
+        return build_unknown(b, node, texture_word, NULL);
+    }
+    return build_constant(b, node, property, use, rgb, count, path, out);
+}
+
+rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
+    bool first;
+    TRY(build_visit(b, node, path, &first));
+    if (!first) {
+        *out = node->built;
+        return REY_OK;
+    }
+    if (strcmp(node->type, "bitmap") == 0) {
+        TRY(build_bitmap(b, node, use, path, out));
+    } else if (strcmp(node->type, "checkerboard") == 0) {
+        TRY(build_checkerboard(b, node, use, path, out));
+    } else {
+        TRY(build_spectrum(b, node, use, path, out));
+    }
+    node->built = *out;
+    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    return build_finish(b, node, path);
+}
+
+rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double *value, int count,
+                      const char *path, int32_t *out) {
+    rey_xml_child *child = rey_xml_child_named(node, name);
+    if (child) {
+        if (!(REY_XML_BIT(child->node->tag) & REY_XML_TEXTURES)) {
+            return rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "'%s' must be a texture, not a %s", name,
+                                rey_xml_tag_name(child->node->tag));
+        }
+        return build_texture(b, child->node, use, path, out);
+    }
+    rey_xml_property *p = rey_xml_find(node, name);
+    bool number = p && (p->kind == REY_XML_FLOAT_VALUE || p->kind == REY_XML_INTEGER_VALUE);
+    double rgb[3] = {value[0], count == 3 ? value[1] : value[0], count == 3 ? value[2] : value[0]};
+    if (use.real && (!p || number)) {
+        TRY(rey_xml_get_float(b->ctx, node, name, value[0], &rgb[0]));
+        return build_constant(b, node, name, use, rgb, 1, path, out);
+    }
+    if (p) {
+        TRY(rey_xml_get_colour(b->ctx, node, name, use.colour, rgb, rgb));
+    }
+    return build_constant(b, node, name, use, rgb, 3, path, out);
+}

@@ -1,0 +1,208 @@
+// mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
+#include "io/build.h"
+#include "io/mitsuba.h"
+
+#include <stdio.h>
+#include <string.h>
+
+// The first parameter path of an object.
+typedef struct Prefix {
+    const rey_xml_node *node;
+    char *path;
+} Prefix;
+
+void build_join(char out[MAX_PATH_NAME], const char *a, const char *b) {
+    snprintf(out, MAX_PATH_NAME, "%s%s%s", a, *a ? "." : "", b);
+}
+
+// Names every parameter below `from` under `to` as well.
+static rey_result alias_prefix(Builder *b, const char *from, const char *to) {
+    size_t length = strlen(from);
+    if (strcmp(from, to) == 0) {
+        return REY_OK;
+    }
+    for (size_t i = 0; i < b->scene->params.count; i++) {
+        const char *name = ARRAY_AT(b->scene->params, Param, i).name;
+        if (strncmp(name, from, length) == 0 && name[length] == '.') {
+            char alias[MAX_PATH_NAME];
+            build_join(alias, to, name + length + 1);
+            TRY(rey_scene_add_alias(b->scene, alias, (int)i));
+        }
+    }
+    for (size_t i = 0, n = b->scene->aliases.count; i < n; i++) {
+        Alias old = ARRAY_AT(b->scene->aliases, Alias, i);
+        if (strncmp(old.name, from, length) == 0 && old.name[length] == '.') {
+            char alias[MAX_PATH_NAME];
+            build_join(alias, to, old.name + length + 1);
+            TRY(rey_scene_add_alias(b->scene, alias, old.param));
+        }
+    }
+    return REY_OK;
+}
+
+rey_result build_visit(Builder *b, rey_xml_node *node, const char *path, bool *first) {
+    *first = node->built < 0;
+    if (!*first) {
+        for (size_t i = 0; i < b->prefixes.count; i++) {
+            Prefix p = ARRAY_AT(b->prefixes, Prefix, i);
+            if (p.node == node) {
+                return alias_prefix(b, p.path, path);
+            }
+        }
+        return REY_OK;
+    }
+    Prefix *p = rey_array_push(b->ctx, &b->prefixes, sizeof *p, 1);
+    if (!p) {
+        return REY_ERROR_MEMORY;
+    }
+    p->node = node;
+    p->path = rey_strdup(b->ctx, path);
+    return p->path ? REY_OK : REY_ERROR_MEMORY;
+}
+
+rey_result build_finish(Builder *b, rey_xml_node *node, const char *path) {
+    return node->id ? alias_prefix(b, path, node->id) : REY_OK;
+}
+
+rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param p, int32_t *out) {
+    char name[MAX_PATH_NAME];
+    *out = rey_scene_append(b->scene, &b->scene->build.theta, sizeof(float), 16);
+    if (*out < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int k = 0; k < 16; k++) {
+        ARRAY_AT(b->scene->build.theta, float, *out + k) = (float)matrix[k];
+    }
+    p.theta = *out;
+    p.count = 16;
+    p.dims = 2;
+    p.shape[0] = p.shape[1] = 4;
+    p.description = "pose: local to world, row-major";
+    build_join(name, path, "to_world");
+    return rey_scene_add_param(b->scene, name, p) < 0 ? REY_ERROR_MEMORY : REY_OK;
+}
+
+// Plugins of the format that are known and do not exist here yet.
+static bool is_known_plugin(const char *type) {
+    static const char *const known[] = {
+        "thindielectric", "principled", "principledthin", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
+        "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
+        "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
+        "sunsky", "timed_sunsky", "cylinder", "shapegroup", "instance", "bsplinecurve", "linearcurve", "sdfgrid", "merge",
+        "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
+        "batch", "mesh_attribute", "volume", "blackbody", "regular", "irregular", "ptracer", "aov", "depth", "volpath",
+        "volpathmis", "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
+        "heterogeneous", "gridvolume", "constvolume"};
+    for (int i = 0; i < COUNT_OF(known); i++) {
+        if (strcmp(known[i], type) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user) {
+    const char *tag = rey_xml_tag_name(node->tag);
+    if (is_known_plugin(node->type)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "%s '%s' is not supported yet", tag, node->type);
+    }
+    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%s'", tag, node->type);
+}
+
+// Stable name of a top-level object: its id, or its class with a running number.
+static void top_level_name(const rey_xml_node *node, int counts[REY_XML_TAG_COUNT], char out[MAX_PATH_NAME]) {
+    int number = counts[node->tag]++;
+    if (node->id) {
+        snprintf(out, MAX_PATH_NAME, "%s", node->id);
+    } else {
+        snprintf(out, MAX_PATH_NAME, "%s_%d", rey_xml_tag_name(node->tag), number);
+    }
+}
+
+static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_XML_TAG_COUNT]) {
+    rey_xml_node *node = child->node;
+    char name[MAX_PATH_NAME];
+    int32_t unused;
+    child->used = true;
+    top_level_name(node, counts, name);
+    switch (node->tag) {
+    case REY_XML_BSDF:
+        return build_bsdf(b, node, name, &unused);
+    case REY_XML_SHAPE:
+        return build_shape(b, node, name);
+    case REY_XML_EMITTER:
+        return build_emitter(b, node, -1, name, &unused);
+    case REY_XML_SENSOR:
+        return build_sensor(b, node, name);
+    case REY_XML_TEXTURE:
+    case REY_XML_SPECTRUM: {
+        TextureUse use = {REY_COLOUR_UNBOUNDED, false, -INFINITY, INFINITY, "", "texture"};
+        return build_texture(b, node, use, name, &unused);
+    }
+    case REY_XML_INTEGRATOR:
+        if (b->scene->integrator) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a scene can have only one integrator");
+        }
+        return build_integrator(b, node);
+    case REY_XML_MEDIUM:
+    case REY_XML_VOLUME:
+    case REY_XML_PHASE:
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "participating media are not supported yet");
+    default:
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a %s cannot stand at the top level of a scene",
+                            rey_xml_tag_name(node->tag));
+    }
+}
+
+static rey_result build_scene(Builder *b) {
+    rey_xml_node *root = rey_xml_root(b->source->document);
+    int counts[REY_XML_TAG_COUNT] = {0};
+    if (root->tag != REY_XML_SCENE) {
+        return rey_xml_fail(b->ctx, root->at, REY_ERROR_SCENE, "the root is a %s, expected a scene",
+                            rey_xml_tag_name(root->tag));
+    }
+    for (int i = 0; i < root->child_count; i++) {
+        TRY(build_child(b, &root->children[i], counts));
+    }
+    TRY(rey_xml_check_unused(b->ctx, root, NULL, NULL));
+    b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
+                                                  (int64_t)b->scene->build.emitters.count);
+    TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);
+    return rey_scene_freeze(b->scene);
+}
+
+static void source_free(void *document) {
+    SceneSource *source = document;
+    rey_xml_free(source->ctx, source->document);
+    rey_array_free(source->ctx, &source->textures);
+    rey_array_free(source->ctx, &source->shapes);
+    rey_free(source->ctx, source);
+}
+
+rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                            rey_scene **out) {
+    Builder b = {.ctx = ctx};
+    *out = NULL;
+    TRY(rey_scene_new(ctx, &b.scene));
+    b.source = rey_alloc(ctx, sizeof *b.source);
+    rey_result result = b.source ? REY_OK : REY_ERROR_MEMORY;
+    if (result == REY_OK) {
+        b.source->ctx = ctx;
+        b.scene->document = b.source;
+        b.scene->document_free = source_free;
+        result = rey_xml_read(ctx, path, defines, define_count, &b.source->document);
+    }
+    if (result == REY_OK) {
+        result = build_scene(&b);
+    }
+    for (size_t i = 0; i < b.prefixes.count; i++) {
+        rey_free(ctx, ARRAY_AT(b.prefixes, Prefix, i).path);
+    }
+    rey_array_free(ctx, &b.prefixes);
+    if (result != REY_OK) {
+        rey_scene_destroy(b.scene);
+        return result;
+    }
+    *out = b.scene;
+    return REY_OK;
+}

@@ -1,0 +1,8 @@
+// mitsuba.h: Mitsuba 3 scene files.
+#pragma once
+
+#include "scene/scene.h"
+
+// Loads a scene; derived data is still to be brought up to date. The caller owns *out.
+rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                            rey_scene **out);

@@ -1,0 +1,408 @@
+// render.c: primal, vector-Jacobian and Jacobian-vector drivers. They check what was asked, cut it into units of work
+// that do not depend on the number of threads, and merge the units' results in a fixed order.
+#include "backend/backend.h"
+#include "base/parallel.h"
+#include "render/film.h"
+#include "render/update.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+
+// Units of a derivative that have a gradient of their own: fixed, so that sums do not depend on the threads.
+enum { GRADIENT_SHARDS = 8, DEFAULT_SETS = 16 };
+
+rey_render_def rey_default_render_def(void) {
+    return (rey_render_def){.size = sizeof(rey_render_def), .sets = DEFAULT_SETS};
+}
+
+// Everything about one call.
+typedef struct Render {
+    rey_scene *scene;
+    rey_render_def def;
+    const Backend *backend;
+    FilmPlan plan;
+    PathJob job;           // what all units share
+    int32_t tiles, shards;
+    void **workspaces;     // one per worker
+    double *films;         // primal and forward: one per tile
+    double *gradients;     // reverse: one per shard
+    int64_t gradient_size;
+    double *columns, *rows;
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at
+    float *adjoint;
+    rey_stats stats;
+    double done, total;    // progress
+    bool cancelled;
+    pthread_mutex_t lock;
+} Render;
+
+static uint32_t hash(uint32_t x) {
+    x ^= x >> 16;
+    x *= 0x7feb352du;
+    x ^= x >> 15;
+    x *= 0x846ca68bu;
+    return x ^ (x >> 16);
+}
+
+static uint32_t scramble_of(uint32_t seed, uint32_t set, uint32_t sensor, uint32_t term) {
+    return hash(hash(hash(hash(seed + 0x9e3779b9u) ^ set) + sensor * 0x85ebca6bu) ^ term);
+}
+
+static void render_free(Render *r) {
+    rey_context *ctx = r->scene->ctx;
+    for (int i = 0; r->workspaces && i < ctx->def.threads; i++) {
+        rey_free(ctx, r->workspaces[i]);
+    }
+    rey_free(ctx, r->workspaces);
+    rey_free(ctx, r->films);
+    rey_free(ctx, r->gradients);
+    rey_free(ctx, r->columns);
+    rey_free(ctx, r->rows);
+    rey_free(ctx, r->offsets);
+    rey_free(ctx, r->adjoint);
+    pthread_mutex_destroy(&r->lock);
+}
+
+static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
+    rey_context *ctx = scene->ctx;
+    if (!def || def->size != sizeof *def) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "rey_render_def must come from rey_default_render_def");
+    }
+    if (def->sensor < 0 || def->sensor >= scene->view.sensors_count) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", def->sensor,
+                        (int)scene->view.sensors_count);
+    }
+    if (def->spp < 0 || def->spp > 1 << 24) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "spp = %d, expected 1 to %d, or 0 for the scene's own", def->spp,
+                        1 << 24);
+    }
+    if (def->sets < 1 || def->sets > 4096) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "sets = %d, expected 1 to 4096", def->sets);
+    }
+    if (def->sampler < REY_SAMPLER_DEFAULT || def->sampler > REY_SAMPLER_SOBOL) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "sampler = %d is none of REY_SAMPLER_*", def->sampler);
+    }
+    return REY_OK;
+}
+
+// Checks, brings the scene up to date and prepares what every mode needs.
+static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode) {
+    *r = (Render){.scene = scene};
+    pthread_mutex_init(&r->lock, NULL);
+    rey_result result = check_def(scene, def);
+    if (result == REY_OK) {
+        result = rey_scene_update(scene);
+    }
+    if (result != REY_OK) {
+        return result;
+    }
+    rey_context *ctx = scene->ctx;
+    const SensorRecord *sensor = scene->view.sensors + def->sensor;
+    r->def = *def;
+    r->def.spp = def->spp ? def->spp : sensor->spp;
+    r->backend = rey_backend_cpu(ctx->def.lanes);
+    r->plan = rey_film_plan(sensor);
+    r->tiles = r->plan.columns * r->plan.rows;
+    r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
+    r->job.sobol = def->sampler == REY_SAMPLER_DEFAULT ? sensor->sampler == REY_SAMPLER_SOBOL
+                                                       : def->sampler == REY_SAMPLER_SOBOL;
+    r->columns = rey_alloc_array(ctx, (size_t)sensor->crop_width, sizeof(double));
+    r->rows = rey_alloc_array(ctx, (size_t)sensor->crop_height, sizeof(double));
+    r->workspaces = rey_alloc_array(ctx, (size_t)ctx->def.threads, sizeof(void *));
+    if (!r->columns || !r->rows || !r->workspaces) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_film_norms(&r->plan, r->columns, r->rows);
+    r->job.workspace_bytes =
+        r->backend->workspace_bytes(mode) + ((size_t)scene->view.groups_count + 3) * sizeof(int32_t);
+    for (int i = 0; i < ctx->def.threads; i++) {
+        r->workspaces[i] = rey_alloc(ctx, r->job.workspace_bytes);
+        if (!r->workspaces[i]) {
+            return REY_ERROR_MEMORY;
+        }
+    }
+    if (mode != MODE_REVERSE) {
+        r->films = rey_alloc_array(ctx, (size_t)r->tiles * (size_t)r->plan.tile_floats, sizeof(double));
+        return r->films ? REY_OK : REY_ERROR_MEMORY;
+    }
+    return REY_OK;
+}
+
+// Runs one tile and books its counts; false when the caller cancelled.
+static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
+    pthread_mutex_lock(&r->lock);
+    bool cancelled = r->cancelled;
+    pthread_mutex_unlock(&r->lock);
+    if (cancelled) {
+        return false;
+    }
+    Tile t = rey_film_tile(&r->plan, tile);
+    job->x = t.x;
+    job->y = t.y;
+    job->width = t.width;
+    job->height = t.height;
+    job->workspace = r->workspaces[worker];
+    job->paths = job->rays = job->nonfinite = 0;
+    job->trace_seconds = 0;
+    double start = rey_thread_seconds();
+    r->backend->run(job);
+    double seconds = rey_thread_seconds() - start;
+    pthread_mutex_lock(&r->lock);
+    r->stats.paths += job->paths;
+    r->stats.rays += job->rays;
+    r->stats.nonfinite += job->nonfinite;
+    r->stats.trace_seconds += job->trace_seconds;
+    r->stats.thread_seconds += seconds;
+    r->done += 1;
+    if (r->def.progress && !r->cancelled && !r->def.progress(r->def.user, r->done / r->total)) {
+        r->cancelled = true;
+    }
+    pthread_mutex_unlock(&r->lock);
+    return true;
+}
+
+static void film_unit(void *argument, int64_t item, int worker) {
+    Render *r = argument;
+    PathJob job = r->job;
+    job.film = r->films + item * r->plan.tile_floats;
+    run_tile(r, &job, (int32_t)item, worker);
+}
+
+// A shard is every GRADIENT_SHARDS-th tile, run in order by one worker.
+static void gradient_unit(void *argument, int64_t item, int worker) {
+    Render *r = argument;
+    PathJob job = r->job;
+    job.gradient = r->gradients + item * r->gradient_size;
+    for (int32_t tile = (int32_t)item; tile < r->tiles; tile += r->shards) {
+        if (!run_tile(r, &job, tile, worker)) {
+            return;
+        }
+    }
+}
+
+static rey_result render_end(Render *r, rey_result result, double start, rey_stats *stats) {
+    if (result == REY_OK && r->cancelled) {
+        result = rey_fail(r->scene->ctx, REY_ERROR_CANCELLED, "cancelled");
+    }
+    r->stats.seconds = rey_seconds() - start;
+    if (stats) {
+        *stats = r->stats;
+    }
+    render_free(r);
+    return result;
+}
+
+// Adds the films of one pass to a picture of doubles.
+static void collect_films(Render *r, int32_t spp, double *picture) {
+    rey_film_merge(&r->plan, r->films, r->columns, r->rows, 1.0 / spp, picture);
+}
+
+static int64_t picture_floats(const Render *r) {
+    return (int64_t)r->plan.sensor->crop_width * r->plan.sensor->crop_height * 3;
+}
+
+rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats) {
+    double start = rey_seconds();
+    Render r;
+    double *picture = NULL;
+    rey_result result = render_begin(&r, scene, def, MODE_PRIMAL);
+    if (result == REY_OK) {
+        picture = rey_alloc_array(scene->ctx, (size_t)picture_floats(&r), sizeof *picture);
+        result = picture ? REY_OK : REY_ERROR_MEMORY;
+    }
+    if (result == REY_OK) {
+        r.job.spp = r.def.spp;
+        r.job.scramble = scramble_of(def->seed, def->set, (uint32_t)def->sensor, 0);
+        r.total = r.tiles;
+        rey_parallel_for(scene->ctx->def.threads, r.tiles, film_unit, &r);
+        collect_films(&r, r.def.spp, picture);
+        for (int64_t i = 0; i < picture_floats(&r); i++) {
+            image[i] = (float)picture[i];
+        }
+    }
+    rey_free(scene->ctx, picture);
+    return render_end(&r, result, start, stats);
+}
+
+// ---- derivatives -------------------------------------------------------------------------------------------------
+
+// Refuses parameters whose derivative would lack a term.
+static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
+    const int available = REY_TERM_INTERIOR;
+    for (int i = 0; i < selection.count; i++) {
+        rey_param_info info;
+        rey_result result = rey_param_get_info(scene, selection.params[i], &info);
+        if (result != REY_OK) {
+            return result;
+        }
+        if (!info.terms) {
+            return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
+        }
+        int missing = info.terms & ~available;
+        if (missing && !def->terms) {
+            int bit = missing & -missing;
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "the gradient of %s needs the term '%s', which does not exist yet: %s. "
+                            "--terms interior gives the part that does",
+                            info.name, rey_term_name(bit), info.why);
+        }
+    }
+    if (def->terms & ~available) {
+        int bit = def->terms & ~available;
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
+    }
+    return REY_OK;
+}
+
+// Where the values of each texture, to_uv and shape's normals begin in the compact vectors of the selection.
+static rey_result map_selection(Render *r, rey_selection selection) {
+    const SceneView *view = &r->scene->view;
+    int64_t textures = view->textures_count, shapes = view->shapes_count;
+    enum { PAD = 16 };
+    int64_t n = 2 * textures + shapes + PAD;
+    r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
+    if (!r->offsets) {
+        return REY_ERROR_MEMORY;
+    }
+    memset(r->offsets, 0xff, (size_t)n * sizeof *r->offsets);
+    int32_t *texture_at = r->offsets, *to_uv_at = r->offsets + textures, *normals_at = r->offsets + 2 * textures;
+    int64_t at = 0;
+    for (int i = 0; i < selection.count; i++) {
+        const Param *p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
+        int32_t *slot = p->texture >= 0   ? &texture_at[p->texture]
+                        : p->to_uv >= 0   ? &to_uv_at[p->to_uv]
+                        : p->normals >= 0 ? &normals_at[p->normals]
+                                          : NULL;
+        if (slot && *slot >= 0) {
+            return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "%s is selected twice", p->name);
+        }
+        if (slot) {
+            *slot = (int32_t)at;
+        }
+        r->job.any_normals |= p->normals >= 0;
+        at += p->count;
+        if (at > INT32_MAX / 2) {
+            return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
+        }
+    }
+    r->gradient_size = at;
+    r->job.texture_at = texture_at;
+    r->job.to_uv_at = to_uv_at;
+    r->job.normals_at = normals_at;
+    return REY_OK;
+}
+
+// Samples per pixel of one set; spp is rounded up to a multiple of the sets.
+static int32_t set_spp(const Render *r) {
+    return (r->def.spp + r->def.sets - 1) / r->def.sets;
+}
+
+static uint32_t set_scramble(const Render *r, int set) {
+    uint32_t number = r->def.sets == 1 ? r->def.set : r->def.set * 0x10001u + (uint32_t)set + 1;
+    return scramble_of(r->def.seed, number, (uint32_t)r->def.sensor, r->def.sets == 1 ? 0 : 1);
+}
+
+static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
+                                   int32_t mode) {
+    rey_result result = render_begin(r, scene, def, mode);
+    if (result == REY_OK) {
+        result = check_terms(scene, def, selection);
+    }
+    return result == REY_OK ? map_selection(r, selection) : result;
+}
+
+// The adjoint of the film's sums: of each pixel over samples and filter norm.
+static rey_result prepare_adjoint(Render *r, const float *adjoint) {
+    const SensorRecord *s = r->plan.sensor;
+    r->adjoint = rey_alloc_array(r->scene->ctx, (size_t)picture_floats(r) + 1, sizeof(float));
+    if (!r->adjoint) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int64_t i = 0; i < picture_floats(r); i++) {
+        int64_t x = i / 3 % s->crop_width, y = i / 3 / s->crop_width;
+        r->adjoint[i] = (float)(adjoint[i] / (r->columns[x] * r->rows[y] * set_spp(r)));
+        if (!isfinite(r->adjoint[i])) {
+            return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "the adjoint image is not finite at pixel %d, %d", (int)x,
+                            (int)y);
+        }
+    }
+    r->job.adjoint = r->adjoint;
+    return REY_OK;
+}
+
+rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *adjoint,
+                   double *gradient, double *set_gradients, rey_stats *stats) {
+    double start = rey_seconds();
+    Render r;
+    rey_result result = derivative_begin(&r, scene, def, selection, MODE_REVERSE);
+    if (result == REY_OK) {
+        result = prepare_adjoint(&r, adjoint);
+    }
+    if (result == REY_OK) {
+        r.shards = r.tiles < GRADIENT_SHARDS ? r.tiles : GRADIENT_SHARDS;
+        r.gradients = rey_alloc_array(scene->ctx, (size_t)(r.gradient_size + 1) * (size_t)r.shards, sizeof(double));
+        result = r.gradients ? REY_OK : REY_ERROR_MEMORY;
+    }
+    if (result == REY_OK) {
+        r.total = (double)r.tiles * def->sets;
+        r.job.spp = set_spp(&r);
+        memset(gradient, 0, (size_t)r.gradient_size * sizeof *gradient);
+        for (int set = 0; set < def->sets && !r.cancelled; set++) {
+            memset(r.gradients, 0, (size_t)r.gradient_size * (size_t)r.shards * sizeof *r.gradients);
+            r.job.scramble = set_scramble(&r, set);
+            rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
+            for (int64_t i = 0; i < r.gradient_size; i++) {
+                double sum = 0;
+                for (int32_t k = 0; k < r.shards; k++) {
+                    sum += r.gradients[k * r.gradient_size + i];
+                }
+                gradient[i] += sum / def->sets;
+                if (set_gradients) {
+                    set_gradients[set * r.gradient_size + i] = sum;
+                }
+            }
+        }
+    }
+    return render_end(&r, result, start, stats);
+}
+
+rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *tangent,
+                   float *derivative, double *set_values, rey_stats *stats) {
+    double start = rey_seconds();
+    Render r;
+    double *pictures = NULL;
+    rey_result result = derivative_begin(&r, scene, def, selection, MODE_FORWARD);
+    int64_t n = 0;
+    if (result == REY_OK) {
+        n = picture_floats(&r);
+        pictures = rey_alloc_array(scene->ctx, 2 * (size_t)n, sizeof *pictures);
+        result = pictures ? REY_OK : REY_ERROR_MEMORY;
+    }
+    if (result == REY_OK) {
+        double *sum = pictures, *one = pictures + n;
+        r.job.tangent = tangent;
+        r.total = (double)r.tiles * def->sets;
+        r.job.spp = set_spp(&r);
+        for (int set = 0; set < def->sets && !r.cancelled; set++) {
+            memset(one, 0, (size_t)n * sizeof *one);
+            memset(r.films, 0, (size_t)r.tiles * (size_t)r.plan.tile_floats * sizeof *r.films);
+            r.job.scramble = set_scramble(&r, set);
+            rey_parallel_for(scene->ctx->def.threads, r.tiles, film_unit, &r);
+            collect_films(&r, r.job.spp, one);
+            double mean = 0;
+            for (int64_t i = 0; i < n; i++) {
+                sum[i] += one[i] / def->sets;
+                mean += one[i] / (double)n;
+            }
+            if (set_values) {
+                set_values[set] = mean;
+            }
+        }
+        for (int64_t i = 0; i < n; i++) {
+            derivative[i] = (float)sum[i];
+        }
+    }
+    rey_free(scene->ctx, pictures);
+    return render_end(&r, result, start, stats);
+}

@@ -1,0 +1,11 @@
+// arrays.inl: every array that a kernel can see, once: ARRAY(type, name, comment). They lie in one arena after loading.
+ARRAY(float, theta, "all numbers that could ever be optimised: colours, texels, vertices, poses")
+ARRAY(TextureNode, textures, "textures, constants among them; a slot of any kind is an index into this")
+ARRAY(BsdfNode, bsdfs, "scattering functions; adapters refer to their children by index")
+ARRAY(ShapeRecord, shapes, "shapes; the index is Embree's geometry id")
+ARRAY(int32_t, triangles, "render indices, three per triangle, relative to the shape's first vertex")
+ARRAY(int32_t, welded, "per render vertex, the smallest vertex of its shape at the same position")
+ARRAY(EmitterRecord, emitters, "light sources")
+ARRAY(SensorRecord, sensors, "cameras with their films")
+ARRAY(Group, groups, "shading groups: what a batch of lanes has in common")
+ARRAY(float, tables, "data derived from theta: distributions, inverse transforms, transmittance tables")

@@ -1,0 +1,36 @@
+// kind.h: the machinery behind "a kind is one header and one table row".
+//
+// A kind's header lists its parameters once, as a macro of rows P(type, field, default, low, high, description):
+//   SPEC   colour-valued texture          REAL   number-valued texture
+//   BOUND  colour or number in [0, 1]     (low and high say the range of every type)
+// and its uniform switches as rows C(type, field, default, choices, description). From the rows come the record below,
+// fetch and scatter, XML attributes with defaults and ranges, parameter names, documentation and all tests.
+#pragma once
+
+#include "scene/scene.h"
+
+typedef enum ParamType {
+    PARAM_SPEC,      // colour texture
+    PARAM_REAL,      // number texture
+    PARAM_IOR,       // number: int_ior / ext_ior, or the ratio
+    PARAM_METAL_ETA, // colour: eta, or from `material`
+    PARAM_METAL_K,   // colour: k, or from `material`
+    PARAM_ALPHA_U,   // number: alpha or alpha_u
+    PARAM_ALPHA_V    // number: alpha or alpha_v
+} ParamType;
+
+typedef struct ParamDesc {
+    ParamType type;
+    const char *name;
+    float value;       // default
+    float low, high;   // allowed range
+    const char *text;  // description
+    const char *option; // type-specific: the default name of an interior index of refraction
+} ParamDesc;
+
+typedef struct ConfigDesc {
+    const char *name;
+    int value;           // default
+    const char *choices; // "false|true" or "beckmann|ggx": the value is the position
+    const char *text;
+} ConfigDesc;

@@ -1,0 +1,161 @@
+// params.c: named parameters: ranges of theta with a name, a shape, a range and the terms that a derivative needs.
+#include "scene/scene.h"
+
+#include <string.h>
+
+int rey_scene_add_param(rey_scene *scene, const char *name, Param param) {
+    param.name = rey_strdup(scene->ctx, name);
+    Param *p = param.name ? rey_array_push(scene->ctx, &scene->params, sizeof *p, 1) : NULL;
+    if (!p) {
+        rey_free(scene->ctx, param.name);
+        return -1;
+    }
+    param.unit = param.unit ? param.unit : "";
+    param.description = param.description ? param.description : "";
+    param.why = param.why ? param.why : "";
+    *p = param;
+    return (int)scene->params.count - 1;
+}
+
+rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param) {
+    if (rey_param_find(scene, name) >= 0) {
+        return REY_OK;
+    }
+    char *copy = rey_strdup(scene->ctx, name);
+    Alias *alias = copy ? rey_array_push(scene->ctx, &scene->aliases, sizeof *alias, 1) : NULL;
+    if (!alias) {
+        rey_free(scene->ctx, copy);
+        return REY_ERROR_MEMORY;
+    }
+    *alias = (Alias){copy, param};
+    return REY_OK;
+}
+
+static const Param *param_at(const rey_scene *scene, int i) {
+    return i >= 0 && (size_t)i < scene->params.count ? &ARRAY_AT(scene->params, Param, i) : NULL;
+}
+
+int rey_param_count(const rey_scene *scene) {
+    return (int)scene->params.count;
+}
+
+rey_result rey_param_get_info(const rey_scene *scene, int param, rey_param_info *info) {
+    const Param *p = param_at(scene, param);
+    if (!p || !info) {
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "there is no parameter number %d", param);
+    }
+    *info = (rey_param_info){.name = p->name, .unit = p->unit, .description = p->description, .count = p->count,
+                             .dims = p->dims, .low = p->low, .high = p->high, .terms = p->terms, .why = p->why};
+    for (int k = 0; k < p->dims; k++) {
+        info->shape[k] = p->shape[k];
+    }
+    return REY_OK;
+}
+
+int rey_param_find(const rey_scene *scene, const char *name) {
+    for (size_t i = 0; i < scene->params.count; i++) {
+        if (strcmp(ARRAY_AT(scene->params, Param, i).name, name) == 0) {
+            return (int)i;
+        }
+    }
+    for (size_t i = 0; i < scene->aliases.count; i++) {
+        if (strcmp(ARRAY_AT(scene->aliases, Alias, i).name, name) == 0) {
+            return ARRAY_AT(scene->aliases, Alias, i).param;
+        }
+    }
+    return -1;
+}
+
+static const char *param_word(void *user, int i) {
+    const rey_scene *scene = user;
+    size_t n = scene->params.count;
+    if ((size_t)i < n) {
+        return ARRAY_AT(scene->params, Param, i).name;
+    }
+    return (size_t)i < n + scene->aliases.count ? ARRAY_AT(scene->aliases, Alias, (size_t)i - n).name : NULL;
+}
+
+const char *rey_param_nearest(const rey_scene *scene, const char *name) {
+    return rey_nearest_word(name, param_word, (void *)(uintptr_t)scene);
+}
+
+const float *rey_param_values(const rey_scene *scene, int param) {
+    const Param *p = param_at(scene, param);
+    return p ? scene->view.theta + p->theta : NULL;
+}
+
+// Derived data that reads a texture: environment distributions, tables of scattering functions.
+static void texture_changed(rey_scene *scene, int32_t texture) {
+    for (int64_t i = 0; i < scene->view.emitters_count; i++) {
+        const EmitterRecord *e = scene->view.emitters + i;
+        scene->dirty_emitters[i] |= e->kind == EMITTER_ENVMAP && e->slot == texture;
+    }
+    for (int64_t i = 0; i < scene->view.bsdfs_count; i++) {
+        const BsdfNode *b = scene->view.bsdfs + i;
+        for (int k = 0; k < MAX_SLOTS && b->table >= 0; k++) {
+            scene->dirty_bsdfs[i] |= b->slot[k] == texture;
+        }
+    }
+}
+
+rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count) {
+    Param *p = (Param *)(uintptr_t)param_at(scene, param);
+    if (!p || !values) {
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "there is no parameter number %d", param);
+    }
+    if (count != p->count) {
+        return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s has %d values, %lld were given", p->name, (int)p->count,
+                        (long long)count);
+    }
+    for (int64_t i = 0; i < count; i++) {
+        if (!(values[i] >= p->low && values[i] <= p->high) || !isfinite(values[i])) {
+            return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s[%lld] = %g, expected a number in [%g, %g]", p->name,
+                            (long long)i, (double)values[i], (double)p->low, (double)p->high);
+        }
+    }
+    memmove(scene->view.theta + p->theta, values, (size_t)count * sizeof *values);
+    p->version++;
+    scene->dirty = true;
+    if (p->texture >= 0) {
+        texture_changed(scene, p->texture);
+    }
+    if (p->geometry >= 0) {
+        scene->dirty_shapes[p->geometry] = 1;
+    }
+    if (p->emitter >= 0) {
+        scene->dirty_emitters[p->emitter] = 1;
+    }
+    return REY_OK;
+}
+
+rey_result rey_param_set(rey_scene *scene, int param, const float *values, int64_t count) {
+    return rey_scene_set(scene, param, values, count);
+}
+
+int64_t rey_selection_size(const rey_scene *scene, rey_selection selection) {
+    int64_t size = 0;
+    for (int i = 0; i < selection.count; i++) {
+        const Param *p = param_at(scene, selection.params[i]);
+        size += p ? p->count : 0;
+    }
+    return size;
+}
+
+const char *rey_term_name(int bit) {
+    switch (bit) {
+    case REY_TERM_INTERIOR:
+        return "interior";
+    case REY_TERM_PRIMARY:
+        return "primary";
+    case REY_TERM_INDIRECT:
+        return "indirect";
+    case REY_TERM_SPECULAR:
+        return "specular";
+    case REY_TERM_MEDIUM:
+        return "medium";
+    case REY_TERM_TERMINATOR:
+        return "terminator";
+    default:
+        return NULL;
+    }
+}

@@ -1,0 +1,89 @@
+// scene.c: life cycle of the flat scene: growing arrays while loading, one arena afterwards.
+#include "scene/scene.h"
+
+#include <string.h>
+
+rey_result rey_scene_new(rey_context *ctx, rey_scene **out) {
+    rey_scene *scene = rey_alloc(ctx, sizeof *scene);
+    if (!scene) {
+        return REY_ERROR_MEMORY;
+    }
+    scene->ctx = ctx;
+    scene->view.environment = -1;
+    scene->view.emitter_cdf = -1;
+    scene->view.max_depth = -1;
+    scene->view.rr_depth = 5;
+    *out = scene;
+    return REY_OK;
+}
+
+int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n) {
+    if (n < 0 || (uint64_t)n + array->count > INT32_MAX) {
+        rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the scene holds more than 2^31 numbers of one kind");
+        return -1;
+    }
+    size_t first = array->count;
+    return rey_array_push(scene->ctx, array, item_bytes, (size_t)n) || n == 0 ? (int32_t)first : -1;
+}
+
+rey_result rey_scene_freeze(rey_scene *scene) {
+    enum { TAIL = 16 }; // entries behind the end that wide loads may touch
+    size_t bytes = 0;
+#define ARRAY(type, name, comment) bytes += ((scene->build.name.count + TAIL) * sizeof(type) + 63) / 64 * 64;
+#include "scene/arrays.inl"
+#undef ARRAY
+    scene->arena = rey_alloc(scene->ctx, bytes);
+    scene->dirty_shapes = rey_alloc(scene->ctx, scene->build.shapes.count + 1);
+    scene->dirty_bsdfs = rey_alloc(scene->ctx, scene->build.bsdfs.count + 1);
+    scene->dirty_emitters = rey_alloc(scene->ctx, scene->build.emitters.count + 1);
+    if (!scene->arena || !scene->dirty_shapes || !scene->dirty_bsdfs || !scene->dirty_emitters) {
+        return REY_ERROR_MEMORY;
+    }
+    scene->arena_bytes = bytes;
+    char *at = scene->arena;
+#define ARRAY(type, name, comment)                                                                                     \
+    scene->view.name = (type *)(void *)at;                                                                             \
+    scene->view.name##_count = (int64_t)scene->build.name.count;                                                       \
+    if (scene->build.name.count) {                                                                                     \
+        memcpy(at, scene->build.name.data, scene->build.name.count * sizeof(type));                                    \
+    }                                                                                                                  \
+    at += ((scene->build.name.count + TAIL) * sizeof(type) + 63) / 64 * 64;                                            \
+    rey_array_free(scene->ctx, &scene->build.name);
+#include "scene/arrays.inl"
+#undef ARRAY
+    memset(scene->dirty_shapes, 1, (size_t)scene->view.shapes_count);
+    memset(scene->dirty_bsdfs, 1, (size_t)scene->view.bsdfs_count);
+    memset(scene->dirty_emitters, 1, (size_t)scene->view.emitters_count);
+    scene->dirty = true;
+    return REY_OK;
+}
+
+void rey_scene_destroy(rey_scene *scene) {
+    if (!scene) {
+        return;
+    }
+    rey_context *ctx = scene->ctx;
+    if (scene->accel_free) {
+        scene->accel_free(scene);
+    }
+#define ARRAY(type, name, comment) rey_array_free(ctx, &scene->build.name);
+#include "scene/arrays.inl"
+#undef ARRAY
+    for (size_t i = 0; i < scene->params.count; i++) {
+        rey_free(ctx, ARRAY_AT(scene->params, Param, i).name);
+    }
+    for (size_t i = 0; i < scene->aliases.count; i++) {
+        rey_free(ctx, ARRAY_AT(scene->aliases, Alias, i).name);
+    }
+    rey_array_free(ctx, &scene->params);
+    rey_array_free(ctx, &scene->aliases);
+    rey_free(ctx, scene->arena);
+    rey_free(ctx, scene->dirty_shapes);
+    rey_free(ctx, scene->dirty_bsdfs);
+    rey_free(ctx, scene->dirty_emitters);
+    rey_free(ctx, scene->integrator);
+    if (scene->document_free) {
+        scene->document_free(scene->document);
+    }
+    rey_free(ctx, scene);
+}

@@ -1,0 +1,149 @@
+// scene.h: the flat scene. Records are plain 32-bit fields so that lanes can gather them; indices, no pointers.
+#pragma once
+
+#include "base/context.h"
+
+#include <math.h>
+
+enum { MAX_SLOTS = 8, MAX_CONFIG = 4, MAX_CHILDREN = 2 };
+
+enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD };
+enum { FILTER_NEAREST, FILTER_BILINEAR };
+enum { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
+
+typedef struct TextureNode {
+    int32_t kind;
+    int32_t theta;    // first value
+    int32_t width, height, channels; // channels 1 or 3
+    int32_t filter, wrap;
+    int32_t to_uv;    // theta offset of a row-major 3 x 3 matrix, -1 = identity
+    int32_t child[2]; // checkerboard: color0, color1
+} TextureNode;
+
+typedef struct BsdfNode {
+    int32_t kind;
+    int32_t slot[MAX_SLOTS];     // textures, in the order of the kind's parameter list
+    int32_t config[MAX_CONFIG];  // uniform switches, in the order of the kind's configuration list
+    int32_t child[MAX_CHILDREN]; // nested functions, -1 = none
+    int32_t table;               // first derived value in `tables`, -1 = none
+} BsdfNode;
+
+// Analytic kinds hit through their own geometry; rectangle and cube are meshes whose vertices follow to_world.
+enum { SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK };
+enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4 };
+
+typedef struct ShapeRecord {
+    int32_t kind, flags, group, bsdf, emitter;
+    int32_t interior, exterior;              // media, -1 = vacuum
+    int32_t triangle, triangle_count;        // in `triangles`, counted in triangles
+    int32_t vertex_count, welded;            // welded: first entry in `welded`
+    int32_t positions, normals, uvs;         // theta offsets, -1 = none
+    int32_t to_world;                        // theta offset of a row-major 4 x 4 matrix, -1 = vertices are in the world
+    int32_t table;                           // sphere: centre, radius, then frame; disk: 12 of to_world, 12 of its inverse
+    int32_t area_cdf;                        // tables offset: triangle_count cumulative areas (mesh emitters), -1 = none
+    float area;                              // surface area [scene units^2]
+} ShapeRecord;
+
+enum { EMITTER_AREA, EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP };
+
+typedef struct EmitterRecord {
+    int32_t kind, shape;   // shape: of an area light, else -1
+    int32_t slot;          // radiance or intensity texture; envmap: the image
+    int32_t scale;         // envmap: constant texture, else -1
+    int32_t position;      // point: theta offset of 3 numbers
+    int32_t to_world;      // envmap: theta offset of 4 x 4
+    int32_t table;         // envmap: inverse rotation (9), then the distribution
+    float weight;          // sampling weight, normalised: the probability of being chosen
+} EmitterRecord;
+
+enum { FILM_BOX, FILM_TENT, FILM_GAUSSIAN, FILM_MITCHELL, FILM_CATMULLROM, FILM_LANCZOS };
+
+typedef struct SensorRecord {
+    int32_t kind;
+    int32_t to_world;         // theta offset of 4 x 4
+    int32_t fov;              // theta offset: horizontal field of view [degrees]
+    int32_t principal;        // theta offset: principal point offset x, y [fraction of the film]
+    int32_t width, height;    // full film [pixels]
+    int32_t crop_x, crop_y, crop_width, crop_height;
+    int32_t filter, sample_border, sampler, spp;
+    float filter_radius, filter_a, filter_b; // gaussian: stddev; mitchell: B, C
+    float near_clip, far_clip;
+    int32_t medium;
+} SensorRecord;
+
+// Lanes of one batch share a group: scattering function, emitter, shape kind and flags are uniform in kernels.
+typedef struct Group {
+    int32_t bsdf, emitter, shape_kind, shape_flags;
+    int32_t interior, exterior;
+} Group;
+
+// What a kernel sees: the arrays, and uniform facts.
+typedef struct SceneView {
+#define ARRAY(type, name, comment) type *name;
+#include "scene/arrays.inl"
+#undef ARRAY
+#define ARRAY(type, name, comment) int64_t name##_count;
+#include "scene/arrays.inl"
+#undef ARRAY
+    int32_t environment;      // emitter index of the constant or envmap light, -1 = none
+    int32_t max_depth, rr_depth, hide_emitters;
+    float bounds_centre[3], bounds_half[3], bounds_radius;
+    void *embree;             // RTCScene
+    bool uniform_emitters;    // every emitter is chosen with the same probability
+    int32_t emitter_cdf;      // tables offset of cumulative emitter weights
+} SceneView;
+
+// A named parameter: a range of theta.
+typedef struct Param {
+    char *name;
+    int32_t theta, count;
+    int32_t dims, shape[3];
+    float low, high;
+    int32_t terms;
+    const char *unit, *description, *why;
+    int32_t texture;          // texture that these are the values of, -1 = none
+    int32_t to_uv;            // texture that these are the to_uv of, -1 = none
+    int32_t normals;          // shape that these are the vertex normals of, -1 = none
+    int32_t geometry;         // shape whose geometry follows, -1 = none
+    int32_t emitter;          // emitter whose pose this is, -1 = none
+    uint32_t version;         // counts changes
+} Param;
+#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .geometry = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
+
+typedef struct Alias {
+    char *name;
+    int32_t param;
+} Alias;
+
+struct rey_scene {
+    rey_context *ctx;
+    SceneView view;
+    Array params, aliases;
+    // Loading: each array grows by itself; rey_scene_freeze moves all into the arena.
+    struct {
+#define ARRAY(type, name, comment) Array name;
+#include "scene/arrays.inl"
+#undef ARRAY
+    } build;
+    void *arena;
+    size_t arena_bytes;
+    void *embree_device;
+    void (*accel_free)(rey_scene *scene); // set by accel, which owns view.embree and embree_device
+    uint8_t *dirty_shapes, *dirty_bsdfs, *dirty_emitters; // derived data to rebuild before the next kernel runs
+    bool dirty;
+    char *integrator;
+    void *document;           // io's source document, owned; freed through document_free
+    void (*document_free)(void *document);
+};
+
+// An empty scene; rey_scene_destroy frees it at any stage.
+rey_result rey_scene_new(rey_context *ctx, rey_scene **out);
+// Appends n zeroed entries to a build array; returns the index of the first, -1 on failure.
+int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n);
+// Moves the build arrays into the arena; theta never moves from here on.
+rey_result rey_scene_freeze(rey_scene *scene);
+// Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
+int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
+rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);
+// Writes a parameter's values after checking them, and notes what has to be rebuilt.
+rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count);

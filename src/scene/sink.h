@@ -1,0 +1,39 @@
+// sink.h: the one door through which derivatives leave a kernel. A reverse sink scatters into the gradient of the
+// selected parameters; a forward sink contracts with their tangent into one number per lane. Both vectors are compact:
+// a table says where the values of each texture (or the normals of each shape) begin, -1 = not asked for.
+#pragma once
+
+#include "math/vec.h"
+#include "scene/scene.h"
+
+typedef struct Sink {
+    double *gradient;          // reverse, else null
+    const float *tangent;      // forward, else null
+    const int32_t *texture_at; // per texture
+    const int32_t *to_uv_at;   // per texture: its to_uv
+    const int32_t *normals_at; // per shape: its vertex normals
+    bool any_normals;
+    Float derivative;          // forward: accumulates
+} Sink;
+
+// The same entry for all lanes of m.
+KFN void sink_add_uniform(Sink *s, int32_t at, Float d, Mask m) {
+    if (s->gradient) {
+        s->gradient[at] += f_sum(d, m);
+    } else {
+        s->derivative = s->derivative + f_zero_unless(m, d) * s->tangent[at];
+    }
+}
+
+// One entry per lane; `at` must be valid in every lane.
+KFN void sink_add(Sink *s, Int at, Float d, Mask m) {
+    if (s->gradient) {
+        f_scatter_add_double(s->gradient, at, d, m);
+    } else {
+#ifdef REAL_DOUBLE
+        s->derivative += f_zero_unless(m, d) * (Float)s->tangent[at];
+#else
+        s->derivative = s->derivative + f_zero_unless(m, d) * f_gather(s->tangent, at);
+#endif
+    }
+}

@@ -1,0 +1,260 @@
+// texture.h: textures as kernels see them, and their adjoints. The texture is uniform over the lanes; a constant costs
+// one broadcast. Derivatives go to the texels, to uv, and to to_uv where that moves no jump.
+// NOT differentiated: jumps of nearest-neighbour texels, checker edges and clamped borders under a moving uv.
+#pragma once
+
+#include "scene/sink.h"
+
+KFN Float theta_at(const SceneView *scene, Int index) {
+#ifdef REAL_DOUBLE
+    return (Float)scene->theta[index];
+#else
+    return f_gather(scene->theta, index);
+#endif
+}
+
+KFN Vec2 texture_map_uv(const SceneView *scene, const TextureNode *t, Vec2 uv) {
+    if (t->to_uv < 0) {
+        return uv;
+    }
+    const float *m = scene->theta + t->to_uv;
+    return (Vec2){uv.x * m[0] + uv.y * m[1] + m[2], uv.x * m[3] + uv.y * m[4] + m[5]};
+}
+
+KFN void texture_map_uv_adj(const SceneView *scene, const TextureNode *t, Vec2 uv, Vec2 d, Vec2 *duv, int32_t to_uv_at,
+                            Sink *sink, Mask m) {
+    if (t->to_uv < 0) {
+        duv->x = duv->x + d.x;
+        duv->y = duv->y + d.y;
+        return;
+    }
+    // x = m0 u + m1 v + m2, y = m3 u + m4 v + m5
+    const float *a = scene->theta + t->to_uv;
+    duv->x = duv->x + d.x * a[0] + d.y * a[3];
+    duv->y = duv->y + d.x * a[1] + d.y * a[4];
+    if (to_uv_at >= 0) {
+        sink_add_uniform(sink, to_uv_at, d.x * uv.x, m);
+        sink_add_uniform(sink, to_uv_at + 1, d.x * uv.y, m);
+        sink_add_uniform(sink, to_uv_at + 2, d.x, m);
+        sink_add_uniform(sink, to_uv_at + 3, d.y * uv.x, m);
+        sink_add_uniform(sink, to_uv_at + 4, d.y * uv.y, m);
+        sink_add_uniform(sink, to_uv_at + 5, d.y, m);
+    }
+}
+
+// Texel index under the wrap mode; n is the number of texels along the axis.
+KFN Int texture_wrap(Int i, int32_t n, int32_t wrap) {
+    if (wrap == WRAP_CLAMP) {
+        return i_max(i_min(i, i_set(n - 1)), i_set(0));
+    }
+    int32_t period = wrap == WRAP_MIRROR ? 2 * n : n;
+    Int q = i_from_f(f_floor(f_from_i(i) * (1.0f / (real)period) + 0.5f / (real)period));
+    i = i - q * period;
+    i = i_max(i_min(i, i_set(period - 1)), i_set(0)); // guards the rounding of q
+    if (wrap == WRAP_MIRROR) {
+        i = i_select(mi_lt(i, i_set(n)), i, 2 * n - 1 - i);
+    }
+    return i;
+}
+
+// The four texels around uv (nearest: all the same) and the bilinear weights.
+typedef struct Footprint {
+    Int at[4];     // texel numbers: 00, 10, 01, 11
+    Float fx, fy;  // weights of the second column and row
+} Footprint;
+
+KFN Footprint texture_footprint(const TextureNode *t, Vec2 uv) {
+    // Far-away coordinates lose their fraction anyway; the clamp keeps the integer conversion defined.
+    Float x = f_clamp(uv.x * (real)t->width, f_set(-1e7f), f_set(1e7f));
+    Float y = f_clamp(uv.y * (real)t->height, f_set(-1e7f), f_set(1e7f));
+    Footprint f;
+    if (t->filter == FILTER_NEAREST) {
+        Int ix = texture_wrap(i_from_f(f_floor(x)), t->width, t->wrap);
+        Int iy = texture_wrap(i_from_f(f_floor(y)), t->height, t->wrap);
+        f.at[0] = f.at[1] = f.at[2] = f.at[3] = iy * t->width + ix;
+        f.fx = f.fy = f_set(0);
+        return f;
+    }
+    x = x - 0.5f;
+    y = y - 0.5f;
+    Float x0 = f_floor(x), y0 = f_floor(y);
+    f.fx = x - x0;
+    f.fy = y - y0;
+    Int ix0 = i_from_f(x0), iy0 = i_from_f(y0);
+    Int ix1 = texture_wrap(ix0 + 1, t->width, t->wrap), iy1 = texture_wrap(iy0 + 1, t->height, t->wrap);
+    ix0 = texture_wrap(ix0, t->width, t->wrap);
+    iy0 = texture_wrap(iy0, t->height, t->wrap);
+    f.at[0] = iy0 * t->width + ix0;
+    f.at[1] = iy0 * t->width + ix1;
+    f.at[2] = iy1 * t->width + ix0;
+    f.at[3] = iy1 * t->width + ix1;
+    return f;
+}
+
+KFN Float footprint_weight(const Footprint *f, int corner) {
+    return (corner & 1 ? f->fx : 1.0f - f->fx) * (corner & 2 ? f->fy : 1.0f - f->fy);
+}
+
+KFN Spec bitmap_texel(const SceneView *scene, const TextureNode *t, Int at) {
+    Int index = at * t->channels + t->theta;
+    if (t->channels == 1) {
+        return spec_set(theta_at(scene, index));
+    }
+    Spec s;
+    for (int c = 0; c < SPEC_N; c++) {
+        s.c[c] = theta_at(scene, index + c);
+    }
+    return s;
+}
+
+KFN Spec bitmap_eval(const SceneView *scene, const TextureNode *t, Vec2 uv) {
+    Footprint f = texture_footprint(t, texture_map_uv(scene, t, uv));
+    if (t->filter == FILTER_NEAREST) {
+        return bitmap_texel(scene, t, f.at[0]);
+    }
+    Spec s = spec_zero();
+    for (int k = 0; k < 4; k++) {
+        s = spec_madd(s, footprint_weight(&f, k), bitmap_texel(scene, t, f.at[k]));
+    }
+    return s;
+}
+
+KFN void bitmap_adj(const SceneView *scene, int32_t id, Vec2 uv, Spec d, Vec2 *duv, Sink *sink, Mask m) {
+    const TextureNode *t = scene->textures + id;
+    Footprint f = texture_footprint(t, texture_map_uv(scene, t, uv));
+    int corners = t->filter == FILTER_NEAREST ? 1 : 4;
+    if (sink->texture_at[id] >= 0) {
+        for (int k = 0; k < corners; k++) {
+            // s = sum_k w_k texel_k
+            Float w = footprint_weight(&f, k);
+            Int at = f.at[k] * t->channels + sink->texture_at[id];
+            if (t->channels == 1) {
+                sink_add(sink, at, w * spec_sum(d), m);
+            } else {
+                for (int c = 0; c < SPEC_N; c++) {
+                    sink_add(sink, at + c, w * d.c[c], m);
+                }
+            }
+        }
+    }
+    if (corners == 4 && (duv || sink->to_uv_at[id] >= 0)) {
+        Float v[4];
+        Vec2 unused = {f_set(0), f_set(0)};
+        for (int k = 0; k < 4; k++) {
+            v[k] = spec_dot(d, bitmap_texel(scene, t, f.at[k]));
+        }
+        // s(fx, fy) bilinear, fx = u' width - ..., fy = v' height - ...
+        Vec2 g;
+        g.x = f_zero_unless(m, ((v[1] - v[0]) * (1.0f - f.fy) + (v[3] - v[2]) * f.fy) * (real)t->width);
+        g.y = f_zero_unless(m, ((v[2] - v[0]) * (1.0f - f.fx) + (v[3] - v[1]) * f.fx) * (real)t->height);
+        texture_map_uv_adj(scene, t, uv, g, duv ? duv : &unused, sink->to_uv_at[id], sink, m);
+    }
+}
+
+// Checkerboard: lanes on color0 when looked up as a colour. As a number the two are swapped [Mitsuba's convention].
+KFN Mask checkerboard_first(const SceneView *scene, const TextureNode *t, Vec2 uv) {
+    uv = texture_map_uv(scene, t, uv);
+    Mask a = m_gt(uv.x - f_floor(uv.x), f_set(0.5f));
+    Mask b = m_gt(uv.y - f_floor(uv.y), f_set(0.5f));
+    return ~(a ^ b);
+}
+
+KFN Float luminance(Spec s) { return s.c[0] * 0.212671f + s.c[1] * 0.715160f + s.c[2] * 0.072169f; }
+KFN Spec luminance_adj(Float d) {
+    Spec s;
+    s.c[0] = d * 0.212671f;
+    s.c[1] = d * 0.715160f;
+    s.c[2] = d * 0.072169f;
+    return s;
+}
+
+static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, Vec2 uv) {
+    const TextureNode *t = scene->textures + id;
+    if (t->kind == TEXTURE_CONSTANT) {
+        const float *v = scene->theta + t->theta;
+        Spec s;
+        for (int c = 0; c < SPEC_N; c++) {
+            s.c[c] = f_set(v[t->channels == 1 ? 0 : c]);
+        }
+        return s;
+    }
+    if (t->kind == TEXTURE_BITMAP) {
+        return bitmap_eval(scene, t, uv);
+    }
+    return spec_select(checkerboard_first(scene, t, uv), texture_eval_general(scene, t->child[0], uv),
+                       texture_eval_general(scene, t->child[1], uv));
+}
+
+static NOINLINE Float texture_eval_real_general(const SceneView *scene, int32_t id, Vec2 uv) {
+    const TextureNode *t = scene->textures + id;
+    if (t->kind == TEXTURE_CHECKERBOARD) {
+        return f_select(checkerboard_first(scene, t, uv), texture_eval_real_general(scene, t->child[1], uv),
+                        texture_eval_real_general(scene, t->child[0], uv));
+    }
+    Spec s = texture_eval_general(scene, id, uv);
+    return t->channels == 1 ? s.c[0] : luminance(s);
+}
+
+KFN Spec texture_eval(const SceneView *scene, int32_t id, Vec2 uv) {
+    const TextureNode *t = scene->textures + id;
+    if (t->kind == TEXTURE_CONSTANT && t->channels == SPEC_N) {
+        Spec s;
+        for (int c = 0; c < SPEC_N; c++) {
+            s.c[c] = f_set(scene->theta[t->theta + c]);
+        }
+        return s;
+    }
+    return texture_eval_general(scene, id, uv);
+}
+
+// The texture as a number: the luminance of a colour.
+KFN Float texture_eval_real(const SceneView *scene, int32_t id, Vec2 uv) {
+    const TextureNode *t = scene->textures + id;
+    if (t->kind == TEXTURE_CONSTANT && t->channels == 1) {
+        return f_set(scene->theta[t->theta]);
+    }
+    return texture_eval_real_general(scene, id, uv);
+}
+
+// Does the derivative of this texture, or of one inside it, leave through the sink?
+KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
+    const TextureNode *t = scene->textures + id;
+    return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD;
+}
+
+// Accumulates the adjoint d of texture_eval into the sink and into duv (may be null).
+static NOINLINE void texture_adj(const SceneView *scene, int32_t id, Vec2 uv, Spec d, Vec2 *duv, Sink *sink, Mask m) {
+    const TextureNode *t = scene->textures + id;
+    int32_t at = sink->texture_at[id];
+    if (t->kind == TEXTURE_CONSTANT) {
+        if (at >= 0 && t->channels == 1) {
+            sink_add_uniform(sink, at, spec_sum(d), m);
+        } else if (at >= 0) {
+            for (int c = 0; c < SPEC_N; c++) {
+                sink_add_uniform(sink, at + c, d.c[c], m);
+            }
+        }
+    } else if (t->kind == TEXTURE_BITMAP) {
+        bitmap_adj(scene, id, uv, d, duv, sink, m);
+    } else {
+        Mask first = checkerboard_first(scene, t, uv);
+        texture_adj(scene, t->child[0], uv, d, duv, sink, m & first);
+        texture_adj(scene, t->child[1], uv, d, duv, sink, m & ~first);
+    }
+}
+
+static NOINLINE void texture_adj_real(const SceneView *scene, int32_t id, Vec2 uv, Float d, Vec2 *duv, Sink *sink,
+                                      Mask m) {
+    const TextureNode *t = scene->textures + id;
+    if (t->kind == TEXTURE_CHECKERBOARD) {
+        Mask first = checkerboard_first(scene, t, uv);
+        texture_adj_real(scene, t->child[1], uv, d, duv, sink, m & first);
+        texture_adj_real(scene, t->child[0], uv, d, duv, sink, m & ~first);
+    } else if (t->channels == 1) {
+        Spec one = spec_zero(); // the single channel is read once, so its adjoint counts once
+        one.c[0] = d;
+        texture_adj(scene, id, uv, one, duv, sink, m);
+    } else {
+        texture_adj(scene, id, uv, luminance_adj(d), duv, sink, m);
+    }
+}

@@ -1,0 +1,178 @@
+// update.c: derived data of shapes.
+#include "shape/update.h"
+
+#include <string.h>
+
+double rey_affine_determinant(const float m[16]) {
+    double a = m[0], b = m[1], c = m[2], d = m[4], e = m[5], f = m[6], g = m[8], h = m[9], i = m[10];
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+}
+
+bool rey_affine_inverse(const float m[16], double r[12]) {
+    double det = rey_affine_determinant(m);
+    if (!(fabs(det) > 1e-300)) {
+        return false;
+    }
+    double s = 1 / det;
+    double a = m[0], b = m[1], c = m[2], d = m[4], e = m[5], f = m[6], g = m[8], h = m[9], i = m[10];
+    double n[9] = {e * i - f * h, c * h - b * i, b * f - c * e, f * g - d * i, a * i - c * g,
+                   c * d - a * f, d * h - e * g, b * g - a * h, a * e - b * d};
+    for (int row = 0; row < 3; row++) {
+        for (int col = 0; col < 3; col++) {
+            r[row * 4 + col] = n[row * 3 + col] * s;
+        }
+        r[row * 4 + 3] = -(r[row * 4] * m[3] + r[row * 4 + 1] * m[7] + r[row * 4 + 2] * m[11]);
+    }
+    return true;
+}
+
+void rey_rectangle_mesh(float vertices[RECTANGLE_VERTICES][8], int32_t triangles[RECTANGLE_TRIANGLES][3]) {
+    for (int i = 0; i < 4; i++) {
+        float u = i == 1 || i == 2, v = i >= 2;
+        float vertex[8] = {2 * u - 1, 2 * v - 1, 0, 0, 0, 1, u, v};
+        memcpy(vertices[i], vertex, sizeof vertex);
+    }
+    int32_t t[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    memcpy(triangles, t, sizeof t);
+}
+
+void rey_cube_mesh(float vertices[CUBE_VERTICES][8], int32_t triangles[CUBE_TRIANGLES][3]) {
+    // Corners of a face counter-clockwise from outside, with uv (0,1), (1,1), (1,0), (0,0).
+    static const float uv[4][2] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    for (int face = 0; face < 6; face++) {
+        int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        float side = face % 2 ? 1.0f : -1.0f;
+        for (int k = 0; k < 4; k++) {
+            float *vertex = vertices[face * 4 + k];
+            float x = k == 1 || k == 2 ? 1.0f : -1.0f, y = k >= 2 ? 1.0f : -1.0f;
+            memset(vertex, 0, 8 * sizeof *vertex);
+            vertex[axis] = side;
+            vertex[u] = x * side;
+            vertex[v] = y;
+            vertex[3 + axis] = side;
+            vertex[6] = uv[k][0];
+            vertex[7] = uv[k][1];
+        }
+        for (int k = 0; k < 2; k++) {
+            int32_t *t = triangles[face * 2 + k];
+            t[0] = face * 4;
+            t[1] = face * 4 + k + 1;
+            t[2] = face * 4 + k + 2;
+        }
+    }
+}
+
+static void transform_point(const float *m, const float *p, float *out) {
+    for (int r = 0; r < 3; r++) {
+        out[r] = m[r * 4] * p[0] + m[r * 4 + 1] * p[1] + m[r * 4 + 2] * p[2] + m[r * 4 + 3];
+    }
+}
+
+// Rectangles and cubes: vertices in the world from to_world; a mirroring pose turns the winding over.
+static rey_result mesh_follow(rey_scene *scene, const ShapeRecord *shape) {
+    SceneView *view = &scene->view;
+    const float *m = view->theta + shape->to_world;
+    double inverse[12];
+    if (!rey_affine_inverse(m, inverse)) {
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "a shape's to_world cannot be inverted");
+    }
+    bool cube = shape->vertex_count == CUBE_VERTICES;
+    float vertices[CUBE_VERTICES][8];
+    int32_t triangles[CUBE_TRIANGLES][3];
+    if (cube) {
+        rey_cube_mesh(vertices, triangles);
+    } else {
+        rey_rectangle_mesh(vertices, triangles);
+    }
+    bool mirrored = rey_affine_determinant(m) < 0;
+    for (int32_t i = 0; i < shape->vertex_count; i++) {
+        transform_point(m, vertices[i], view->theta + shape->positions + 3 * i);
+    }
+    for (int32_t i = 0; i < shape->triangle_count; i++) {
+        int32_t *t = view->triangles + 3 * (shape->triangle + i);
+        t[0] = triangles[i][0];
+        t[1] = triangles[i][mirrored ? 2 : 1];
+        t[2] = triangles[i][mirrored ? 1 : 2];
+    }
+    return REY_OK;
+}
+
+// Sphere: centre, radius, rows of the inverse rotation.
+static rey_result sphere_follow(rey_scene *scene, ShapeRecord *shape) {
+    const float *m = scene->view.theta + shape->to_world;
+    float *t = scene->view.tables + shape->table;
+    double inverse[12];
+    if (!rey_affine_inverse(m, inverse)) {
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "a sphere's to_world cannot be inverted");
+    }
+    double radius = sqrt((double)m[0] * m[0] + (double)m[4] * m[4] + (double)m[8] * m[8]);
+    for (int k = 0; k < 3; k++) {
+        t[k] = m[4 * k + 3];
+        for (int c = 0; c < 3; c++) {
+            t[4 + 3 * k + c] = (float)(inverse[4 * k + c] * radius);
+        }
+    }
+    t[3] = (float)radius;
+    shape->area = (float)(4 * 3.14159265358979323846 * radius * radius);
+    return REY_OK;
+}
+
+static rey_result disk_follow(rey_scene *scene, ShapeRecord *shape) {
+    const float *m = scene->view.theta + shape->to_world;
+    float *t = scene->view.tables + shape->table;
+    double inverse[12];
+    if (!rey_affine_inverse(m, inverse)) {
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "a disk's to_world cannot be inverted");
+    }
+    for (int k = 0; k < 12; k++) {
+        t[k] = m[k];
+        t[12 + k] = (float)inverse[k];
+    }
+    double x[3] = {m[0], m[4], m[8]}, y[3] = {m[1], m[5], m[9]};
+    double n[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
+    shape->area = (float)(3.14159265358979323846 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]));
+    return REY_OK;
+}
+
+static double triangle_area(const SceneView *view, const ShapeRecord *shape, int32_t triangle) {
+    const int32_t *t = view->triangles + 3 * (shape->triangle + triangle);
+    const float *p = view->theta + shape->positions;
+    double a[3], b[3];
+    for (int k = 0; k < 3; k++) {
+        a[k] = (double)p[3 * t[1] + k] - p[3 * t[0] + k];
+        b[k] = (double)p[3 * t[2] + k] - p[3 * t[0] + k];
+    }
+    double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+static void mesh_areas(SceneView *view, ShapeRecord *shape) {
+    double total = 0;
+    for (int32_t i = 0; i < shape->triangle_count; i++) {
+        total += triangle_area(view, shape, i);
+    }
+    shape->area = (float)total;
+    double sum = 0;
+    for (int32_t i = 0; i < shape->triangle_count && shape->area_cdf >= 0; i++) {
+        sum += triangle_area(view, shape, i);
+        view->tables[shape->area_cdf + i] = total > 0 ? (float)(sum / total) : (float)(i + 1) / (float)shape->triangle_count;
+    }
+}
+
+rey_result rey_shape_update(rey_scene *scene, int32_t id) {
+    ShapeRecord *shape = scene->view.shapes + id;
+    rey_result result = REY_OK;
+    if (shape->kind == SHAPE_SPHERE) {
+        return sphere_follow(scene, shape);
+    }
+    if (shape->kind == SHAPE_DISK) {
+        return disk_follow(scene, shape);
+    }
+    if (shape->to_world >= 0) {
+        result = mesh_follow(scene, shape);
+    }
+    if (result == REY_OK) {
+        mesh_areas(&scene->view, shape);
+    }
+    return result;
+}
