@@ -1,0 +1,306 @@
+// exr.c: OpenEXR through the library's C core.
+#include "io/file.h"
+#include "io/image.h"
+
+#include <openexr.h>
+#include <string.h>
+
+enum { EXR_MOST_CHANNELS = 64 };
+
+// What the library's callbacks see.
+typedef struct Stream {
+    rey_context *ctx;
+    const char *name;
+    const unsigned char *in; // reading
+    size_t size;
+    Array out;               // writing
+    bool reported;
+} Stream;
+
+// The core prints to stderr unless it is given a handler. The first message is the one that explains the others.
+static void on_error(exr_const_context_t file, exr_result_t code, const char *message) {
+    void *user = NULL;
+    UNUSED(code);
+    if (file && exr_get_user_data(file, &user) == EXR_ERR_SUCCESS && user) {
+        Stream *s = user;
+        if (!s->reported) {
+            rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: %s", s->name, message);
+            s->reported = true;
+        }
+    }
+}
+
+static int64_t on_size(exr_const_context_t file, void *user) {
+    UNUSED(file);
+    return (int64_t)((Stream *)user)->size;
+}
+
+static int64_t on_read(exr_const_context_t file, void *user, void *buffer, uint64_t bytes, uint64_t offset,
+                       exr_stream_error_func_ptr_t error) {
+    const Stream *s = user;
+    UNUSED(file);
+    UNUSED(error);
+    if (offset > s->size) {
+        return -1;
+    }
+    uint64_t n = bytes < s->size - offset ? bytes : s->size - offset;
+    memcpy(buffer, s->in + offset, n);
+    return (int64_t)n;
+}
+
+static int64_t on_write(exr_const_context_t file, void *user, const void *buffer, uint64_t bytes, uint64_t offset,
+                        exr_stream_error_func_ptr_t error) {
+    Stream *s = user;
+    UNUSED(file);
+    UNUSED(error);
+    if (offset + bytes > s->out.count && !rey_array_push(s->ctx, &s->out, 1, offset + bytes - s->out.count)) {
+        return -1;
+    }
+    memcpy((char *)s->out.data + offset, buffer, bytes);
+    return (int64_t)bytes;
+}
+
+static rey_result failed(Stream *s, exr_result_t code) {
+    if (s->reported) {
+        return REY_ERROR_FORMAT;
+    }
+    return rey_fail(s->ctx, code == EXR_ERR_OUT_OF_MEMORY ? REY_ERROR_MEMORY : REY_ERROR_FORMAT, "%s: %s", s->name,
+                    exr_get_default_error_message(code));
+}
+
+// Which channels of the file become the picture's: R G B, or Y, or (layer.)R G B, or all.
+typedef struct ChannelChoice {
+    int count;
+    int at[EXR_MOST_CHANNELS]; // for each channel of the file, its place in the picture, -1 = dropped
+} ChannelChoice;
+
+static const char *base_name(const char *name) {
+    const char *dot = strrchr(name, '.');
+    return dot ? dot + 1 : name;
+}
+
+static ChannelChoice choose_channels(const exr_attr_chlist_t *list) {
+    static const char *const rgb[] = {"R", "G", "B"};
+    ChannelChoice choice = {0};
+    for (int layered = 0; layered < 2 && choice.count == 0; layered++) {
+        bool taken[4] = {false};
+        for (int i = 0; i < list->num_channels; i++) {
+            const char *name = list->entries[i].name.str;
+            const char *word = layered ? base_name(name) : name;
+            choice.at[i] = -1;
+            for (int c = 0; c < 3; c++) {
+                if (strcmp(word, rgb[c]) == 0 && !taken[c]) {
+                    choice.at[i] = c;
+                    taken[c] = true;
+                }
+            }
+            taken[3] |= strcmp(word, "Y") == 0;
+        }
+        if (taken[0] && taken[1] && taken[2]) {
+            choice.count = 3;
+        } else if (taken[3]) {
+            choice.count = 1;
+            bool first = true;
+            for (int i = 0; i < list->num_channels; i++) {
+                const char *name = list->entries[i].name.str;
+                bool grey = strcmp(layered ? base_name(name) : name, "Y") == 0;
+                choice.at[i] = grey && first ? 0 : -1;
+                first = first && !grey;
+            }
+        }
+    }
+    if (choice.count == 0) {
+        choice.count = list->num_channels;
+        for (int i = 0; i < list->num_channels; i++) {
+            choice.at[i] = i;
+        }
+    }
+    return choice;
+}
+
+// Decodes one chunk (scanlines or a tile) into the picture at pixel (x, y).
+static exr_result_t decode_chunk(exr_context_t file, const exr_chunk_info_t *chunk, exr_decode_pipeline_t *pipeline,
+                                 bool fresh, const ChannelChoice *choice, rey_image *image, int64_t x, int64_t y) {
+    exr_result_t code = fresh ? exr_decoding_initialize(file, 0, chunk, pipeline)
+                              : exr_decoding_update(file, 0, chunk, pipeline);
+    if (code != EXR_ERR_SUCCESS) {
+        return code;
+    }
+    for (int i = 0; i < pipeline->channel_count; i++) {
+        exr_coding_channel_info_t *c = &pipeline->channels[i];
+        c->decode_to_ptr = NULL;
+        if (choice->at[i] < 0) {
+            continue;
+        }
+        if (c->x_samples != 1 || c->y_samples != 1 || x < 0 || y < 0 || x + c->width > image->width ||
+            y + c->height > image->height) {
+            return EXR_ERR_FEATURE_NOT_IMPLEMENTED;
+        }
+        c->user_data_type = EXR_PIXEL_FLOAT;
+        c->user_bytes_per_element = 4;
+        c->user_pixel_stride = image->channels * 4;
+        c->user_line_stride = image->width * image->channels * 4;
+        c->decode_to_ptr = (uint8_t *)(image->data + (y * image->width + x) * image->channels + choice->at[i]);
+    }
+    code = fresh ? exr_decoding_choose_default_routines(file, 0, pipeline) : EXR_ERR_SUCCESS;
+    return code == EXR_ERR_SUCCESS ? exr_decoding_run(file, 0, pipeline) : code;
+}
+
+static exr_result_t read_scanlines(exr_context_t file, const exr_attr_box2i_t *window, const ChannelChoice *choice,
+                                   rey_image *image) {
+    exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
+    int32_t lines;
+    exr_result_t code = exr_get_scanlines_per_chunk(file, 0, &lines);
+    for (int64_t y = window->min.y; y <= window->max.y && code == EXR_ERR_SUCCESS; y += lines) {
+        exr_chunk_info_t chunk;
+        code = exr_read_scanline_chunk_info(file, 0, (int)y, &chunk);
+        if (code == EXR_ERR_SUCCESS) {
+            code = decode_chunk(file, &chunk, &pipeline, y == window->min.y, choice, image, 0, y - window->min.y);
+        }
+    }
+    exr_decoding_destroy(file, &pipeline);
+    return code;
+}
+
+static exr_result_t read_tiles(exr_context_t file, const ChannelChoice *choice, rey_image *image) {
+    exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
+    int32_t width, height;
+    exr_result_t code = exr_get_tile_sizes(file, 0, 0, 0, &width, &height);
+    bool fresh = true;
+    for (int64_t y = 0; y < image->height && code == EXR_ERR_SUCCESS; y += height) {
+        for (int64_t x = 0; x < image->width && code == EXR_ERR_SUCCESS; x += width) {
+            exr_chunk_info_t chunk;
+            code = exr_read_tile_chunk_info(file, 0, (int)(x / width), (int)(y / height), 0, 0, &chunk);
+            if (code == EXR_ERR_SUCCESS) {
+                code = decode_chunk(file, &chunk, &pipeline, fresh, choice, image, x, y);
+                fresh = false;
+            }
+        }
+    }
+    exr_decoding_destroy(file, &pipeline);
+    return code;
+}
+
+static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
+    const exr_attr_chlist_t *list;
+    exr_attr_box2i_t window;
+    exr_storage_t storage;
+    exr_result_t code = exr_get_channels(file, 0, &list);
+    code = code == EXR_ERR_SUCCESS ? exr_get_data_window(file, 0, &window) : code;
+    code = code == EXR_ERR_SUCCESS ? exr_get_storage(file, 0, &storage) : code;
+    if (code != EXR_ERR_SUCCESS) {
+        return failed(s, code);
+    }
+    if (list->num_channels < 1 || list->num_channels > EXR_MOST_CHANNELS ||
+        (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)) {
+        return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED, "%s: expected scanlines or tiles of 1 to %d channels", s->name,
+                        EXR_MOST_CHANNELS);
+    }
+    ChannelChoice choice = choose_channels(list);
+    int64_t width = (int64_t)window.max.x - window.min.x + 1, height = (int64_t)window.max.y - window.min.y + 1;
+    // Even the best compression does not shrink a picture a thousand-fold below a byte per 64 pixels.
+    if (width > 0 && height > 0 && width < IMAGE_LARGEST && height < IMAGE_LARGEST &&
+        (uint64_t)(width * height) / 16384 > s->size) {
+        return rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: claims %lld x %lld pixels in %zu bytes", s->name,
+                        (long long)width, (long long)height, s->size);
+    }
+    rey_result result = rey_image_new(s->ctx, s->name, width, height, choice.count, out);
+    if (result != REY_OK) {
+        return result;
+    }
+    code = storage == EXR_STORAGE_TILED ? read_tiles(file, &choice, out) : read_scanlines(file, &window, &choice, out);
+    return code == EXR_ERR_SUCCESS ? REY_OK : failed(s, code);
+}
+
+rey_result rey_exr_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
+    Stream stream = {.ctx = ctx, .name = name, .in = bytes, .size = size};
+    exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    exr_context_t file = NULL;
+    options.error_handler_fn = on_error;
+    options.user_data = &stream;
+    options.read_fn = on_read;
+    options.size_fn = on_size;
+    options.max_image_width = options.max_image_height = IMAGE_LARGEST;
+    exr_result_t code = exr_start_read(&file, name, &options);
+    rey_result result = code == EXR_ERR_SUCCESS ? read_part(&stream, file, out) : failed(&stream, code);
+    if (file) {
+        exr_finish(&file);
+    }
+    return result;
+}
+
+// ---- writing -----------------------------------------------------------------------------------------------------
+
+// The core wants channels sorted by name.
+static void sort_channels(int channels, const char *const *names, int order[EXR_MOST_CHANNELS]) {
+    for (int i = 0; i < channels; i++) {
+        int j = i;
+        for (; j > 0 && strcmp(names[order[j - 1]], names[i]) > 0; j--) {
+            order[j] = order[j - 1];
+        }
+        order[j] = i;
+    }
+}
+
+static exr_result_t write_chunks(exr_context_t file, const float *data, int width, int height, int channels,
+                                 const int *order) {
+    exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    int32_t lines;
+    exr_result_t code = exr_get_scanlines_per_chunk(file, 0, &lines);
+    for (int y = 0; y < height && code == EXR_ERR_SUCCESS; y += lines) {
+        exr_chunk_info_t chunk;
+        code = exr_write_scanline_chunk_info(file, 0, y, &chunk);
+        if (code == EXR_ERR_SUCCESS) {
+            code = y == 0 ? exr_encoding_initialize(file, 0, &chunk, &pipeline)
+                          : exr_encoding_update(file, 0, &chunk, &pipeline);
+        }
+        for (int c = 0; c < channels && code == EXR_ERR_SUCCESS; c++) {
+            exr_coding_channel_info_t *info = &pipeline.channels[c];
+            info->user_data_type = EXR_PIXEL_FLOAT;
+            info->user_bytes_per_element = 4;
+            info->user_pixel_stride = channels * 4;
+            info->user_line_stride = width * channels * 4;
+            info->encode_from_ptr = (const uint8_t *)(data + (int64_t)y * width * channels + order[c]);
+        }
+        if (code == EXR_ERR_SUCCESS && y == 0) {
+            code = exr_encoding_choose_default_routines(file, 0, &pipeline);
+        }
+        code = code == EXR_ERR_SUCCESS ? exr_encoding_run(file, 0, &pipeline) : code;
+    }
+    exr_encoding_destroy(file, &pipeline);
+    return code;
+}
+
+rey_result rey_exr_write(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
+                         const char *const *names) {
+    static const char *const rgb[] = {"R", "G", "B"}, *const grey[] = {"Y"};
+    int order[EXR_MOST_CHANNELS], part;
+    Stream stream = {.ctx = ctx, .name = path};
+    exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    exr_context_t file = NULL;
+    if (!names) {
+        names = channels == 1 ? grey : rgb;
+    }
+    options.error_handler_fn = on_error;
+    options.user_data = &stream;
+    options.write_fn = on_write;
+    sort_channels(channels, names, order);
+    exr_result_t code = exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, &options);
+    code = code == EXR_ERR_SUCCESS ? exr_add_part(file, "image", EXR_STORAGE_SCANLINE, &part) : code;
+    if (code == EXR_ERR_SUCCESS) {
+        code = exr_initialize_required_attr_simple(file, 0, width, height, EXR_COMPRESSION_ZIP);
+    }
+    for (int c = 0; c < channels && code == EXR_ERR_SUCCESS; c++) {
+        code = exr_add_channel(file, 0, names[order[c]], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
+    }
+    code = code == EXR_ERR_SUCCESS ? exr_write_header(file) : code;
+    code = code == EXR_ERR_SUCCESS ? write_chunks(file, data, width, height, channels, order) : code;
+    if (file) {
+        exr_result_t end = exr_finish(&file);
+        code = code == EXR_ERR_SUCCESS ? end : code;
+    }
+    rey_result result = code == EXR_ERR_SUCCESS ? rey_file_write(ctx, path, stream.out.data, stream.out.count)
+                                                : failed(&stream, code);
+    rey_array_free(ctx, &stream.out);
+    return result;
+}

@@ -1,0 +1,55 @@
+// image.h: pictures in memory, and their readers and writers. Values are interleaved, rows from the top.
+#pragma once
+
+#include "base/context.h"
+
+enum { IMAGE_LARGEST = 65536 }; // pixels along one edge
+
+typedef struct rey_image {
+    int width, height, channels; // channels: 1 or 3 (alpha is dropped); EXR files without colours: as many as they have
+    float *data;                 // width x height x channels
+    bool srgb;                   // integers of an sRGB-encoded file, scaled to [0, 1] and not decoded yet
+} rey_image;
+
+// Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, PFM, NPY (f4 or f8, 2 or 3
+// dimensions). The caller frees *out with rey_image_free, also after a failure.
+rey_result rey_image_read(rey_context *ctx, const char *path, rey_image *out);
+rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
+                                 rey_image *out);
+void rey_image_free(rey_context *ctx, rey_image *image);
+
+// Room for a picture; checks its size against IMAGE_LARGEST.
+rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int64_t height, int channels, rey_image *out);
+// Three channels: grey is repeated, channels behind the third are dropped.
+rey_result rey_image_to_rgb(rey_context *ctx, rey_image *image);
+
+float rey_srgb_decode(float encoded); // the exact piecewise curve
+float rey_srgb_encode(float linear);
+void rey_image_decode_srgb(rey_image *image); // decodes and clears `srgb`
+
+// The formats, from memory; `name` is for messages.
+rey_result rey_exr_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
+                              rey_image *out);
+
+// ---- writers: a file appears complete or not at all ------------------------------------------------------------------
+
+// float32, ZIP. names: one per channel, null = R G B (or Y for one).
+rey_result rey_exr_write(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
+                         const char *const *names);
+// 8 bits, sRGB-encoded from linear RGB.
+rey_result rey_png_write(rey_context *ctx, const char *path, const float *rgb, int width, int height);
+// Mean over channels in blue (negative), white (0), red; *scale is the value of full colour: the 99.5th percentile of
+// |value|, or the largest when that is 0.
+rey_result rey_png_write_signed(rey_context *ctx, const char *path, const float *rgb, int width, int height,
+                                float *scale);
+// PNG in memory of 8-bit RGB; the caller frees *bytes with rey_free.
+rey_result rey_png_encode(rey_context *ctx, const unsigned char *rgb8, int width, int height, unsigned char **bytes,
+                          size_t *size);
+// Linear RGB to 8-bit sRGB; out: width x height x 3.
+void rey_image_to_srgb8(const float *rgb, int64_t pixels, unsigned char *out);
+// float32 array in C order.
+rey_result rey_npy_write(rey_context *ctx, const char *path, const float *data, const int64_t *shape, int dims);
