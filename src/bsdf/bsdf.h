@@ -2,9 +2,15 @@
 #pragma once
 
 #include "bsdf/call.h"
+#include "bsdf/conductor.h"
+#include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
 #include "bsdf/mask.h"
 #include "bsdf/null.h"
+#include "bsdf/plastic.h"
+#include "bsdf/roughconductor.h"
+#include "bsdf/roughdielectric.h"
+#include "bsdf/roughplastic.h"
 #include "bsdf/twosided.h"
 
 enum {
@@ -21,6 +27,7 @@ enum {
 #define FETCH_SPEC texture_eval
 #define FETCH_REAL texture_eval_real
 #define FETCH_IOR texture_eval_real
+#define FETCH_SMOOTH_IOR texture_eval_real
 #define FETCH_METAL_ETA texture_eval
 #define FETCH_METAL_K texture_eval
 #define FETCH_ALPHA_U texture_eval_real
@@ -28,6 +35,7 @@ enum {
 #define SCATTER_SPEC texture_adj
 #define SCATTER_REAL texture_adj_real
 #define SCATTER_IOR texture_adj_real
+#define SCATTER_SMOOTH_IOR texture_adj_real
 #define SCATTER_METAL_ETA texture_adj
 #define SCATTER_METAL_K texture_adj
 #define SCATTER_ALPHA_U texture_adj_real

@@ -17,6 +17,7 @@ typedef struct BsdfSample {
 #define FIELD_SPEC Spec
 #define FIELD_REAL Float
 #define FIELD_IOR Float
+#define FIELD_SMOOTH_IOR Float
 #define FIELD_METAL_ETA Spec
 #define FIELD_METAL_K Spec
 #define FIELD_ALPHA_U Float

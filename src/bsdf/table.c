@@ -2,6 +2,7 @@
 #include "bsdf/table.h"
 
 #include "bsdf/bsdf.h"
+#include "math/rough_transmittance.h"
 
 #include <string.h>
 
@@ -42,12 +43,27 @@ int rey_bsdf_kind_find(const char *name) {
 }
 
 int32_t rey_bsdf_table_size(int kind) {
-    UNUSED(kind);
-    return 0;
+    return kind == BSDF_ROUGHPLASTIC ? COAT_TABLE_SIZE : 0;
+}
+
+// The coat's transmittance, tabulated for the current roughness and index.
+static void roughplastic_update(rey_scene *scene, const BsdfNode *node) {
+    const SceneView *view = &scene->view;
+    double eta = (double)view->theta[view->textures[node->slot[0]].theta];
+    double alpha = (double)view->theta[view->textures[node->slot[3]].theta];
+    double internal, by_alpha, by_eta;
+    float *table = view->tables + node->table;
+    rey_rough_transmittance(node->config[0] == 1, fmax(alpha, (double)MICROFACET_ALPHA_MIN), eta, table,
+                            table + COAT_BY_ALPHA, table + COAT_BY_ETA, &internal, &by_alpha, &by_eta);
+    table[COAT_INTERNAL] = (float)internal;
+    table[COAT_INTERNAL + 1] = (float)by_alpha;
+    table[COAT_INTERNAL + 2] = (float)by_eta;
 }
 
 rey_result rey_bsdf_update(rey_scene *scene, int32_t bsdf) {
-    UNUSED(scene);
-    UNUSED(bsdf);
+    const BsdfNode *node = scene->view.bsdfs + bsdf;
+    if (node->kind == BSDF_ROUGHPLASTIC) {
+        roughplastic_update(scene, node);
+    }
     return REY_OK;
 }

@@ -74,6 +74,7 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
         build_join(name, path, p->name);
         switch (p->type) {
         case PARAM_IOR:
+        case PARAM_SMOOTH_IOR:
             TRY(ior_slot(b, node, p, name, &bsdf->slot[i]));
             break;
         case PARAM_METAL_ETA:

@@ -2,7 +2,7 @@
 //
 // A kind's header lists its parameters once, as a macro of rows P(type, field, default, low, high, description):
 //   SPEC   colour-valued texture          REAL   number-valued texture
-//   BOUND  colour or number in [0, 1]     (low and high say the range of every type)
+//   and the special forms of ParamType; low and high say the allowed range
 // and its uniform switches as rows C(type, field, default, choices, description). From the rows come the record below,
 // fetch and scatter, XML attributes with defaults and ranges, parameter names, documentation and all tests.
 #pragma once
@@ -13,6 +13,7 @@ typedef enum ParamType {
     PARAM_SPEC,      // colour texture
     PARAM_REAL,      // number texture
     PARAM_IOR,       // number: int_ior / ext_ior, or the ratio
+    PARAM_SMOOTH_IOR, // the same; it turns directions of delta lobes, so its derivative needs the specular term
     PARAM_METAL_ETA, // colour: eta, or from `material`
     PARAM_METAL_K,   // colour: k, or from `material`
     PARAM_ALPHA_U,   // number: alpha or alpha_u

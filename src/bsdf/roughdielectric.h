@@ -1,0 +1,132 @@
+// roughdielectric.h: rough glass [walter2007 eq. 20 and 21], from both sides. m is the (generalised) half vector turned
+// to the upper side, a = wi.m, b = wo.m, and e the index of the other side over that of wi's side:
+// reflection F D G / (4 |cos_i|), refraction (1 - F) D G |a b| / (|cos_i| (a + e b)^2), radiance compression included.
+#pragma once
+
+#include "bsdf/roughconductor.h"
+
+#define ROUGHDIELECTRIC_PARAMS(P)                                                                                      \
+    P(IOR, eta, 1.5046f, 1e-3f, INFINITY, "relative index of refraction, interior over exterior", "bk7")               \
+    P(SPEC, specular_reflectance, 1, 0, 1, "factor on the reflection", "")                                             \
+    P(SPEC, specular_transmittance, 1, 0, 1, "factor on the refraction", "")                                           \
+    P(ALPHA_U, alpha_u, 0.1f, 0, 1, "roughness along the tangent", "")                                                 \
+    P(ALPHA_V, alpha_v, 0.1f, 0, 1, "roughness across the tangent", "")
+KIND_RECORD(RoughDielectric, ROUGHDIELECTRIC_PARAMS, MICROFACET_CONFIG)
+
+// What eval, pdf and the adjoint share.
+typedef struct RoughDielectricTerms {
+    Mask counts, reflects;
+    Vec3 h, m;   // unnormalised and final half vector
+    Float turn;  // the sign that turned m up
+    Float e;     // index ratio along the path
+    Float a, b, q, fresnel;
+} RoughDielectricTerms;
+
+KFN RoughDielectricTerms roughdielectric_terms(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe) {
+    RoughDielectricTerms t;
+    t.reflects = m_gt(wi.z * wo.z, f_set(0));
+    t.e = f_select(m_gt(wi.z, f_set(0)), p->eta, 1.0f / p->eta);
+    t.h = v3_madd(wi, f_select(t.reflects, f_set(1), t.e), wo);
+    Vec3 m = v3_normalize(t.h);
+    t.turn = f_sign(m.z);
+    t.m = v3_scale(m, t.turn);
+    t.a = v3_dot(wi, t.m);
+    t.b = v3_dot(wo, t.m);
+    t.q = t.a + t.e * t.b;
+    Float cos_t, eta_it, eta_ti;
+    t.fresnel = fresnel_dielectric(t.a, p->eta, &cos_t, &eta_it, &eta_ti);
+    t.counts = m_ne(wi.z * wo.z, f_set(0)) & mi_eq(lobe, i_set(LOBE_SMOOTH));
+    return t;
+}
+
+// |a b| / (|cos_i| q^2): from normals to refracted directions.
+KFN Float roughdielectric_refraction(const RoughDielectricTerms *t, Vec3 wi) {
+    return f_abs(t->a * t->b) * f_safe_rcp(f_abs(wi.z) * t->q * t->q);
+}
+
+KFN Microfacet roughdielectric_facets(const RoughDielectric *p) {
+    return microfacet_make(p->distribution, p->sample_visible, p->alpha_u, p->alpha_v);
+}
+
+KFN Spec roughdielectric_eval(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe) {
+    Microfacet mf = roughdielectric_facets(p);
+    RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, lobe);
+    Float dg = f_zero_unless(t.counts, microfacet_D(&mf, t.m) * smith_G(&mf, wi, wo, t.m));
+    Float r = t.fresnel * dg * f_safe_rcp(4.0f * f_abs(wi.z));
+    Float s = (1.0f - t.fresnel) * dg * roughdielectric_refraction(&t, wi);
+    return spec_select(t.reflects, spec_scale(p->specular_reflectance, r), spec_scale(p->specular_transmittance, s));
+}
+
+// Probability of reflection for facets that reflect F; 1 in total internal reflection.
+KFN Float roughdielectric_probability(const RoughDielectric *p, Float fresnel) {
+    Float q = f_clamp(fresnel, f_set(p->floor), f_set(1 - p->floor));
+    return f_select(m_lt(fresnel, f_set(1)), q, f_set(1));
+}
+
+KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe) {
+    Microfacet mf = roughdielectric_facets(p);
+    RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, lobe);
+    Vec3 up = v3_scale(wi, f_sign(wi.z)); // facets are sampled for the side of wi
+    Float choice = roughdielectric_probability(p, t.fresnel);
+    Float reflected = choice * f_safe_rcp(4.0f * f_abs(t.b));
+    Float refracted = (1.0f - choice) * f_abs(t.b) * t.e * t.e * f_safe_rcp(t.q * t.q);
+    // Facets seen from their back cannot have been sampled.
+    Mask visible = m_gt(t.a * wi.z, f_set(0)) & m_gt(t.b * wo.z, f_set(0));
+    return f_zero_unless(t.counts & visible,
+                         microfacet_pdf(&mf, up, t.m) * f_select(t.reflects, reflected, refracted));
+}
+
+KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u1, Vec2 u2) {
+    Microfacet mf = roughdielectric_facets(p);
+    Vec3 m = microfacet_sample(&mf, v3_scale(wi, f_sign(wi.z)), u2.x, u2.y);
+    Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), p->eta, &cos_t, &eta_it, &eta_ti);
+    Mask reflects = m_lt(u1, roughdielectric_probability(p, f));
+    Vec3 wo = v3_select(reflects, reflect(wi, m), refract(wi, m, cos_t, eta_ti));
+    // A reflected direction below the surface, or a refracted one above it, has no density there.
+    Mask right_side = reflects ^ m_le(wi.z * wo.z, f_set(0));
+    wo = v3_select(right_side, wo, v3(wo.x, wo.y, f_set(0)));
+    return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(reflects, f_set(1), eta_it)};
+}
+
+KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, RoughDielectric *dp,
+                             Vec3 *dwi, Vec3 *dwo) {
+    Microfacet mf = roughdielectric_facets(p);
+    RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, lobe);
+    Float d = microfacet_D(&mf, t.m), gi = smith_G1(&mf, wi, t.m), go = smith_G1(&mf, wo, t.m);
+    Float rcp_ci = f_safe_rcp(wi.z);
+    Float jacobian = f_select(t.reflects, 0.25f * f_abs(rcp_ci), roughdielectric_refraction(&t, wi));
+    Float k = d * gi * go * jacobian, share = f_select(t.reflects, t.fresnel, 1.0f - t.fresnel);
+    df = spec_zero_unless(t.counts, df);
+    // f = colour share K, K = D Gi Go jacobian
+    Spec dr = spec_zero_unless(t.reflects, df), ds = spec_zero_unless(~t.reflects, df);
+    spec_acc(&dp->specular_reflectance, spec_scale(dr, share * k));
+    spec_acc(&dp->specular_transmittance, spec_scale(ds, share * k));
+    Float dvalue = spec_dot(dr, p->specular_reflectance) + spec_dot(ds, p->specular_transmittance);
+    Float dfresnel = f_select(t.reflects, dvalue * k, -dvalue * k), dk = dvalue * share;
+    Float du = f_set(0), dv = f_set(0), da = f_set(0), db = f_set(0), de = f_set(0);
+    Vec3 dm = v3_zero(), dh = v3_zero();
+    microfacet_D_adj(&mf, t.m, dk * gi * go * jacobian, &du, &dv, &dm);
+    smith_G1_adj(&mf, wi, t.m, dk * d * go * jacobian, &du, &dv, dwi);
+    smith_G1_adj(&mf, wo, t.m, dk * d * gi * jacobian, &du, &dv, dwo);
+    microfacet_alpha_adj(p->alpha_u, du, &dp->alpha_u);
+    microfacet_alpha_adj(p->alpha_v, dv, &dp->alpha_v);
+    // jacobian = 1 / (4 |wi.z|), or |a b| / (|wi.z| q^2) with q = a + e b
+    Float g = f_zero_unless(t.counts, dk * k);
+    dwi->z = dwi->z - g * rcp_ci;
+    Float gt = f_zero_unless(~t.reflects, g), rcp_q = f_safe_rcp(t.q);
+    da = gt * (f_safe_rcp(t.a) - 2.0f * rcp_q);
+    db = gt * (f_safe_rcp(t.b) - 2.0f * t.e * rcp_q);
+    de = -2.0f * gt * t.b * rcp_q;
+    fresnel_dielectric_adj(t.a, p->eta, f_zero_unless(t.counts, dfresnel), f_set(0), &da, &dp->eta);
+    // a = wi . m, b = wo . m
+    v3_acc(dwi, v3_scale(t.m, da));
+    v3_acc(dwo, v3_scale(t.m, db));
+    v3_acc(&dm, v3_madd(v3_scale(wi, da), db, wo));
+    // m = turn normalize(h), h = wi + wo or wi + e wo
+    v3_normalize_adj(t.h, v3_scale(dm, t.turn), &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, v3_scale(dh, f_select(t.reflects, f_set(1), t.e)));
+    de = de + f_zero_unless(~t.reflects, v3_dot(dh, wo));
+    // e = eta, or 1 / eta from inside
+    dp->eta = dp->eta + f_zero_unless(t.counts, f_select(m_gt(wi.z, f_set(0)), de, -de * t.e * t.e));
+}
