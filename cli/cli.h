@@ -62,8 +62,8 @@ typedef struct Options {
     int set_count;
 } Options;
 
-// Parses a subcommand's arguments. Returns true when the command should run; otherwise *status is what it should return:
-// 0 after --help, 2 after a usage error, which has been printed.
+// Parses a subcommand's arguments. Returns true when the command should run; otherwise *status is what it should
+// return: 0 after --help, 2 after a usage error, which has been printed.
 bool cli_options_parse(Command command, int argc, char **argv, Options *options, int *status);
 void cli_options_free(Options *options);
 void cli_options_help(Command command); // the list of the options that a subcommand takes
@@ -151,6 +151,9 @@ int cli_direction_terms(const rey_scene *scene, const Direction *direction); // 
 typedef enum ImageFormat { IMAGE_EXR, IMAGE_PNG, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
 ImageFormat cli_image_format(const char *path); // "-" is EXR on standard output
 
+// Reads an RGB image of any format that the library knows; *rgb is freed with rey_free. Words in the context on
+// failure.
+rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb);
 // EXIT_OK when an image can go to path: known ending and a folder that exists. Reports otherwise.
 int cli_check_output(const Options *options, const char *path);
 // Writes height x width x 3 floats by the ending of path. signed_values: PNG becomes blue-white-red over

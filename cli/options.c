@@ -3,8 +3,6 @@
 
 #include "base/context.h"
 
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,7 +59,8 @@ static const OptionRow option_rows[] = {
     {OPTION_SENSOR, 0, "sensor", "K", RENDERS, "which sensor, from 0"},
     {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default: the scene's)"},
     {OPTION_DEFINE, 'D', NULL, "key=value", RENDERS | READS, "value of $key in the scene; may be repeated"},
-    {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR, "worker threads (default: all that are allowed)"},
+    {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR,
+     "worker threads (default: all that are allowed)"},
     {OPTION_LANES, 0, "lanes", "1|8|16", RENDERS | FITS | READS | DOCTOR, "SIMD width (default: the widest)"},
     {OPTION_JSON, 0, "json", NULL, EVERY, "print one JSON object on standard output"},
     {OPTION_HELP, 'h', "help", NULL, EVERY, "print this text"},
@@ -92,44 +91,6 @@ void cli_options_help(Command command) {
                      row->argument ? " " : "", row->argument ? row->argument : "");
             printf("  %-32s %s\n", text, row->help);
         }
-    }
-}
-
-bool cli_parse_integer(const char *text, int64_t low, int64_t high, int64_t *out) {
-    char *end;
-    errno = 0;
-    long long value = strtoll(text, &end, 10);
-    if (end == text || *end || errno || value < low || value > high) {
-        return false;
-    }
-    *out = value;
-    return true;
-}
-
-bool cli_parse_number(const char *text, double *out) {
-    char *end;
-    double value = strtod(text, &end);
-    if (end == text || *end || !isfinite(value)) {
-        return false;
-    }
-    *out = value;
-    return true;
-}
-
-int cli_parse_list(const char *text, int max, double *out) {
-    int count = 0;
-    const char *s = text;
-    for (;;) {
-        char *end;
-        double value = strtod(s, &end);
-        if (end == s || !isfinite(value) || count == max || (*end && *end != ',')) {
-            return -1;
-        }
-        out[count++] = value;
-        if (!*end) {
-            return count;
-        }
-        s = end + 1;
     }
 }
 
@@ -183,7 +144,8 @@ static bool parse_define(Options *o, const char *text) {
 }
 
 // Sets *target to the index of value among the null-terminated choices.
-static bool parse_choice(const Options *o, const char *option, const char *value, const char *const *choices, int *target) {
+static bool parse_choice(const Options *o, const char *option, const char *value, const char *const *choices,
+                         int *target) {
     for (int i = 0; choices[i]; i++) {
         if (!strcmp(value, choices[i])) {
             *target = i;
@@ -199,7 +161,8 @@ static bool parse_choice(const Options *o, const char *option, const char *value
     return false;
 }
 
-static bool parse_count(const Options *o, const char *option, const char *value, int64_t low, int64_t high, int *target) {
+static bool parse_count(const Options *o, const char *option, const char *value, int64_t low, int64_t high,
+                        int *target) {
     int64_t number;
     if (!cli_parse_integer(value, low, high, &number)) {
         cli_usage_error(o->command, "%s: expected a whole number from %lld to %lld, got '%s'", option, (long long)low,
@@ -393,7 +356,8 @@ static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
 }
 
 static bool check_required(const Options *o) {
-    static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE", "JOB.yaml", "SCENE", "SCENE", "A and B", ""};
+    static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE",   "JOB.yaml",
+                                                       "SCENE", "SCENE", "A and B", ""};
     static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 0};
     Command c = o->command;
     if (o->file_count < needed[c]) {

@@ -4,10 +4,12 @@
 #include "base/context.h"
 #include "base/parallel.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
@@ -106,6 +108,21 @@ int cli_finish_output(void) {
     if (fflush(stdout) || ferror(stdout)) {
         cli_note("standard output could not be written");
         return EXIT_FAILED;
+    }
+    return EXIT_OK;
+}
+
+int cli_check_output(const Options *options, const char *path) {
+    if (cli_image_format(path) == IMAGE_UNKNOWN) {
+        return cli_usage_error(options->command, "-o: '%s' ends in none of .exr, .png, .npy", path);
+    }
+    char folder[4096] = ".";
+    const char *slash = strrchr(path, '/');
+    if (slash) {
+        snprintf(folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
+    }
+    if (strcmp(path, "-") && access(folder, W_OK)) {
+        return cli_fail(options, "cannot write into %s: %s", folder, strerror(errno));
     }
     return EXIT_OK;
 }
