@@ -218,17 +218,23 @@ static rey_result work_prepare(Work *w, int64_t largest) {
     return good ? REY_OK : REY_ERROR_MEMORY;
 }
 
+static int build_directions(Work *w, Check *checks, int count) {
+    for (int i = 0; i < count; i++) {
+        checks[i].spec = w->session.options->params[i];
+        int status = cli_session_direction(&w->session, &checks[i].spec, 1, &checks[i].direction);
+        if (status) {
+            return status;
+        }
+    }
+    return EXIT_OK;
+}
+
 static rey_result check_all(Work *w, Check *checks, int count) {
     Session *s = &w->session;
     int64_t largest = 0;
-    rey_result result = REY_OK;
-    for (int i = 0; i < count && !result; i++) {
-        checks[i].spec = s->options->params[i];
-        result = cli_direction_build(s->ctx, s->scene, &checks[i].spec, 1, &checks[i].direction);
-        if (!result) {
-            int64_t size = checks[i].direction.offsets[checks[i].direction.count];
-            largest = size > largest ? size : largest;
-        }
+    for (int i = 0; i < count; i++) {
+        int64_t size = checks[i].direction.offsets[checks[i].direction.count];
+        largest = size > largest ? size : largest;
     }
     rey_scene_info info;
     rey_scene_get_info(s->scene, &info);
@@ -236,7 +242,7 @@ static rey_result check_all(Work *w, Check *checks, int count) {
     s->def.spp = spp > CHECK_SETS ? spp / CHECK_SETS : 1;
     s->def.sets = 1;
     s->progress.parts = (double)count * CHECK_SETS * (1 + POINTS);
-    result = result ? result : work_prepare(w, largest);
+    rey_result result = work_prepare(w, largest);
     for (int i = 0; i < count && !result; i++) {
         result = check_direction(w, &checks[i]);
     }
@@ -316,11 +322,11 @@ static void print_json(const Work *w, const Check *checks, int count, double thr
 static int run_checks(const Options *options, Work *w) {
     int count = options->param_count;
     Check *checks = rey_alloc_array(w->session.ctx, (size_t)count, sizeof *checks);
-    int status = EXIT_OK;
-    rey_result result = checks ? check_all(w, checks, count) : REY_ERROR_MEMORY;
+    int status = checks ? build_directions(w, checks, count) : EXIT_OK;
+    rey_result result = !checks ? REY_ERROR_MEMORY : status ? REY_OK : check_all(w, checks, count);
     if (result) {
         status = cli_report_failure(options, w->session.ctx, result);
-    } else {
+    } else if (!status) {
         double threshold;
         bool passed = judge(checks, count, &threshold);
         if (options->json) {

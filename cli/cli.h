@@ -142,6 +142,8 @@ typedef struct Direction {
 // Builds the sum of the directions of specs, each `NAME[:OP]`. On REY_ERROR_ARGUMENT the text itself is malformed.
 rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
                                Direction *direction);
+// The same for a session, with failures reported: returns the exit status.
+int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction);
 void cli_direction_free(rey_context *ctx, Direction *direction);
 rey_selection cli_direction_selection(const Direction *direction);
 int cli_direction_terms(const rey_scene *scene, const Direction *direction); // terms that it needs

@@ -138,6 +138,9 @@ static rey_result write_gradient(Grad *g, const double *gradient) {
             values[i] = (float)gradient[g->direction.offsets[k] + i];
         }
         snprintf(path, sizeof path, "%s/%s.npy", folder, info.name);
+        for (char *c = path + strlen(folder) + 1; *c; c++) {
+            *c = *c == '/' ? '_' : *c; // names are not paths
+        }
         result = rey_npy_write(ctx, path, values, info.shape, info.dims);
         rey_free(ctx, values);
         if (result) {
@@ -180,17 +183,12 @@ static rey_result reverse(Grad *g) {
     return result;
 }
 
-static rey_result grad(Grad *g) {
+static rey_result differentiate(Grad *g) {
     Session *s = &g->session;
-    const Options *o = s->options;
     s->def.sets = SETS;
-    rey_result result = cli_direction_build(s->ctx, s->scene, o->params, o->param_count, &g->direction);
-    if (!result) {
-        g->needed = cli_direction_terms(s->scene, &g->direction);
-        g->used = o->terms ? o->terms : g->needed;
-        result = o->reverse ? reverse(g) : forward(g);
-    }
-    return result;
+    g->needed = cli_direction_terms(s->scene, &g->direction);
+    g->used = s->options->terms ? s->options->terms : g->needed;
+    return s->options->reverse ? reverse(g) : forward(g);
 }
 
 static void print_result(const Grad *g) {
@@ -223,10 +221,11 @@ int cli_grad(int argc, char **argv) {
         status = cli_session_open(&options, "grad", &g.session);
     }
     if (!status) {
-        rey_result result = grad(&g);
+        status = cli_session_direction(&g.session, options.params, options.param_count, &g.direction);
+        rey_result result = status ? REY_OK : differentiate(&g);
         if (result) {
             status = cli_report_failure(&options, g.session.ctx, result);
-        } else {
+        } else if (!status) {
             print_result(&g);
             status = cli_finish_output();
         }

@@ -179,6 +179,15 @@ void cli_session_close(Session *session) {
     session->ctx = NULL;
 }
 
+int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction) {
+    rey_result result = cli_direction_build(session->ctx, session->scene, specs, spec_count, direction);
+    if (result == REY_ERROR_ARGUMENT) { // the text, not the scene, is wrong
+        cli_report_failure(session->options, session->ctx, result);
+        return EXIT_USAGE;
+    }
+    return result ? cli_report_failure(session->options, session->ctx, result) : EXIT_OK;
+}
+
 void cli_add_stats(rey_stats *sum, const rey_stats *part) {
     sum->seconds += part->seconds;
     sum->trace_seconds += part->trace_seconds;
