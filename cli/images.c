@@ -26,11 +26,23 @@ ImageFormat cli_image_format(const char *path) {
 }
 
 rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb) {
-    FakeImage image;
+    rey_image image = {0};
     rey_result result = rey_image_read(ctx, path, &image);
-    *width = image.width;
-    *height = image.height;
-    *rgb = image.rgb;
+    result = result ? result : rey_image_to_rgb(ctx, &image);
+    if (!result) {
+        if (image.srgb) {
+            rey_image_decode_srgb(&image);
+        }
+        size_t count = (size_t)image.width * (size_t)image.height * 3;
+        *width = image.width;
+        *height = image.height;
+        *rgb = rey_alloc_array(ctx, count, sizeof **rgb);
+        result = *rgb ? REY_OK : REY_ERROR_MEMORY;
+        if (!result) {
+            memcpy(*rgb, image.data, count * sizeof **rgb);
+        }
+    }
+    rey_image_free(ctx, &image);
     return result;
 }
 

@@ -37,8 +37,6 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
                        "compare gradients with correlated finite differences",
                        "\nEach P is checked by itself, in blocks of the image. Exits with 1 when a gradient is "
                        "wrong.\n" DIRECTION_NOTES},
-    [COMMAND_FIT] = {"fit", cli_fit, "JOB.yaml [--set key=value]... [--resume] [-o DIR] [options]",
-                     "recover parameters from images", ""},
     [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},
     [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
     [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
@@ -65,7 +63,9 @@ static void print_help(FILE *file) {
         "Reynolds %s: physically based rendering, its derivatives, and scenes recovered from images.\n\nCommands:\n",
         rey_version());
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        fprintf(file, "  %-10s %s\n", command_rows[i].name, command_rows[i].summary);
+        if (command_rows[i].run) {
+            fprintf(file, "  %-10s %s\n", command_rows[i].name, command_rows[i].summary);
+        }
     }
     fprintf(file,
             "\nOptions:\n  -h, --help     print this text; 'reynolds COMMAND --help' tells more\n"
@@ -76,6 +76,9 @@ static void print_help(FILE *file) {
 
 static const char *command_name_at(void *user, int i) {
     (void)user;
+    while (i < COMMAND_COUNT && !command_rows[i].run) {
+        i++;
+    }
     return i < COMMAND_COUNT ? command_rows[i].name : NULL;
 }
 
@@ -99,7 +102,7 @@ int main(int argc, char **argv) {
     }
     const char *word = argv[1];
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (!strcmp(word, command_rows[i].name)) {
+        if (command_rows[i].run && !strcmp(word, command_rows[i].name)) {
             cli_catch_interrupts();
             return command_rows[i].run(argc - 1, argv + 1);
         }
