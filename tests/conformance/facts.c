@@ -387,12 +387,13 @@ void run_facts(Suite *suite) {
         {"facts/film filters", run_filters},   {"facts/textures bitmap", run_bitmaps},
         {"facts/emitters envmap", run_envmap},
     };
-    for (int i = 0; i < COUNT_OF(tables); i++) {
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s/facts", suite->folder);
+    for (int i = 0; i < COUNT_OF(tables) && !access(folder, R_OK); i++) {
         if (suite_selects(suite, tables[i].name)) {
             tables[i].run(suite, tables[i].name);
         }
     }
-    char folder[4096];
     snprintf(folder, sizeof folder, "%s/data/scenes", suite->folder);
     load_folder(suite, folder, "", true);
 }
