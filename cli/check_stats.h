@@ -1,0 +1,33 @@
+// check_stats.h: z-scores of a derivative against a finite difference, per image block and channel.
+#pragma once
+
+#include <stdbool.h>
+
+enum { CHECK_SETS = 16, CHECK_SERIES = 4 }; // series: R, G, B and their mean
+
+// The picture cut into about 8 x 8 blocks.
+typedef struct Blocks {
+    int width, height; // of the picture
+    int nx, ny;
+} Blocks;
+Blocks check_blocks(int width, int height);
+
+// Adds weight times the block means of image to sums[(y * nx + x) * CHECK_SERIES + series].
+void check_add_blocks(const Blocks *blocks, const float *image, double weight, double *sums);
+
+typedef struct CheckResult {
+    double derivative, difference; // means over pixels and channels
+    double standard_error;         // of derivative - difference
+    double relative_error;         // root mean square standard error of the blocks over that of their derivative
+    double worst_z;                // of the block and channel with the largest |z|
+    int worst_x, worst_y, worst_channel;
+    double sum_z; // sum of the blocks' z of the mean channel / sqrt(their number)
+    int tests;    // block and channel tests
+} CheckResult;
+
+// derivative and difference hold CHECK_SETS rows of ny * nx * CHECK_SERIES block means, from the same sample sets.
+// rounding: absolute error that float arithmetic leaves in a block's difference.
+CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, double rounding);
+
+// |z| that one of n tests passes with a probability of 1 % in all (Sidak's correction).
+double check_z_threshold(int n);

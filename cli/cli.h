@@ -1,0 +1,164 @@
+// cli.h: what the subcommands of `reynolds` share: options, the session they open, and how they report.
+#pragma once
+
+#include "json.h"
+#include "reynolds/reynolds.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { EXIT_OK = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_INTERRUPTED = 130 };
+
+// Subcommands: main.c holds one row for each. A command gets its own name as argv[0] and returns the exit status.
+typedef enum Command {
+    COMMAND_RENDER,
+    COMMAND_GRAD,
+    COMMAND_CHECK,
+    COMMAND_FIT,
+    COMMAND_PARAMS,
+    COMMAND_INFO,
+    COMMAND_COMPARE,
+    COMMAND_DOCTOR,
+    COMMAND_COUNT
+} Command;
+
+int cli_render(int argc, char **argv);
+int cli_grad(int argc, char **argv);
+int cli_check(int argc, char **argv);
+int cli_fit(int argc, char **argv);
+int cli_params(int argc, char **argv);
+int cli_info(int argc, char **argv);
+int cli_compare(int argc, char **argv);
+int cli_doctor(int argc, char **argv);
+
+const char *cli_command_name(Command command);
+// Prints the subcommand's usage, its options and its notes.
+void cli_command_help(Command command);
+
+/* ---- options ------------------------------------------------------------------------------------------- */
+
+typedef struct Options {
+    Command command;
+    const char *files[2]; // positional arguments: SCENE, JOB.yaml, or A and B
+    int file_count;
+    const char *output;  // -o, null when not given
+    int spp;             // 0 = the scene's own count
+    uint32_t seed;       // default 0
+    bool seed_given;     // --seed was on the command line
+    int sensor;          // default 0
+    int threads;         // 0 = as many as there are
+    int lanes;           // 0 = the widest
+    int sampler;         // REY_SAMPLER_*
+    int terms;           // REY_TERM_* bits, 0 = all that are needed
+    bool reverse;        // --mode reverse
+    const char *adjoint; // number or file name
+    bool resume, json;
+    rey_define *defines; // -D
+    char **define_names; // copies of their names, owned
+    int define_count;
+    const char **params; // --param
+    int param_count;
+    const char **sets; // --set key=value
+    int set_count;
+} Options;
+
+// Parses a subcommand's arguments. Returns true when the command should run; otherwise *status is what it should
+// return: 0 after --help, 2 after a usage error, which has been printed.
+bool cli_options_parse(Command command, int argc, char **argv, Options *options, int *status);
+void cli_options_free(Options *options);
+void cli_options_help(Command command); // the list of the options that a subcommand takes
+
+// Prints "reynolds COMMAND: message" and a hint at --help to standard error; returns EXIT_USAGE.
+int cli_usage_error(Command command, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+// Whole-text conversions: false when text is not a number of that kind within the range.
+bool cli_parse_integer(const char *text, int64_t low, int64_t high, int64_t *out);
+bool cli_parse_number(const char *text, double *out);
+// Comma-separated numbers; returns how many were read (at most max), -1 when the text is malformed.
+int cli_parse_list(const char *text, int max, double *out);
+
+/* ---- sessions ------------------------------------------------------------------------------------------ */
+
+// Seconds since the process started to run main.
+double cli_seconds_total(void);
+
+// SIGINT sets a flag that the progress callbacks read; a second SIGINT ends the process at once.
+void cli_catch_interrupts(void);
+bool cli_interrupted(void);
+
+typedef struct Progress {
+    const char *label;   // "render"
+    double part, parts;  // this call is number `part` of `parts` equal ones
+    double start, shown; // times of the first call and of the last line [s]
+    bool visible;        // standard error is a terminal
+} Progress;
+Progress cli_progress(const char *label);
+// Fits rey_render_def.progress; user is a Progress. False, which cancels, once the user has interrupted.
+bool cli_progress_step(void *user, double fraction);
+void cli_progress_end(Progress *progress); // clears the line
+
+typedef struct Session {
+    const Options *options;
+    rey_context *ctx;
+    rey_scene *scene;
+    rey_render_def def; // spp, seed, sensor, sampler, terms and progress filled in
+    int width, height;  // of the picture of the sensor
+    Progress progress;
+} Session;
+
+// Creates the context only (context_open) or the context and the scene too. On failure it has reported already,
+// *session is closed, and the exit status is returned; EXIT_OK otherwise.
+int cli_context_open(const Options *options, Session *session);
+int cli_session_open(const Options *options, const char *label, Session *session);
+void cli_session_close(Session *session);
+
+// Reports a failed library call (words on standard error, one object on standard output with --json)
+// and returns the exit status for it: 130 when the user interrupted, else 1.
+int cli_report_failure(const Options *options, const rey_context *ctx, rey_result result);
+// The same for failures of the command itself.
+int cli_fail(const Options *options, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Words on standard error, one line.
+void cli_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// Flushes standard output; EXIT_OK, or EXIT_FAILED and a message when the data could not be written.
+int cli_finish_output(void);
+
+// The keys that every rendering command reports: times, paths, rays, memory, threads, lanes.
+void cli_json_stats(Json *json, const Session *session, const rey_stats *stats);
+void cli_add_stats(rey_stats *sum, const rey_stats *part);
+void cli_json_terms(Json *json, const char *key, int terms);
+// Names of the terms in bits, joined by commas, into text.
+void cli_terms_text(int terms, char *text, size_t size);
+
+/* ---- directions ---------------------------------------------------------------------------------------- */
+
+// One joint direction in parameter space: a tangent vector over the selection of the parameters that it moves.
+typedef struct Direction {
+    int *params; // indices, none twice
+    int count;
+    int64_t *offsets; // count + 1 entries: where each parameter starts in tangent
+    float *tangent;
+} Direction;
+
+// Builds the sum of the directions of specs, each `NAME[:OP]`. On REY_ERROR_ARGUMENT the text itself is malformed.
+rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
+                               Direction *direction);
+// The same for a session, with failures reported: returns the exit status.
+int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction);
+void cli_direction_free(rey_context *ctx, Direction *direction);
+rey_selection cli_direction_selection(const Direction *direction);
+int cli_direction_terms(const rey_scene *scene, const Direction *direction); // terms that it needs
+
+/* ---- images -------------------------------------------------------------------------------------------- */
+
+typedef enum ImageFormat { IMAGE_EXR, IMAGE_PNG, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
+ImageFormat cli_image_format(const char *path); // "-" is EXR on standard output
+
+// Reads an RGB image of any format that the library knows; *rgb is freed with rey_free. Words in the context on
+// failure.
+rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb);
+// EXIT_OK when an image can go to path: known ending and a folder that exists. Reports otherwise.
+int cli_check_output(const Options *options, const char *path);
+// Writes height x width x 3 floats by the ending of path. signed_values: PNG becomes blue-white-red over
+// [-scale, scale], and *scale (may be null) tells the scale.
+rey_result cli_write_image(rey_context *ctx, const char *path, const float *image, int width, int height,
+                           bool signed_values, float *scale);

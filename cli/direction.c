@@ -1,0 +1,342 @@
+// direction.c: directions in parameter space from texts such as bunny.positions:rotate=0,1,0@0,0.5,0.
+//
+// A direction is the tangent d theta_i / d theta of a curve through the current values:
+//   positions  p(theta) = T(theta) p, normals n(theta) = R(theta) n, and transforms M(theta) = T(theta) M (world)
+//   or M(theta) = M T(theta) (local). With T(theta) = I + theta L + O(theta^2) the tangents are L p, L n, L M and M L.
+#include "cli.h"
+
+#include "npy.h"
+
+#include "base/context.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_LIST = 64 };
+
+typedef enum OpId { OP_ADD, OP_TRANSLATE, OP_LOCAL_TRANSLATE, OP_ROTATE, OP_SCALE, OP_FILE, OP_COUNT } OpId;
+static const char *const op_names[OP_COUNT] = {"add", "translate", "local_translate", "rotate", "scale", "file"};
+
+typedef struct Op {
+    OpId id;
+    double values[MAX_LIST];
+    int value_count;
+    double centre[3];
+    const char *file;
+} Op;
+
+// What the numbers of a parameter are, as far as moving them is concerned.
+typedef enum Geometry { GEOMETRY_NONE, GEOMETRY_POINTS, GEOMETRY_VECTORS, GEOMETRY_TRANSFORM } Geometry;
+
+static bool ends_with(const char *name, const char *ending) {
+    size_t n = strlen(name), m = strlen(ending);
+    return n >= m && !strcmp(name + n - m, ending);
+}
+
+static Geometry geometry_of(const rey_param_info *info) {
+    if (info->dims == 2 && info->shape[0] == 4 && info->shape[1] == 4) {
+        return GEOMETRY_TRANSFORM;
+    }
+    if (info->dims < 1 || info->dims > 2 || info->shape[info->dims - 1] != 3) {
+        return GEOMETRY_NONE;
+    }
+    if (ends_with(info->name, "positions") || ends_with(info->name, "position")) {
+        return GEOMETRY_POINTS;
+    }
+    return ends_with(info->name, "normals") || ends_with(info->name, "direction") ? GEOMETRY_VECTORS : GEOMETRY_NONE;
+}
+
+// Length of the NAME part of spec: up to the first colon that an operation's name and "=" follow, or the first colon.
+static size_t name_length(const char *spec) {
+    for (const char *colon = strchr(spec, ':'); colon; colon = strchr(colon + 1, ':')) {
+        for (int i = 0; i < OP_COUNT; i++) {
+            size_t n = strlen(op_names[i]);
+            if (!strncmp(colon + 1, op_names[i], n) && colon[1 + n] == '=') {
+                return (size_t)(colon - spec);
+            }
+        }
+    }
+    return strcspn(spec, ":");
+}
+
+static const char *op_name_at(void *user, int i) {
+    UNUSED(user);
+    return i < OP_COUNT ? op_names[i] : NULL;
+}
+
+static rey_result unknown_op(rey_context *ctx, const char *spec, const char *op) {
+    char word[64];
+    snprintf(word, sizeof word, "%.*s", (int)strcspn(op, "="), op);
+    const char *nearest = rey_nearest_word(word, op_name_at, NULL);
+    return rey_fail(ctx, REY_ERROR_ARGUMENT,
+                    "%s: unknown operation '%s', %s%s (one of add, translate, local_translate, rotate, scale, file)",
+                    spec, word, nearest ? "did you mean " : "expected OP=VALUE", nearest ? nearest : "");
+}
+
+// Reads "list" or "list@cx,cy,cz".
+static bool parse_values(const char *text, Op *op) {
+    const char *at = strchr(text, '@');
+    char list[1024];
+    size_t length = at ? (size_t)(at - text) : strlen(text);
+    if (length >= sizeof list) {
+        return false;
+    }
+    memcpy(list, text, length);
+    list[length] = 0;
+    op->value_count = cli_parse_list(list, MAX_LIST, op->values);
+    return op->value_count > 0 && (!at || cli_parse_list(at + 1, 3, op->centre) == 3);
+}
+
+static rey_result parse_op(rey_context *ctx, const char *spec, const char *text, Op *op) {
+    *op = (Op){.id = OP_COUNT};
+    for (int i = 0; i < OP_COUNT; i++) {
+        size_t n = strlen(op_names[i]);
+        if (!strncmp(text, op_names[i], n) && text[n] == '=') {
+            op->id = (OpId)i;
+            text += n + 1;
+            break;
+        }
+    }
+    if (op->id == OP_COUNT) {
+        return unknown_op(ctx, spec, text);
+    }
+    if (op->id == OP_FILE) {
+        op->file = text;
+        return REY_OK;
+    }
+    bool centred = op->id == OP_ROTATE || op->id == OP_SCALE;
+    if (!parse_values(text, op) || (!centred && strchr(text, '@'))) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: '%s' is not a list of numbers%s", spec, text,
+                        centred ? " with an optional @cx,cy,cz" : "");
+    }
+    bool vector = op->id != OP_ADD && op->id != OP_SCALE;
+    if ((vector && op->value_count != 3) || (op->id == OP_SCALE && op->value_count != 1)) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: %s takes %s, got %d numbers", spec, op_names[op->id],
+                        vector ? "three numbers x,y,z" : "one number", op->value_count);
+    }
+    return REY_OK;
+}
+
+// The generator L of T(theta), a 4 x 4 matrix.
+static bool generator(const Op *op, double L[4][4]) {
+    memset(L, 0, 16 * sizeof(double));
+    const double *v = op->values, *c = op->centre;
+    if (op->id == OP_TRANSLATE || op->id == OP_LOCAL_TRANSLATE) {
+        for (int i = 0; i < 3; i++) {
+            L[i][3] = v[i];
+        }
+        return true;
+    }
+    if (op->id == OP_SCALE) { // c + (1 + theta S)(p - c)
+        for (int i = 0; i < 3; i++) {
+            L[i][i] = v[0];
+            L[i][3] = -v[0] * c[i];
+        }
+        return true;
+    }
+    double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    if (length == 0) {
+        return false;
+    }
+    double k =
+        3.14159265358979323846 / 180 / length; // d/dtheta of Rodrigues' formula at 0 is the cross product by the axis
+    double a[3] = {k * v[0], k * v[1], k * v[2]};
+    double cross[3][3] = {{0, -a[2], a[1]}, {a[2], 0, -a[0]}, {-a[1], a[0], 0}};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            L[i][j] = cross[i][j];
+            L[i][3] -= cross[i][j] * c[j];
+        }
+    }
+    return true;
+}
+
+static void add_transform_tangent(const double L[4][4], const float *M, bool local, float *tangent) {
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            double sum = 0;
+            for (int k = 0; k < 4; k++) {
+                sum += local ? (double)M[4 * i + k] * L[k][j] : L[i][k] * (double)M[4 * k + j];
+            }
+            tangent[4 * i + j] += (float)sum;
+        }
+    }
+}
+
+static rey_result add_motion(rey_context *ctx, const char *spec, const Op *op, const rey_param_info *info,
+                             const float *values, float *tangent) {
+    Geometry geometry = geometry_of(info);
+    bool local = op->id == OP_LOCAL_TRANSLATE;
+    if (geometry == GEOMETRY_NONE) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT,
+                        "%s: %s moves positions (N x 3) or transforms (4 x 4), and %s is neither", spec,
+                        op_names[op->id], info->name);
+    }
+    if (local && geometry != GEOMETRY_TRANSFORM) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: local_translate needs a transform (to_world)", spec);
+    }
+    double L[4][4];
+    if (!generator(op, L)) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: the axis of a rotation cannot be zero", spec);
+    }
+    if (geometry == GEOMETRY_TRANSFORM) {
+        add_transform_tangent((const double(*)[4])L, values, local, tangent);
+        return REY_OK;
+    }
+    if (geometry == GEOMETRY_VECTORS && op->id != OP_ROTATE) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: %s does not turn directions; only rotate does", spec,
+                        op_names[op->id]);
+    }
+    double w = geometry == GEOMETRY_POINTS ? 1 : 0;
+    for (int64_t n = 0; n + 3 <= info->count; n += 3) {
+        for (int i = 0; i < 3; i++) {
+            tangent[n + i] += (float)(L[i][0] * (double)values[n] + L[i][1] * (double)values[n + 1] +
+                                      L[i][2] * (double)values[n + 2] + L[i][3] * w);
+        }
+    }
+    return REY_OK;
+}
+
+static rey_result add_constant(rey_context *ctx, const char *spec, const Op *op, const rey_param_info *info,
+                               float *tangent) {
+    int64_t last = info->dims ? info->shape[info->dims - 1] : 1;
+    if (op->value_count != 1 && op->value_count != last) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: add takes 1 or %lld numbers for %s, got %d", spec,
+                        (long long)last, info->name, op->value_count);
+    }
+    for (int64_t i = 0; i < info->count; i++) {
+        tangent[i] += (float)op->values[op->value_count == 1 ? 0 : i % last];
+    }
+    return REY_OK;
+}
+
+static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info *info, float *tangent) {
+    float *values = rey_alloc_array(ctx, (size_t)info->count, sizeof *values);
+    if (!values) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_result result = cli_npy_read(ctx, op->file, info->count, values);
+    for (int64_t i = 0; i < info->count && !result; i++) {
+        tangent[i] += values[i];
+    }
+    rey_free(ctx, values);
+    return result;
+}
+
+static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spec, int *param) {
+    size_t length = name_length(spec);
+    char *name = rey_alloc(ctx, length + 1);
+    if (!name) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(name, spec, length);
+    rey_result result = REY_OK;
+    *param = rey_param_find(scene, name);
+    if (*param < 0) {
+        const char *nearest = rey_param_nearest(scene, name);
+        result = rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s'%s%s%s", name, nearest ? ", did you mean '" : "",
+                          nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
+    }
+    rey_free(ctx, name);
+    return result;
+}
+
+static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec, int param, float *tangent) {
+    rey_param_info info;
+    rey_result result = rey_param_get_info(scene, param, &info);
+    if (result) {
+        return result;
+    }
+    Op op = {.id = OP_ADD, .values = {1}, .value_count = 1};
+    size_t length = name_length(spec);
+    if (spec[length]) {
+        result = parse_op(ctx, spec, spec + length + 1, &op);
+        if (result) {
+            return result;
+        }
+    }
+    switch (op.id) {
+    case OP_ADD:
+        return add_constant(ctx, spec, &op, &info, tangent);
+    case OP_FILE:
+        return add_file(ctx, &op, &info, tangent);
+    default:
+        return add_motion(ctx, spec, &op, &info, rey_param_values(scene, param), tangent);
+    }
+}
+
+// Collects the distinct parameters of specs and where each one starts in the joint tangent.
+static rey_result select_params(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
+                                int *spec_slots, Direction *d) {
+    for (int i = 0; i < spec_count; i++) {
+        int param;
+        rey_result result = find_param(ctx, scene, specs[i], &param);
+        if (result) {
+            return result;
+        }
+        int slot = 0;
+        while (slot < d->count && d->params[slot] != param) {
+            slot++;
+        }
+        if (slot == d->count) {
+            rey_param_info info;
+            result = rey_param_get_info(scene, param, &info);
+            if (result) {
+                return result;
+            }
+            d->params[d->count++] = param;
+            d->offsets[d->count] = d->offsets[slot] + info.count;
+        }
+        spec_slots[i] = slot;
+    }
+    return REY_OK;
+}
+
+rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
+                               Direction *direction) {
+    *direction = (Direction){0};
+    int *slots = rey_alloc_array(ctx, (size_t)spec_count, sizeof *slots);
+    direction->params = rey_alloc_array(ctx, (size_t)spec_count, sizeof *direction->params);
+    direction->offsets = rey_alloc_array(ctx, (size_t)spec_count + 1, sizeof *direction->offsets);
+    rey_result result = REY_ERROR_MEMORY;
+    if (slots && direction->params && direction->offsets) {
+        result = select_params(ctx, scene, specs, spec_count, slots, direction);
+    }
+    if (!result) {
+        size_t size = (size_t)direction->offsets[direction->count];
+        direction->tangent = rey_alloc_array(ctx, size, sizeof *direction->tangent);
+        result = direction->tangent ? REY_OK : REY_ERROR_MEMORY;
+    }
+    for (int i = 0; i < spec_count && !result; i++) {
+        int slot = slots[i];
+        result = add_spec(ctx, scene, specs[i], direction->params[slot], direction->tangent + direction->offsets[slot]);
+    }
+    rey_free(ctx, slots);
+    if (result) {
+        cli_direction_free(ctx, direction);
+    }
+    return result;
+}
+
+void cli_direction_free(rey_context *ctx, Direction *direction) {
+    rey_free(ctx, direction->params);
+    rey_free(ctx, direction->offsets);
+    rey_free(ctx, direction->tangent);
+    *direction = (Direction){0};
+}
+
+rey_selection cli_direction_selection(const Direction *direction) {
+    return (rey_selection){.params = direction->params, .count = direction->count};
+}
+
+int cli_direction_terms(const rey_scene *scene, const Direction *direction) {
+    int terms = 0;
+    for (int i = 0; i < direction->count; i++) {
+        rey_param_info info;
+        if (rey_param_get_info(scene, direction->params[i], &info) == REY_OK) {
+            terms |= info.terms;
+        }
+    }
+    return terms;
+}

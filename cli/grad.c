@@ -1,0 +1,237 @@
+// grad.c: `reynolds grad`: the derivative image along a direction, or the gradient of sum A * image.
+//
+// Both modes report value = d/dtheta of the sum over pixels and channels of A * image along the joint direction
+// (forward mode: A = 1/(3 W H), the mean), and its standard error from independently scrambled sample sets: the
+// standard deviation of the sets' values divided by the square root of their number.
+#include "cli.h"
+
+#include "base/context.h"
+#include "io/image.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum { SETS = 16 };
+
+typedef struct Grad {
+    Session session;
+    Direction direction;
+    rey_stats stats;
+    double value, standard_error;
+    int needed, used; // term bits
+    float png_scale;  // of the signed picture, 0 when none was written
+} Grad;
+
+// Mean and standard error of the mean.
+static void summarize(const double *values, int count, double *mean, double *standard_error) {
+    double sum = 0, squares = 0;
+    for (int i = 0; i < count; i++) {
+        sum += values[i];
+    }
+    *mean = sum / count;
+    for (int i = 0; i < count; i++) {
+        squares += (values[i] - *mean) * (values[i] - *mean);
+    }
+    *standard_error = sqrt(squares / (count - 1) / count);
+}
+
+static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
+    const Options *o = g->session.options;
+    Json json = json_begin(file);
+    json_object(&json, NULL);
+    cli_json_stats(&json, &g->session, &g->stats);
+    json_string(&json, "mode", o->reverse ? "reverse" : "forward");
+    json_number(&json, "value", g->value);
+    json_number(&json, "standard_error", g->standard_error);
+    json_object(&json, "terms");
+    json_number(&json, rey_term_name(REY_TERM_INTERIOR), g->value);
+    json_object_end(&json);
+    json_bool(&json, "complete", (g->needed & ~g->used) == 0);
+    cli_json_terms(&json, "needed_terms", g->needed);
+    json_array(&json, "parameters");
+    for (int i = 0; i < g->direction.count; i++) {
+        rey_param_info info;
+        rey_param_get_info(g->session.scene, g->direction.params[i], &info);
+        json_string(&json, NULL, info.name);
+    }
+    json_array_end(&json);
+    json_integer(&json, "width", g->session.width);
+    json_integer(&json, "height", g->session.height);
+    json_string(&json, "output", gradient_folder ? gradient_folder : o->output);
+    if (g->png_scale > 0) {
+        json_number(&json, "png_scale", (double)g->png_scale);
+    }
+    json_object_end(&json);
+    json_end(&json);
+}
+
+static rey_result forward(Grad *g) {
+    Session *s = &g->session;
+    const char *output = s->options->output;
+    double sets[SETS];
+    float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, 3 * sizeof *image);
+    if (!image) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_result result = rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image,
+                                sets, &g->stats);
+    cli_progress_end(&s->progress);
+    if (!result) {
+        summarize(sets, SETS, &g->value, &g->standard_error);
+    }
+    if (!result && output) {
+        bool png = cli_image_format(output) == IMAGE_PNG;
+        result = cli_write_image(s->ctx, output, image, s->width, s->height, true, png ? &g->png_scale : NULL);
+    }
+    rey_free(s->ctx, image);
+    return result;
+}
+
+static rey_result read_adjoint(Session *s, float **adjoint) {
+    const char *text = s->options->adjoint;
+    size_t count = (size_t)s->width * (size_t)s->height * 3;
+    double number;
+    if (cli_parse_number(text, &number)) {
+        *adjoint = rey_alloc_array(s->ctx, count, sizeof **adjoint);
+        for (size_t i = 0; i < count && *adjoint; i++) {
+            (*adjoint)[i] = (float)number;
+        }
+        return *adjoint ? REY_OK : REY_ERROR_MEMORY;
+    }
+    int width, height;
+    rey_result result = cli_read_image(s->ctx, text, &width, &height, adjoint);
+    if (!result && (width != s->width || height != s->height)) {
+        return rey_fail(s->ctx, REY_ERROR_ARGUMENT, "%s: the adjoint is %d x %d pixels, the picture %d x %d", text,
+                        width, height, s->width, s->height);
+    }
+    return result;
+}
+
+static double dot(const double *gradient, const float *tangent, int64_t count) {
+    double sum = 0;
+    for (int64_t i = 0; i < count; i++) {
+        sum += gradient[i] * (double)tangent[i];
+    }
+    return sum;
+}
+
+// Writes each parameter's gradient as FOLDER/NAME.npy, with the parameter's shape, and FOLDER/gradient.json.
+static rey_result write_gradient(Grad *g, const double *gradient) {
+    rey_context *ctx = g->session.ctx;
+    const char *folder = g->session.options->output;
+    char path[4096];
+    if (mkdir(folder, 0777) && errno != EEXIST) {
+        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", folder, strerror(errno));
+    }
+    for (int k = 0; k < g->direction.count; k++) {
+        rey_param_info info;
+        rey_result result = rey_param_get_info(g->session.scene, g->direction.params[k], &info);
+        float *values = result ? NULL : rey_alloc_array(ctx, (size_t)info.count, sizeof *values);
+        if (!values) {
+            return result ? result : REY_ERROR_MEMORY;
+        }
+        for (int64_t i = 0; i < info.count; i++) {
+            values[i] = (float)gradient[g->direction.offsets[k] + i];
+        }
+        snprintf(path, sizeof path, "%s/%s.npy", folder, info.name);
+        for (char *c = path + strlen(folder) + 1; *c; c++) {
+            *c = *c == '/' ? '_' : *c; // names are not paths
+        }
+        result = rey_npy_write(ctx, path, values, info.shape, info.dims);
+        rey_free(ctx, values);
+        if (result) {
+            return result;
+        }
+    }
+    snprintf(path, sizeof path, "%s/gradient.json", folder);
+    FILE *file = fopen(path, "w");
+    if (!file) {
+        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
+    }
+    write_json(file, g, folder);
+    bool bad = ferror(file) != 0;
+    return fclose(file) || bad ? rey_fail(ctx, REY_ERROR_IO, "%s: could not be written", path) : REY_OK;
+}
+
+static rey_result reverse(Grad *g) {
+    Session *s = &g->session;
+    int64_t size = g->direction.offsets[g->direction.count];
+    float *adjoint = NULL;
+    double *gradient = rey_alloc_array(s->ctx, (size_t)size, sizeof *gradient);
+    double *set_gradients = rey_alloc_array(s->ctx, (size_t)size, SETS * sizeof *set_gradients);
+    rey_result result = gradient && set_gradients ? read_adjoint(s, &adjoint) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = rey_vjp(s->scene, &s->def, cli_direction_selection(&g->direction), adjoint, gradient, set_gradients,
+                         &g->stats);
+        cli_progress_end(&s->progress);
+    }
+    if (!result) {
+        double sets[SETS];
+        for (int i = 0; i < SETS; i++) {
+            sets[i] = dot(set_gradients + i * size, g->direction.tangent, size);
+        }
+        summarize(sets, SETS, &g->value, &g->standard_error);
+        result = s->options->output ? write_gradient(g, gradient) : REY_OK;
+    }
+    rey_free(s->ctx, adjoint);
+    rey_free(s->ctx, gradient);
+    rey_free(s->ctx, set_gradients);
+    return result;
+}
+
+static rey_result differentiate(Grad *g) {
+    Session *s = &g->session;
+    s->def.sets = SETS;
+    g->needed = cli_direction_terms(s->scene, &g->direction);
+    g->used = s->options->terms ? s->options->terms : g->needed;
+    return s->options->reverse ? reverse(g) : forward(g);
+}
+
+static void print_result(const Grad *g) {
+    if (g->png_scale > 0) {
+        cli_note("blue -%g, white 0, red %g", (double)g->png_scale, (double)g->png_scale);
+    }
+    if ((g->needed & ~g->used) != 0) {
+        char missing[128];
+        cli_terms_text(g->needed & ~g->used, missing, sizeof missing);
+        cli_note("incomplete on request: left out %s", missing);
+    }
+    if (g->session.options->json) {
+        write_json(stdout, g, NULL);
+    } else if (!g->session.options->output || strcmp(g->session.options->output, "-")) {
+        printf("value %.9g\nstandard_error %.3g\n", g->value, g->standard_error);
+    }
+}
+
+int cli_grad(int argc, char **argv) {
+    Options options;
+    Grad g = {0};
+    int status;
+    if (!cli_options_parse(COMMAND_GRAD, argc, argv, &options, &status)) {
+        return status;
+    }
+    if (options.output && !options.reverse) {
+        status = cli_check_output(&options, options.output);
+    }
+    if (!status) {
+        status = cli_session_open(&options, "grad", &g.session);
+    }
+    if (!status) {
+        status = cli_session_direction(&g.session, options.params, options.param_count, &g.direction);
+        rey_result result = status ? REY_OK : differentiate(&g);
+        if (result) {
+            status = cli_report_failure(&options, g.session.ctx, result);
+        } else if (!status) {
+            print_result(&g);
+            status = cli_finish_output();
+        }
+        cli_direction_free(g.session.ctx, &g.direction);
+        cli_session_close(&g.session);
+    }
+    cli_options_free(&options);
+    return status;
+}

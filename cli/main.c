@@ -1,0 +1,119 @@
+// main.c: the table of subcommands, help and dispatch.
+#include "cli.h"
+
+#include "base/context.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define DIRECTION_NOTES                                                                                                \
+    "\nA direction P is NAME[:OP]; several form one joint direction. Names are listed by 'reynolds params'. OP is "    \
+    "one of\n"                                                                                                         \
+    "  add=V                     every entry moves by theta*V (default add=1); V may list the last dimension\n"        \
+    "  translate=x,y,z           positions or to_world, in the world\n"                                                \
+    "  local_translate=x,y,z     to_world, in the object's own frame\n"                                                \
+    "  rotate=ax,ay,az[@cx,cy,cz]  theta in degrees, about an axis through a centre\n"                                 \
+    "  scale=S[@cx,cy,cz]        positions or to_world, about a centre\n"                                              \
+    "  file=TANGENT.npy          a tangent of the parameter's size\n"
+
+typedef struct CommandRow {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *usage;
+    const char *summary;
+    const char *notes;
+} CommandRow;
+
+static const CommandRow command_rows[COMMAND_COUNT] = {
+    [COMMAND_RENDER] = {"render", cli_render, "SCENE -o OUT [options]", "render a Mitsuba 3 scene to an image", ""},
+    [COMMAND_GRAD] =
+        {"grad", cli_grad, "SCENE --param P [--param P]... [--mode reverse --adjoint A] [-o OUT] [options]",
+         "derivative image (forward) or gradient (reverse)",
+         "\nForward mode writes the derivative image along the direction; its value is the mean over pixels and\n"
+         "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
+         "for\n"
+         "each parameter, and gradient.json, into the folder -o.\n" DIRECTION_NOTES},
+    [COMMAND_CHECK] = {"check", cli_check, "SCENE --param P [--param P]... [options]",
+                       "compare gradients with correlated finite differences",
+                       "\nEach P is checked by itself, in blocks of the image. Exits with 1 when a gradient is "
+                       "wrong.\n" DIRECTION_NOTES},
+    [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},
+    [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
+    [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
+                         "differences between two images; B is the reference",
+                         "\npsnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2).\n"},
+    [COMMAND_DOCTOR] = {"doctor", cli_doctor, "[options]", "examine this machine and this build", ""},
+};
+
+const char *cli_command_name(Command command) {
+    return command_rows[command].name;
+}
+
+void cli_command_help(Command command) {
+    const CommandRow *row = &command_rows[command];
+    printf("Usage: reynolds %s %s\n\n%s.\n", row->name, row->usage, row->summary);
+    cli_options_help(command);
+    fputs(row->notes, stdout);
+}
+
+static void print_help(FILE *file) {
+    fprintf(
+        file,
+        "Usage: reynolds COMMAND [arguments]\n\n"
+        "Reynolds %s: physically based rendering, its derivatives, and scenes recovered from images.\n\nCommands:\n",
+        rey_version());
+    for (int i = 0; i < COMMAND_COUNT; i++) {
+        if (command_rows[i].run) {
+            fprintf(file, "  %-10s %s\n", command_rows[i].name, command_rows[i].summary);
+        }
+    }
+    fprintf(file,
+            "\nOptions:\n  -h, --help     print this text; 'reynolds COMMAND --help' tells more\n"
+            "      --version  print the version\n\n"
+            "Data goes to standard output and words to standard error. Exit status: 0 success, 1 failure, 2 usage,\n"
+            "130 interrupted.\n");
+}
+
+static const char *command_name_at(void *user, int i) {
+    (void)user;
+    while (i < COMMAND_COUNT && !command_rows[i].run) {
+        i++;
+    }
+    return i < COMMAND_COUNT ? command_rows[i].name : NULL;
+}
+
+static int unknown_word(const char *word) {
+    const char *nearest = rey_nearest_word(word, command_name_at, NULL);
+    const char *what = word[0] == '-' ? "option" : "command";
+    if (nearest) {
+        fprintf(stderr, "reynolds: unknown %s '%s', did you mean '%s'?\n", what, word, nearest);
+    } else {
+        fprintf(stderr, "reynolds: unknown %s '%s'\n", what, word);
+    }
+    fprintf(stderr, "Try 'reynolds --help'.\n");
+    return EXIT_USAGE;
+}
+
+int main(int argc, char **argv) {
+    cli_seconds_total();
+    if (argc < 2) {
+        print_help(stderr);
+        return EXIT_USAGE;
+    }
+    const char *word = argv[1];
+    for (int i = 0; i < COMMAND_COUNT; i++) {
+        if (command_rows[i].run && !strcmp(word, command_rows[i].name)) {
+            cli_catch_interrupts();
+            return command_rows[i].run(argc - 1, argv + 1);
+        }
+    }
+    if (!strcmp(word, "--version")) {
+        printf("reynolds %s\n", rey_version());
+        return cli_finish_output();
+    }
+    if (!strcmp(word, "-h") || !strcmp(word, "--help") || !strcmp(word, "help")) {
+        print_help(stdout);
+        return cli_finish_output();
+    }
+    return unknown_word(word);
+}

@@ -1,0 +1,103 @@
+// npy.c: reader of NumPy's array files, format versions 1 to 3 [numpy.lib.format].
+#include "npy.h"
+
+#include "base/context.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <stdio.h>
+
+typedef struct Header {
+    int item_bytes; // 4 or 8
+    int64_t count;
+} Header;
+
+// Product of the numbers of "'shape': (a, b, c)"; -1 when it is malformed or overflows.
+static int64_t shape_count(const char *text) {
+    const char *s = strstr(text, "'shape':");
+    s = s ? strchr(s, '(') : NULL;
+    if (!s) {
+        return -1;
+    }
+    int64_t count = 1;
+    for (s++; *s != ')'; s++) {
+        if (*s >= '0' && *s <= '9') {
+            char *end;
+            errno = 0;
+            long long n = strtoll(s, &end, 10);
+            if (errno || __builtin_mul_overflow(count, n, &count)) {
+                return -1;
+            }
+            s = end - 1;
+        } else if (*s != ',' && *s != ' ') {
+            return -1;
+        }
+    }
+    return count;
+}
+
+static rey_result read_header(rey_context *ctx, FILE *file, const char *path, Header *header) {
+    unsigned char head[12];
+    if (fread(head, 1, 10, file) != 10 || memcmp(head, "\x93NUMPY", 6) || head[6] < 1 || head[6] > 3) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a NumPy .npy file", path);
+    }
+    size_t length = head[8] | (size_t)head[9] << 8;
+    if (head[6] > 1) {
+        if (fread(head + 10, 1, 2, file) != 2) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: truncated", path);
+        }
+        length |= (size_t)head[10] << 16 | (size_t)head[11] << 24;
+    }
+    char text[4096] = "";
+    if (length >= sizeof text || fread(text, 1, length, file) != length) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: truncated header", path);
+    }
+    const char *type = strstr(text, "'descr':");
+    bool single = type && strstr(type, "'<f4'"), dual = type && strstr(type, "'<f8'");
+    if (!single && !dual) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: expected little-endian float32 or float64 numbers", path);
+    }
+    if (strstr(text, "'fortran_order': True")) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: expected an array in C order, this one is in Fortran order", path);
+    }
+    header->item_bytes = single ? 4 : 8;
+    header->count = shape_count(text);
+    return REY_OK;
+}
+
+static rey_result read_values(rey_context *ctx, FILE *file, const char *path, const Header *header, float *values) {
+    for (int64_t i = 0; i < header->count; i++) {
+        double number = 0;
+        float narrow = 0;
+        void *target = header->item_bytes == 4 ? (void *)&narrow : (void *)&number;
+        if (fread(target, (size_t)header->item_bytes, 1, file) != 1) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: truncated after %lld of %lld numbers", path, (long long)i,
+                            (long long)header->count);
+        }
+        values[i] = header->item_bytes == 4 ? narrow : (float)number;
+        if (!isfinite(values[i])) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: number %lld is not finite", path, (long long)i);
+        }
+    }
+    return REY_OK;
+}
+
+rey_result cli_npy_read(rey_context *ctx, const char *path, int64_t count, float *values) {
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
+    }
+    Header header = {0};
+    rey_result result = read_header(ctx, file, path, &header);
+    if (!result && header.count != count) {
+        result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: holds %lld numbers, the parameter has %lld", path,
+                          (long long)header.count, (long long)count);
+    }
+    if (!result) {
+        result = read_values(ctx, file, path, &header, values);
+    }
+    fclose(file);
+    return result;
+}

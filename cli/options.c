@@ -1,0 +1,415 @@
+// options.c: the command line's options: one table row for each, and the parser that walks it.
+#include "cli.h"
+
+#include "base/context.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    RENDERS = 1 << COMMAND_RENDER | 1 << COMMAND_GRAD | 1 << COMMAND_CHECK,
+    FITS = 1 << COMMAND_FIT,
+    READS = 1 << COMMAND_PARAMS | 1 << COMMAND_INFO,
+    GRADS = 1 << COMMAND_GRAD,
+    CHECKS = 1 << COMMAND_CHECK,
+    DOCTOR = 1 << COMMAND_DOCTOR,
+    EVERY = (1 << COMMAND_COUNT) - 1
+};
+
+typedef enum OptionId {
+    OPTION_OUTPUT,
+    OPTION_SPP,
+    OPTION_SEED,
+    OPTION_SENSOR,
+    OPTION_DEFINE,
+    OPTION_THREADS,
+    OPTION_LANES,
+    OPTION_SAMPLER,
+    OPTION_PARAM,
+    OPTION_MODE,
+    OPTION_ADJOINT,
+    OPTION_TERMS,
+    OPTION_SET,
+    OPTION_RESUME,
+    OPTION_JSON,
+    OPTION_HELP
+} OptionId;
+
+typedef struct OptionRow {
+    OptionId id;
+    char letter;          // short form, 0 when there is none
+    const char *name;     // long form, null when there is none
+    const char *argument; // placeholder, null for a switch
+    int commands;         // bits of the subcommands that take it
+    const char *help;
+} OptionRow;
+
+static const OptionRow option_rows[] = {
+    {OPTION_OUTPUT, 'o', NULL, "OUT", RENDERS & ~CHECKS, "file by ending (.exr .png .npy), - for standard output"},
+    {OPTION_OUTPUT, 'o', NULL, "DIR", FITS, "folder for everything that the fit writes"},
+    {OPTION_PARAM, 0, "param", "P", GRADS | CHECKS, "NAME[:OP]: a direction (see below); may be repeated"},
+    {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
+    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or an EXR of the image's size"},
+    {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior)"},
+    {OPTION_SET, 0, "set", "key=value", FITS, "change an entry of the job; may be repeated"},
+    {OPTION_RESUME, 0, "resume", NULL, FITS, "continue from the last checkpoint"},
+    {OPTION_SPP, 0, "spp", "N", RENDERS, "samples per pixel (default: the scene's)"},
+    {OPTION_SEED, 0, "seed", "N", RENDERS | FITS, "seed of the random numbers (default 0)"},
+    {OPTION_SENSOR, 0, "sensor", "K", RENDERS, "which sensor, from 0"},
+    {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default: the scene's)"},
+    {OPTION_DEFINE, 'D', NULL, "key=value", RENDERS | READS, "value of $key in the scene; may be repeated"},
+    {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR,
+     "worker threads (default: all that are allowed)"},
+    {OPTION_LANES, 0, "lanes", "1|8|16", RENDERS | FITS | READS | DOCTOR, "SIMD width (default: the widest)"},
+    {OPTION_JSON, 0, "json", NULL, EVERY, "print one JSON object on standard output"},
+    {OPTION_HELP, 'h', "help", NULL, EVERY, "print this text"},
+};
+enum { OPTION_ROW_COUNT = sizeof option_rows / sizeof option_rows[0] };
+
+int cli_usage_error(Command command, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    fprintf(stderr, "reynolds %s: ", cli_command_name(command));
+    vfprintf(stderr, format, arguments);
+    fprintf(stderr, "\nTry 'reynolds %s --help'.\n", cli_command_name(command));
+    va_end(arguments);
+    return EXIT_USAGE;
+}
+
+void cli_options_help(Command command) {
+    printf("\nOptions:\n");
+    for (int i = 0; i < OPTION_ROW_COUNT; i++) {
+        const OptionRow *row = &option_rows[i];
+        if (row->commands >> command & 1) {
+            char text[64] = "    ";
+            if (row->letter) {
+                snprintf(text, sizeof text, "-%c%s", row->letter, row->name ? ", " : "");
+            }
+            size_t used = strlen(text);
+            snprintf(text + used, sizeof text - used, "%s%s%s%s", row->name ? "--" : "", row->name ? row->name : "",
+                     row->argument ? " " : "", row->argument ? row->argument : "");
+            printf("  %-32s %s\n", text, row->help);
+        }
+    }
+}
+
+void cli_terms_text(int terms, char *text, size_t size) {
+    size_t used = 0;
+    snprintf(text, size, "none");
+    for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
+        if (terms & bit && used < size) {
+            int n = snprintf(text + used, size - used, "%s%s", used ? "," : "", rey_term_name(bit));
+            used += (size_t)n;
+        }
+    }
+}
+
+static bool parse_terms(Options *o, const char *text) {
+    char all[128];
+    cli_terms_text(REY_TERM_ALL, all, sizeof all);
+    for (const char *s = text;; s++) {
+        size_t length = strcspn(s, ",");
+        int found = 0;
+        for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
+            const char *name = rey_term_name(bit);
+            found |= strlen(name) == length && !strncmp(name, s, length) ? bit : 0;
+        }
+        if (!found) {
+            cli_usage_error(o->command, "--terms: '%.*s' is none of %s", (int)length, s, all);
+            return false;
+        }
+        o->terms |= found;
+        s += length;
+        if (!*s) {
+            return true;
+        }
+    }
+}
+
+static bool parse_define(Options *o, const char *text) {
+    const char *equals = strchr(text, '=');
+    if (!equals || equals == text) {
+        cli_usage_error(o->command, "-D: expected key=value, got '%s'", text);
+        return false;
+    }
+    char *name = strndup(text, (size_t)(equals - text));
+    if (!name) {
+        cli_usage_error(o->command, "out of memory");
+        return false;
+    }
+    o->define_names[o->define_count] = name;
+    o->defines[o->define_count++] = (rey_define){.name = name, .value = equals + 1};
+    return true;
+}
+
+// Sets *target to the index of value among the null-terminated choices.
+static bool parse_choice(const Options *o, const char *option, const char *value, const char *const *choices,
+                         int *target) {
+    for (int i = 0; choices[i]; i++) {
+        if (!strcmp(value, choices[i])) {
+            *target = i;
+            return true;
+        }
+    }
+    char list[128] = "";
+    for (int i = 0; choices[i]; i++) {
+        size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", choices[i]);
+    }
+    cli_usage_error(o->command, "%s: '%s' is none of %s", option, value, list);
+    return false;
+}
+
+static bool parse_count(const Options *o, const char *option, const char *value, int64_t low, int64_t high,
+                        int *target) {
+    int64_t number;
+    if (!cli_parse_integer(value, low, high, &number)) {
+        cli_usage_error(o->command, "%s: expected a whole number from %lld to %lld, got '%s'", option, (long long)low,
+                        (long long)high, value);
+        return false;
+    }
+    *target = (int)number;
+    return true;
+}
+
+static bool parse_seed(Options *o, const char *value) {
+    int64_t number;
+    if (!cli_parse_integer(value, 0, UINT32_MAX, &number)) {
+        cli_usage_error(o->command, "--seed: expected a whole number from 0 to %u, got '%s'", UINT32_MAX, value);
+        return false;
+    }
+    o->seed = (uint32_t)number;
+    o->seed_given = true;
+    return true;
+}
+
+static bool parse_set(Options *o, const char *value) {
+    const char *equals = strchr(value, '=');
+    if (!equals || equals == value) {
+        cli_usage_error(o->command, "--set: expected key=value, got '%s'", value);
+        return false;
+    }
+    o->sets[o->set_count++] = value;
+    return true;
+}
+
+static bool apply_option(Options *o, const OptionRow *row, const char *value) {
+    static const char *const samplers[] = {"default", "independent", "sobol", NULL};
+    static const char *const modes[] = {"forward", "reverse", NULL};
+    static const char *const widths[] = {"1", "8", "16", NULL};
+    static const int width_values[] = {1, 8, 16};
+    int choice = 0;
+    switch (row->id) {
+    case OPTION_OUTPUT:
+        o->output = value;
+        return true;
+    case OPTION_SPP:
+        return parse_count(o, "--spp", value, 1, INT32_MAX, &o->spp);
+    case OPTION_SEED:
+        return parse_seed(o, value);
+    case OPTION_SENSOR:
+        return parse_count(o, "--sensor", value, 0, INT32_MAX, &o->sensor);
+    case OPTION_DEFINE:
+        return parse_define(o, value);
+    case OPTION_THREADS:
+        return parse_count(o, "--threads", value, 1, 4096, &o->threads);
+    case OPTION_LANES:
+        if (!parse_choice(o, "--lanes", value, widths, &choice)) {
+            return false;
+        }
+        o->lanes = width_values[choice];
+        return true;
+    case OPTION_SAMPLER:
+        if (!parse_choice(o, "--sampler", value, samplers + 1, &choice)) {
+            return false;
+        }
+        o->sampler = choice == 0 ? REY_SAMPLER_INDEPENDENT : REY_SAMPLER_SOBOL;
+        return true;
+    case OPTION_PARAM:
+        o->params[o->param_count++] = value;
+        return true;
+    case OPTION_MODE:
+        if (!parse_choice(o, "--mode", value, modes, &choice)) {
+            return false;
+        }
+        o->reverse = choice == 1;
+        return true;
+    case OPTION_ADJOINT:
+        o->adjoint = value;
+        return true;
+    case OPTION_TERMS:
+        return parse_terms(o, value);
+    case OPTION_SET:
+        return parse_set(o, value);
+    case OPTION_RESUME:
+        o->resume = true;
+        return true;
+    case OPTION_JSON:
+        o->json = true;
+        return true;
+    default:
+        return true;
+    }
+}
+
+static const char *option_name_at(void *user, int i) {
+    int command = *(const Command *)user;
+    for (int row = 0; row < OPTION_ROW_COUNT; row++) {
+        if (option_rows[row].name && option_rows[row].commands >> command & 1 && i-- == 0) {
+            return option_rows[row].name;
+        }
+    }
+    return NULL;
+}
+
+static const OptionRow *find_row(Command command, const char *name, size_t length, char letter) {
+    for (int i = 0; i < OPTION_ROW_COUNT; i++) {
+        const OptionRow *row = &option_rows[i];
+        bool same = name ? row->name && strlen(row->name) == length && !strncmp(row->name, name, length)
+                         : row->letter == letter;
+        if (same && row->commands >> command & 1) {
+            return row;
+        }
+    }
+    return NULL;
+}
+
+// Finds the row of one argument that starts with a dash, and its attached value ("--spp=4", "-t4"), if any.
+static const OptionRow *match_option(Options *o, const char *text, const char **attached) {
+    *attached = NULL;
+    if (text[1] != '-') {
+        const OptionRow *row = find_row(o->command, NULL, 0, text[1]);
+        if (!row || (text[2] && !row->argument)) {
+            cli_usage_error(o->command, "unknown option '%s'", text);
+            return NULL;
+        }
+        *attached = text[2] ? text + 2 : NULL;
+        return row;
+    }
+    const char *name = text + 2;
+    size_t length = strcspn(name, "=");
+    const OptionRow *row = find_row(o->command, name, length, 0);
+    if (!row) {
+        char word[64];
+        snprintf(word, sizeof word, "%.*s", (int)length, name);
+        const char *nearest = rey_nearest_word(word, option_name_at, &o->command);
+        if (nearest) {
+            cli_usage_error(o->command, "unknown option '--%s', did you mean '--%s'?", word, nearest);
+        } else {
+            cli_usage_error(o->command, "unknown option '--%s'", word);
+        }
+        return NULL;
+    }
+    *attached = name[length] == '=' ? name + length + 1 : NULL;
+    return row;
+}
+
+static bool add_file(Options *o, const char *text) {
+    static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 0};
+    if (o->file_count >= most[o->command]) {
+        cli_usage_error(o->command, "unexpected argument '%s'", text);
+        return false;
+    }
+    o->files[o->file_count++] = text;
+    return true;
+}
+
+static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
+    bool only_files = false;
+    for (int i = 1; i < argc; i++) {
+        const char *text = argv[i];
+        if (only_files || text[0] != '-' || !text[1]) {
+            if (!add_file(o, text)) {
+                return false;
+            }
+            continue;
+        }
+        if (!strcmp(text, "--")) {
+            only_files = true;
+            continue;
+        }
+        const char *value;
+        const OptionRow *row = match_option(o, text, &value);
+        if (!row) {
+            return false;
+        }
+        if (row->id == OPTION_HELP) {
+            *help = true;
+            return true;
+        }
+        if (row->argument && !value) {
+            if (++i == argc) {
+                cli_usage_error(o->command, "option '%s' needs a value (%s)", text, row->argument);
+                return false;
+            }
+            value = argv[i];
+        } else if (!row->argument && value) {
+            cli_usage_error(o->command, "option '--%s' takes no value", row->name);
+            return false;
+        }
+        if (!apply_option(o, row, value)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool check_required(const Options *o) {
+    static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE",   "JOB.yaml",
+                                                       "SCENE", "SCENE", "A and B", ""};
+    static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 0};
+    Command c = o->command;
+    if (o->file_count < needed[c]) {
+        cli_usage_error(c, "%s missing", missing[c]);
+    } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count) {
+        cli_usage_error(c, "--param is missing");
+    } else if (c == COMMAND_GRAD && o->reverse && !o->adjoint) {
+        cli_usage_error(c, "--mode reverse needs --adjoint");
+    } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {
+        cli_usage_error(c, "--adjoint needs --mode reverse");
+    } else if (c == COMMAND_RENDER && !o->output && !o->json) {
+        cli_usage_error(c, "-o OUT is missing");
+    } else if (o->json && o->output && !strcmp(o->output, "-")) {
+        cli_usage_error(c, "--json and -o - both want standard output");
+    } else {
+        return true;
+    }
+    return false;
+}
+
+bool cli_options_parse(Command command, int argc, char **argv, Options *options, int *status) {
+    *options = (Options){.command = command};
+    *status = EXIT_USAGE;
+    size_t most = (size_t)argc + 1;
+    options->defines = calloc(most, sizeof *options->defines);
+    options->define_names = calloc(most, sizeof *options->define_names);
+    options->params = calloc(most, sizeof *options->params);
+    options->sets = calloc(most, sizeof *options->sets);
+    bool help = false;
+    if (!options->defines || !options->define_names || !options->params || !options->sets) {
+        cli_note("out of memory");
+        *status = EXIT_FAILED;
+    } else if (parse_arguments(options, argc, argv, &help)) {
+        if (help) {
+            cli_command_help(command);
+            *status = cli_finish_output();
+        } else if (check_required(options)) {
+            *status = EXIT_OK;
+            return true;
+        }
+    }
+    cli_options_free(options);
+    return false;
+}
+
+void cli_options_free(Options *options) {
+    for (int i = 0; i < options->define_count; i++) {
+        free(options->define_names[i]);
+    }
+    free(options->define_names);
+    free(options->defines);
+    free(options->params);
+    free(options->sets);
+    *options = (Options){.command = options->command};
+}

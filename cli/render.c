@@ -1,0 +1,61 @@
+// render.c: `reynolds render`.
+#include "cli.h"
+
+#include "base/context.h"
+
+#include <stdio.h>
+
+static void print_json(const Session *s, const rey_stats *stats) {
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    cli_json_stats(&json, s, stats);
+    json_integer(&json, "width", s->width);
+    json_integer(&json, "height", s->height);
+    json_string(&json, "output", s->options->output);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+static rey_result render(Session *s, rey_stats *stats) {
+    float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, 3 * sizeof *image);
+    if (!image) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_result result = rey_render(s->scene, &s->def, image, stats);
+    cli_progress_end(&s->progress);
+    if (!result && s->options->output) {
+        result = cli_write_image(s->ctx, s->options->output, image, s->width, s->height, false, NULL);
+    }
+    rey_free(s->ctx, image);
+    return result;
+}
+
+int cli_render(int argc, char **argv) {
+    Options options;
+    Session session;
+    int status;
+    if (!cli_options_parse(COMMAND_RENDER, argc, argv, &options, &status)) {
+        return status;
+    }
+    status = options.output ? cli_check_output(&options, options.output) : EXIT_OK;
+    if (!status) {
+        status = cli_session_open(&options, "render", &session);
+    }
+    if (!status) {
+        rey_stats stats = {0};
+        rey_result result = render(&session, &stats);
+        if (result) {
+            status = cli_report_failure(&options, session.ctx, result);
+        } else if (options.json) {
+            print_json(&session, &stats);
+        } else {
+            cli_note("%d x %d pixels, %.3f s, %.2f million paths/s, %.2f million rays/s", session.width, session.height,
+                     stats.seconds, (double)stats.paths / stats.seconds / 1e6,
+                     (double)stats.rays / stats.seconds / 1e6);
+        }
+        status = status ? status : cli_finish_output();
+        cli_session_close(&session);
+    }
+    cli_options_free(&options);
+    return status;
+}

@@ -1,0 +1,217 @@
+// scene_info.c: `reynolds params` and `reynolds info`: what a scene holds.
+#include "cli.h"
+
+#include "base/context.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SHOWN_VALUES = 16 }; // parameters up to this size are printed in full with --json
+
+typedef struct Range {
+    double low, high, mean;
+} Range;
+
+static Range value_range(const float *values, int64_t count) {
+    Range r = {INFINITY, -INFINITY, 0};
+    for (int64_t i = 0; i < count; i++) {
+        r.low = fmin(r.low, (double)values[i]);
+        r.high = fmax(r.high, (double)values[i]);
+        r.mean += (double)values[i] / (double)count;
+    }
+    return r;
+}
+
+static void json_param(Json *json, const rey_param_info *info, const float *values) {
+    Range range = value_range(values, info->count);
+    json_object(json, NULL);
+    json_string(json, "name", info->name);
+    json_string(json, "description", info->description);
+    json_string(json, "unit", info->unit);
+    json_array(json, "shape");
+    for (int i = 0; i < info->dims; i++) {
+        json_integer(json, NULL, info->shape[i]);
+    }
+    json_array_end(json);
+    json_integer(json, "count", info->count);
+    json_number(json, "low", (double)info->low);
+    json_number(json, "high", (double)info->high);
+    if (info->dims == 0) {
+        json_number(json, "value", (double)values[0]);
+    } else if (info->count <= SHOWN_VALUES) {
+        json_array(json, "value");
+        for (int64_t i = 0; i < info->count; i++) {
+            json_number(json, NULL, (double)values[i]);
+        }
+        json_array_end(json);
+    }
+    json_number(json, "mean", range.mean);
+    json_number(json, "min", range.low);
+    json_number(json, "max", range.high);
+    cli_json_terms(json, "terms", info->terms);
+    json_string(json, "why", info->why);
+    json_object_end(json);
+}
+
+static void shape_text(const rey_param_info *info, char *text, size_t size) {
+    snprintf(text, size, "%s", info->dims ? "" : "1");
+    for (int i = 0; i < info->dims; i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
+    }
+}
+
+static void value_text(const rey_param_info *info, const float *values, char *text, size_t size) {
+    text[0] = 0;
+    if (info->count > 4) {
+        Range range = value_range(values, info->count);
+        snprintf(text, size, "mean %.4g", range.mean);
+        return;
+    }
+    for (int64_t i = 0; i < info->count; i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%.5g", i ? ", " : "", (double)values[i]);
+    }
+}
+
+static void print_param(const rey_param_info *info, const float *values, int name_width) {
+    char shape[80], value[128], range[64], terms[128];
+    shape_text(info, shape, sizeof shape);
+    value_text(info, values, value, sizeof value);
+    snprintf(range, sizeof range, "[%g, %g]", (double)info->low, (double)info->high);
+    cli_terms_text(info->terms, terms, sizeof terms);
+    printf("%-*s  %-12s %-10s %-16s %-28s %s\n", name_width, info->name, shape, info->unit[0] ? info->unit : "-", range,
+           value, terms);
+}
+
+static void print_params(const Session *s) {
+    int count = rey_param_count(s->scene), name_width = 4;
+    rey_param_info info;
+    for (int i = 0; i < count; i++) {
+        if (rey_param_get_info(s->scene, i, &info) == REY_OK && (int)strlen(info.name) > name_width) {
+            name_width = (int)strlen(info.name);
+        }
+    }
+    printf("%-*s  %-12s %-10s %-16s %-28s %s\n", name_width, "name", "shape", "unit", "range", "value", "terms");
+    for (int i = 0; i < count; i++) {
+        if (rey_param_get_info(s->scene, i, &info) == REY_OK) {
+            print_param(&info, rey_param_values(s->scene, i), name_width);
+        }
+    }
+}
+
+static void print_params_json(const Session *s) {
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    json_array(&json, "parameters");
+    for (int i = 0; i < rey_param_count(s->scene); i++) {
+        rey_param_info info;
+        if (rey_param_get_info(s->scene, i, &info) == REY_OK) {
+            json_param(&json, &info, rey_param_values(s->scene, i));
+        }
+    }
+    json_array_end(&json);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+// One count of rey_scene_info and what to call it.
+typedef struct CountRow {
+    const char *name;
+    int64_t value;
+} CountRow;
+
+enum { COUNT_ROWS = 11 };
+
+static void count_rows(const rey_scene_info *info, CountRow rows[COUNT_ROWS]) {
+    const CountRow all[COUNT_ROWS] = {
+        {"shapes", info->shapes},         {"triangles", info->triangles},
+        {"vertices", info->vertices},     {"instances", info->instances},
+        {"bsdfs", info->bsdfs},           {"emitters", info->emitters},
+        {"textures", info->textures},     {"sensors", info->sensors},
+        {"parameters", info->parameters}, {"parameter_floats", info->parameter_floats},
+        {"bytes", info->bytes},
+    };
+    memcpy(rows, all, sizeof all);
+}
+
+static void print_info(const Session *s) {
+    rey_scene_info info;
+    rey_scene_get_info(s->scene, &info);
+    CountRow rows[COUNT_ROWS];
+    count_rows(&info, rows);
+    for (int i = 0; i < COUNT_ROWS; i++) {
+        printf("%-17s %lld\n", rows[i].name, (long long)rows[i].value);
+    }
+    printf("%-17s %g %g %g to %g %g %g\n", "bounds", info.bounds[0], info.bounds[1], info.bounds[2], info.bounds[3],
+           info.bounds[4], info.bounds[5]);
+    printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
+    printf("%-17s %d\n", "samples per pixel", info.sample_count);
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        int width, height;
+        if (rey_scene_film_size(s->scene, i, &width, &height) == REY_OK) {
+            printf("sensor %-10d %d x %d pixels\n", i, width, height);
+        }
+    }
+}
+
+static void print_info_json(const Session *s) {
+    rey_scene_info info;
+    rey_scene_get_info(s->scene, &info);
+    CountRow rows[COUNT_ROWS];
+    count_rows(&info, rows);
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    for (int i = 0; i < COUNT_ROWS; i++) {
+        json_integer(&json, rows[i].name, rows[i].value);
+    }
+    json_array(&json, "bounds");
+    for (int i = 0; i < 6; i++) {
+        json_number(&json, NULL, info.bounds[i]);
+    }
+    json_array_end(&json);
+    json_string(&json, "integrator", info.integrator);
+    json_integer(&json, "max_depth", info.max_depth);
+    json_integer(&json, "rr_depth", info.rr_depth);
+    json_integer(&json, "sample_count", info.sample_count);
+    json_array(&json, "films");
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        int width = 0, height = 0;
+        rey_scene_film_size(s->scene, i, &width, &height);
+        json_array(&json, NULL);
+        json_integer(&json, NULL, width);
+        json_integer(&json, NULL, height);
+        json_array_end(&json);
+    }
+    json_array_end(&json);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+static int describe(Command command, int argc, char **argv, void (*print)(const Session *),
+                    void (*print_as_json)(const Session *)) {
+    Options options;
+    Session session;
+    int status;
+    if (!cli_options_parse(command, argc, argv, &options, &status)) {
+        return status;
+    }
+    status = cli_session_open(&options, cli_command_name(command), &session);
+    if (!status) {
+        (options.json ? print_as_json : print)(&session);
+        cli_session_close(&session);
+        status = cli_finish_output();
+    }
+    cli_options_free(&options);
+    return status;
+}
+
+int cli_params(int argc, char **argv) {
+    return describe(COMMAND_PARAMS, argc, argv, print_params, print_params_json);
+}
+
+int cli_info(int argc, char **argv) {
+    return describe(COMMAND_INFO, argc, argv, print_info, print_info_json);
+}

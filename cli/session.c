@@ -1,0 +1,223 @@
+// session.c: contexts and scenes of the subcommands, interruption, progress, and reports.
+#include "cli.h"
+
+#include "base/context.h"
+#include "base/parallel.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
+
+static void on_interrupt(int number) {
+    UNUSED(number);
+    interrupted = 1;
+}
+
+void cli_catch_interrupts(void) {
+    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+}
+
+bool cli_interrupted(void) {
+    return interrupted != 0;
+}
+
+double cli_seconds_total(void) {
+    static double start; // set by the first call, which main makes
+    if (start == 0) {
+        start = rey_seconds();
+    }
+    return rey_seconds() - start;
+}
+
+Progress cli_progress(const char *label) {
+    return (Progress){.label = label, .parts = 1, .visible = isatty(STDERR_FILENO) != 0};
+}
+
+bool cli_progress_step(void *user, double fraction) {
+    Progress *p = user;
+    double now = rey_seconds();
+    if (p->start == 0) {
+        p->start = now;
+        p->shown = now; // short calls show nothing
+    }
+    if (p->visible && now - p->shown > 0.2) {
+        double done = (p->part + fraction) / p->parts;
+        double left = done > 0 ? (now - p->start) * (1 - done) / done : 0;
+        fprintf(stderr, "\r\033[K%s %3.0f %%  %.0f s left", p->label, 100 * done, left);
+        p->shown = now;
+    }
+    return !cli_interrupted();
+}
+
+void cli_progress_end(Progress *progress) {
+    if (progress->visible && progress->shown > progress->start) {
+        fprintf(stderr, "\r\033[K");
+    }
+}
+
+void cli_note(const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    fprintf(stderr, "reynolds: ");
+    vfprintf(stderr, format, arguments);
+    fputc('\n', stderr);
+    va_end(arguments);
+}
+
+static void report(const Options *options, const char *message, rey_result result) {
+    cli_note("%s", message);
+    if (options->json) {
+        Json json = json_begin(stdout);
+        json_object(&json, NULL);
+        json_string(&json, "error", message);
+        json_string(&json, "kind", rey_result_text(result));
+        json_object_end(&json);
+        json_end(&json);
+    }
+}
+
+int cli_report_failure(const Options *options, const rey_context *ctx, rey_result result) {
+    if (result == REY_ERROR_CANCELLED && cli_interrupted()) {
+        cli_note("interrupted");
+        return EXIT_INTERRUPTED;
+    }
+    const char *message = rey_error(ctx);
+    report(options, message[0] ? message : rey_result_text(result), result);
+    return EXIT_FAILED;
+}
+
+int cli_fail(const Options *options, const char *format, ...) {
+    char message[2048];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    report(options, message, REY_ERROR_ARGUMENT);
+    return EXIT_FAILED;
+}
+
+int cli_finish_output(void) {
+    if (fflush(stdout) || ferror(stdout)) {
+        cli_note("standard output could not be written");
+        return EXIT_FAILED;
+    }
+    return EXIT_OK;
+}
+
+int cli_check_output(const Options *options, const char *path) {
+    if (cli_image_format(path) == IMAGE_UNKNOWN) {
+        return cli_usage_error(options->command, "-o: '%s' ends in none of .exr, .png, .npy", path);
+    }
+    char folder[4096] = ".";
+    const char *slash = strrchr(path, '/');
+    if (slash) {
+        snprintf(folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
+    }
+    if (strcmp(path, "-") && access(folder, W_OK)) {
+        return cli_fail(options, "cannot write into %s: %s", folder, strerror(errno));
+    }
+    return EXIT_OK;
+}
+
+int cli_context_open(const Options *options, Session *session) {
+    *session = (Session){.options = options};
+    rey_context_def def = rey_default_context_def();
+    def.threads = options->threads;
+    def.lanes = options->lanes;
+    rey_result result = rey_context_create(&def, &session->ctx);
+    if (result == REY_ERROR_UNSUPPORTED) {
+        return cli_fail(options, "this machine cannot run %d lanes, at most %d", options->lanes, rey_widest_lanes());
+    }
+    return result ? cli_fail(options, "%s", rey_result_text(result)) : EXIT_OK;
+}
+
+static rey_result load_scene(Session *s) {
+    const Options *o = s->options;
+    rey_result result = rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &s->scene);
+    if (result) {
+        return result;
+    }
+    return rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height);
+}
+
+int cli_session_open(const Options *options, const char *label, Session *session) {
+    int status = cli_context_open(options, session);
+    if (status) {
+        return status;
+    }
+    rey_result result = load_scene(session);
+    if (result || cli_interrupted()) {
+        status = cli_report_failure(options, session->ctx, cli_interrupted() ? REY_ERROR_CANCELLED : result);
+        cli_session_close(session);
+        return status;
+    }
+    session->progress = cli_progress(label);
+    rey_render_def def = rey_default_render_def();
+    def.spp = options->spp;
+    def.seed = options->seed;
+    def.sensor = options->sensor;
+    def.sampler = options->sampler;
+    def.terms = options->terms;
+    def.progress = cli_progress_step;
+    def.user = &session->progress;
+    session->def = def;
+    return EXIT_OK;
+}
+
+void cli_session_close(Session *session) {
+    rey_scene_destroy(session->scene);
+    rey_context_destroy(session->ctx);
+    session->scene = NULL;
+    session->ctx = NULL;
+}
+
+int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction) {
+    rey_result result = cli_direction_build(session->ctx, session->scene, specs, spec_count, direction);
+    if (result == REY_ERROR_ARGUMENT) { // the text, not the scene, is wrong
+        cli_report_failure(session->options, session->ctx, result);
+        return EXIT_USAGE;
+    }
+    return result ? cli_report_failure(session->options, session->ctx, result) : EXIT_OK;
+}
+
+void cli_add_stats(rey_stats *sum, const rey_stats *part) {
+    sum->seconds += part->seconds;
+    sum->trace_seconds += part->trace_seconds;
+    sum->thread_seconds += part->thread_seconds;
+    sum->paths += part->paths;
+    sum->rays += part->rays;
+    sum->nonfinite += part->nonfinite;
+}
+
+void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) {
+    double seconds = stats->seconds;
+    json_number(json, "seconds", seconds);
+    json_number(json, "seconds_total", cli_seconds_total());
+    json_integer(json, "paths", stats->paths);
+    json_integer(json, "rays", stats->rays);
+    json_number(json, "paths_per_second", seconds > 0 ? (double)stats->paths / seconds : 0);
+    json_number(json, "rays_per_second", seconds > 0 ? (double)stats->rays / seconds : 0);
+    json_number(json, "trace_share", stats->thread_seconds > 0 ? stats->trace_seconds / stats->thread_seconds : 0);
+    json_number(json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
+    json_integer(json, "threads", rey_threads(session->ctx));
+    json_integer(json, "lanes", rey_lanes(session->ctx));
+    json_integer(json, "nonfinite", stats->nonfinite);
+}
+
+void cli_json_terms(Json *json, const char *key, int terms) {
+    json_array(json, key);
+    for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
+        if (terms & bit) {
+            json_string(json, NULL, rey_term_name(bit));
+        }
+    }
+    json_array_end(json);
+}

@@ -1,0 +1,284 @@
+// test_cli.c: the command as a user runs it: exit statuses, where words and data go, and that its numbers agree.
+#include "json_read.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { OUTPUT_BYTES = 1 << 17 };
+
+typedef struct Fixture {
+    char folder[64];
+    char out[OUTPUT_BYTES], words[OUTPUT_BYTES]; // of the latest command
+} Fixture;
+
+static int make_folder(void **state) {
+    static Fixture fixture;
+    snprintf(fixture.folder, sizeof fixture.folder, "/tmp/reynolds-test-XXXXXX");
+    *state = &fixture;
+    return !mkdtemp(fixture.folder) || chdir(fixture.folder);
+}
+
+static int remove_folder(void **state) {
+    Fixture *f = *state;
+    char command[128];
+    snprintf(command, sizeof command, "rm -r %s", f->folder);
+    return chdir("/") || system(command);
+}
+
+static void read_text(const char *path, char *text) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    text[fread(text, 1, OUTPUT_BYTES - 1, file)] = 0;
+    fclose(file);
+}
+
+// Runs `reynolds ARGUMENTS` in the test's folder and returns the exit status; %s in arguments is the scene.
+static int run(Fixture *f, const char *arguments) {
+    char command[4096], filled[2048];
+    snprintf(filled, sizeof filled, arguments, TEST_SCENE);
+    snprintf(command, sizeof command, "'%s' %s >out.txt 2>words.txt", REYNOLDS_COMMAND, filled);
+    int status = system(command);
+    read_text("out.txt", f->out);
+    read_text("words.txt", f->words);
+    if (!WIFEXITED(status)) {
+        return -1;
+    }
+    return WEXITSTATUS(status);
+}
+
+static void expect(Fixture *f, int status, const char *arguments) {
+    int found = run(f, arguments);
+    if (found != status) {
+        print_error("reynolds %s: exit %d, expected %d\n%s\n", arguments, found, status, f->words);
+    }
+    assert_int_equal(found, status);
+}
+
+static JsonNode *run_json(Fixture *f, int status, const char *arguments) {
+    expect(f, status, arguments);
+    JsonNode *node = json_read("out.txt");
+    assert_non_null(node);
+    assert_int_equal(node->kind, JSON_OBJECT);
+    return node;
+}
+
+static void usage_errors_exit_with_two(void **state) {
+    Fixture *f = *state;
+    static const char *const wrong[] = {"",
+                                        "rendr %s",
+                                        "render",
+                                        "render %s",
+                                        "render %s -o a.bmp",
+                                        "render %s -o a.exr --spp 0",
+                                        "render %s -o a.exr --spp 1.5",
+                                        "render %s -o a.exr --ssp 4",
+                                        "render %s -o a.exr extra",
+                                        "render %s -o",
+                                        "render %s -o a.exr -D x",
+                                        "render %s -o a.exr --lanes 4",
+                                        "render %s -o a.exr --sampler halton",
+                                        "render %s -o a.exr --param x",
+                                        "render %s -o - --json",
+                                        "grad %s",
+                                        "grad %s --param x --mode up",
+                                        "grad %s --param x --mode reverse",
+                                        "grad %s --param x --adjoint 1",
+                                        "grad %s --param x --terms nothing",
+                                        "grad %s --param red.reflectance.value:ad=1",
+                                        "check %s",
+                                        "compare a.exr",
+                                        "doctor extra",
+                                        "info %s --spp 4",
+                                        "render %s -o a.exr --json=1"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        expect(f, 2, wrong[i]);
+        assert_string_equal(f->out, "");
+        assert_true(f->words[0] != 0);
+    }
+    run(f, "rendr %s");
+    assert_non_null(strstr(f->words, "'render'"));
+    run(f, "render %s -o a.exr --ssp 4");
+    assert_non_null(strstr(f->words, "'--spp'"));
+}
+
+static void help_and_version(void **state) {
+    Fixture *f = *state;
+    static const char *const commands[] = {"render", "grad", "check", "fit", "params", "info", "compare", "doctor"};
+    expect(f, 0, "--version");
+    assert_int_equal(strncmp(f->out, "reynolds ", 9), 0);
+    expect(f, 0, "--help");
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        char arguments[64];
+        assert_non_null(strstr(f->out, commands[i]));
+        snprintf(arguments, sizeof arguments, "%s --help", commands[i]);
+        int status = run(f, arguments);
+        assert_int_equal(status, 0);
+        assert_non_null(strstr(f->out, "--json"));
+        run(f, "--help");
+    }
+}
+
+static void failures_exit_with_one(void **state) {
+    Fixture *f = *state;
+    expect(f, 1, "render missing.xml -o a.exr");
+    assert_non_null(strstr(f->words, "missing.xml"));
+    expect(f, 1, "render %s -o /nonexistent/a.exr");
+    expect(f, 1, "render %s -o a.exr --sensor 7");
+    expect(f, 1, "grad %s --param rad.reflectance.value");
+    assert_non_null(strstr(f->words, "red.reflectance.value"));
+    expect(f, 1, "compare a.exr b.exr");
+    JsonNode *node = run_json(f, 1, "render missing.xml -o a.exr --json");
+    assert_non_null(json_text(node, "error", NULL));
+    json_free(node);
+    if (access("/dev/full", W_OK) == 0) {
+        char command[4096];
+        snprintf(command, sizeof command, "'%s' info '%s' >/dev/full 2>words.txt", REYNOLDS_COMMAND, TEST_SCENE);
+        assert_int_equal(WEXITSTATUS(system(command)), 1);
+    }
+}
+
+static const char *const render_keys[] = {"seconds",         "seconds_total", "paths",   "rays", "paths_per_second",
+                                          "rays_per_second", "peak_rss_mb",   "threads", "lanes"};
+
+static void expect_render_keys(const JsonNode *node) {
+    for (size_t i = 0; i < sizeof render_keys / sizeof render_keys[0]; i++) {
+        if (!(json_value(node, render_keys[i], -1) > 0)) {
+            print_error("%s is missing or not positive\n", render_keys[i]);
+            fail();
+        }
+    }
+}
+
+static void rendering(void **state) {
+    Fixture *f = *state;
+    JsonNode *node = run_json(f, 0, "render %s -o a.exr --spp 16 --json -t 1");
+    expect_render_keys(node);
+    assert_true(json_value(node, "paths", 0) >= 32 * 24 * 16);
+    assert_true(json_value(node, "threads", 0) == 1);
+    json_free(node);
+    expect(f, 0, "render %s -o b.exr --spp 16 -t2");
+    assert_string_equal(f->out, "");
+    assert_int_equal(system("cmp a.exr b.exr"), 0); // threads change no bit
+    expect(f, 0, "render %s -o - -D spp=16");
+    assert_int_equal(system("cmp a.exr out.txt"), 0);
+    expect(f, 0, "render %s -o c.png --spp 1");
+    expect(f, 0, "render %s -o c.npy --spp 1");
+    expect(f, 0, "render %s -o d.exr --spp 16 --seed 1");
+    assert_int_not_equal(system("cmp -s a.exr d.exr"), 0);
+    node = run_json(f, 0, "compare a.exr d.exr --json");
+    assert_true(json_value(node, "mse", 0) > 0 && json_value(node, "psnr", 0) > 0);
+    assert_true(fabs(json_value(node, "mean_a", 0) / json_value(node, "mean_b", 1) - 1) < 0.1);
+    json_free(node);
+    node = run_json(f, 0, "compare a.exr b.exr --json");
+    assert_true(json_value(node, "mse", 1) == 0);
+    assert_int_equal(json_get(node, "psnr")->kind, JSON_NULL);
+    json_free(node);
+}
+
+#define DIRECTION                                                                                                      \
+    "--param red.reflectance.value:add=1,0.5,2 --param metal.alpha.value --param lamp.emitter.radiance.value:add=0.1"
+
+static void forward_and_reverse_agree(void **state) {
+    Fixture *f = *state;
+    JsonNode *forward = run_json(f, 0, "grad %s " DIRECTION " --spp 64 -o d.exr --json");
+    JsonNode *reverse =
+        run_json(f, 0, "grad %s " DIRECTION " --spp 64 --mode reverse --adjoint 0.00043402777777 -o g --json");
+    double a = json_value(forward, "value", NAN), b = json_value(reverse, "value", NAN);
+    expect_render_keys(forward);
+    expect_render_keys(reverse);
+    assert_true(a != 0 && fabs(a - b) <= 1e-4 * fabs(a));
+    assert_true(json_value(forward, "standard_error", 0) > 0);
+    assert_true(json_value(forward, "terms.interior", 0) == a);
+    assert_true(json_value(forward, "complete", 0) == 1);
+    json_free(forward);
+    json_free(reverse);
+    assert_int_equal(access("g/red.reflectance.value.npy", R_OK), 0);
+    reverse = json_read("g/gradient.json");
+    assert_true(json_value(reverse, "value", NAN) == b);
+    json_free(reverse);
+    // A gradient file is a tangent: |g|^2 along itself, which the forward mode must give too.
+    expect(f, 0, "grad %s --param red.reflectance.value:file=g/red.reflectance.value.npy --spp 64");
+    assert_true(strtod(f->out + strlen("value "), NULL) > 0);
+    // An adjoint picture: the mean of I dI, from the rendered picture itself.
+    expect(f, 0, "render %s -o a.exr --spp 16");
+    expect(f, 0, "grad %s --param red.reflectance.value --spp 16 --mode reverse --adjoint a.exr");
+    expect(f, 0, "grad %s --param red.reflectance.value --spp 16 -o d.png");
+    assert_non_null(strstr(f->words, "blue"));
+}
+
+static void incomplete_gradients_are_refused(void **state) {
+    Fixture *f = *state;
+    expect(f, 1, "grad %s --param camera.to_world:translate=1,0,0 --spp 16");
+    assert_non_null(strstr(f->words, "primary"));
+    JsonNode *node = run_json(f, 0, "grad %s --param camera.to_world:translate=1,0,0 --spp 16 --terms interior --json");
+    assert_true(json_value(node, "complete", 1) == 0);
+    json_free(node);
+}
+
+static void checks_pass_on_right_gradients(void **state) {
+    Fixture *f = *state;
+    JsonNode *node =
+        run_json(f, 0, "check %s --param red.reflectance.value --param lamp.emitter.radiance.value --spp 256 --json");
+    assert_true(json_value(node, "passed", 0) == 1);
+    json_free(node);
+    // the interior term alone is wrong where silhouettes move
+    expect(f, 1, "check %s --param camera.to_world:translate=1,0,0 --terms interior --spp 64");
+    assert_non_null(strstr(f->out, "WRONG"));
+}
+
+static void descriptions(void **state) {
+    Fixture *f = *state;
+    JsonNode *node = run_json(f, 0, "params %s --json");
+    const JsonNode *list = json_get(node, "parameters"), *red = NULL;
+    for (const JsonNode *p = list->first; p; p = p->next) {
+        red = !strcmp(json_text(p, "name", ""), "red.reflectance.value") ? p : red;
+    }
+    assert_non_null(red);
+    assert_true(fabs(json_get(red, "value")->first->number - 0.6) < 1e-6);
+    assert_string_equal(json_get(red, "terms")->first->text, "interior");
+    json_free(node);
+    expect(f, 0, "params %s");
+    assert_non_null(strstr(f->out, "metal.alpha.value"));
+    node = run_json(f, 0, "info %s --json");
+    assert_true(json_value(node, "shapes", 0) == 4);
+    assert_string_equal(json_text(node, "integrator", ""), "path");
+    json_free(node);
+    expect(f, 0, "info %s");
+    node = run_json(f, 0, "doctor --json");
+    assert_true(json_value(node, "passed", 0) == 1);
+    json_free(node);
+    expect(f, 0, "doctor");
+}
+
+static void interruption_exits_with_130(void **state) {
+    (void)state;
+    char command[4096];
+    snprintf(command, sizeof command,
+             "timeout --preserve-status -s INT 2 '%s' render '%s' -o slow.exr --spp 10000000 2>words.txt",
+             REYNOLDS_COMMAND, TEST_SCENE);
+    int status = system(command);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 130);
+    assert_int_not_equal(access("slow.exr", R_OK), 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(usage_errors_exit_with_two),     cmocka_unit_test(help_and_version),
+        cmocka_unit_test(failures_exit_with_one),         cmocka_unit_test(rendering),
+        cmocka_unit_test(forward_and_reverse_agree),      cmocka_unit_test(incomplete_gradients_are_refused),
+        cmocka_unit_test(checks_pass_on_right_gradients), cmocka_unit_test(descriptions),
+        cmocka_unit_test(interruption_exits_with_130),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
