@@ -18,6 +18,7 @@ typedef struct ObjReader {
     Array pools[POOLS]; // v, vt, vn in order: 3, 2 and 3 floats
     Array keys;         // Triple: 1-based indices into the pools, 0 = absent; one per render vertex
     TripleTable table;  // from keys to render vertices
+    Array recent;       // uint32_t per v: 1 + the render vertex that used it last, which mostly is the next one too
     Array faces;        // 3 uint32_t
     int64_t largest[POOLS], largest_line[POOLS]; // indices may point forward: checked at the end
 } ObjReader;
@@ -144,8 +145,20 @@ static rey_result read_corner(ObjReader *r, Triple *key) {
                     (long long)r->line, shown_length(r), r->at);
 }
 
+static bool same_triple(const Triple *a, const Triple *b) {
+    return a->word[0] == b->word[0] && a->word[1] == b->word[1] && a->word[2] == b->word[2];
+}
+
 static rey_result find_vertex(ObjReader *r, const Triple *key, uint32_t *vertex) {
-    size_t count = r->keys.count;
+    size_t count = r->keys.count, known = r->recent.count, positions = r->pools[POSITION].count;
+    if (known < positions && !rey_array_push(r->ctx, &r->recent, sizeof(uint32_t), positions - known)) {
+        return REY_ERROR_MEMORY;
+    }
+    uint32_t *recent = key->word[0] <= positions ? &ARRAY_AT(r->recent, uint32_t, key->word[0] - 1) : NULL;
+    if (recent && *recent && same_triple(&ARRAY_AT(r->keys, Triple, *recent - 1), key)) {
+        *vertex = *recent - 1;
+        return REY_OK;
+    }
     if (!triple_reserve(r->ctx, &r->table, r->keys.data, count)) {
         return REY_ERROR_MEMORY;
     }
@@ -163,6 +176,9 @@ static rey_result find_vertex(ObjReader *r, const Triple *key, uint32_t *vertex)
         *slot = (uint32_t)(count + 1);
     }
     *vertex = *slot - 1;
+    if (recent) {
+        *recent = *slot;
+    }
     return REY_OK;
 }
 
@@ -303,6 +319,7 @@ rey_result rey_mesh_read_obj_memory(rey_context *ctx, const char *name, const vo
         rey_array_free(ctx, &r.pools[pool]);
     }
     rey_array_free(ctx, &r.keys);
+    rey_array_free(ctx, &r.recent);
     rey_array_free(ctx, &r.faces);
     if (result != REY_OK) {
         rey_mesh_free(ctx, out);

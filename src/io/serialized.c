@@ -57,14 +57,17 @@ static rey_result read_bytes(SerializedReader *r, void *to, size_t size, const c
             feed(r);
         }
         int status = inflate(&r->stream, Z_NO_FLUSH);
+        if (r->stream.avail_out == 0) {
+            break; // all there: a wrong checksum, if next, is for check_end to report
+        }
         if (status == Z_MEM_ERROR) {
             return REY_ERROR_MEMORY;
         }
-        if (status == Z_STREAM_END && r->stream.avail_out) {
+        if (status == Z_STREAM_END) {
             return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the compressed data end early, expected %s",
                             r->name, offset(r), what);
         }
-        if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
+        if (status != Z_OK && status != Z_BUF_ERROR) {
             return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the compressed data are damaged (%s), expected %s",
                             r->name, offset(r), r->stream.msg ? r->stream.msg : "no zlib stream", what);
         }
