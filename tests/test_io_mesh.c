@@ -78,7 +78,8 @@ static void test_obj_corners_become_vertices(void **state) {
     rey_context *ctx = *state;
     rey_mesh mesh;
     assert_ok(ctx, rey_mesh_read_obj(ctx, MESHES "house.obj", true, &mesh));
-    static const float positions[] = {-1, 0, 0, 1, 0, 0, 1, 2, 0, -1, 2, 0, 1, 2, 0, 0, 3, 0, -1, 0, 0, 1, 2, 0, -1, 2, 0};
+    static const float positions[] = {-1, 0, 0, 1, 0,  0, 1, 2, 0, -1, 2,  0, 1, 2,
+                                      0,  0, 3, 0, -1, 0, 0, 1, 2, 0,  -1, 2, 0};
     static const float uvs[] = {0, 0.75f, 1, 0.75f, 1, 0, 0, 0, 0, 0, 0.5f, -0.5f, 0, 0, 0, 0, 0, 0};
     static const uint32_t faces[] = {0, 1, 2, 0, 2, 3, 0, 1, 4, 0, 4, 5, 0, 5, 3, 6, 7, 8};
     static const uint32_t welded[] = {0, 1, 2, 3, 2, 5, 0, 2, 3};
@@ -126,8 +127,10 @@ static void check_all_ply(const rey_mesh *mesh) {
         int channels, count;
         const float *data;
     } attributes[] = {
-        {"vertex_heat", false, 1, 5, heat}, {"vertex_tint", false, 3, 15, tint},
-        {"face_color", true, 3, 12, color}, {"face_rank", true, 1, 4, rank},
+        {"vertex_heat", false, 1, 5, heat},
+        {"vertex_tint", false, 3, 15, tint},
+        {"face_color", true, 3, 12, color},
+        {"face_rank", true, 1, 4, rank},
     };
     assert_int_equal(mesh->vertex_count, 5);
     assert_int_equal(mesh->face_count, 4);
@@ -189,7 +192,7 @@ static void test_serialized_versions_agree(void **state) {
     rey_mesh_free(ctx, &squares[1]);
 }
 
-// ---- writing ---------------------------------------------------------------------------------------------------------
+// ---- writing -------------------------------------------------------------------------------------------------------
 
 static rey_result read_any(rey_context *ctx, const char *path, int shape_index, rey_mesh *out) {
     const char *extension = strrchr(path, '.');
@@ -263,7 +266,7 @@ static void test_write_failures(void **state) {
     rey_mesh_free(ctx, &mesh);
 }
 
-// ---- normals ---------------------------------------------------------------------------------------------------------
+// ---- normals -------------------------------------------------------------------------------------------------------
 
 // Weighting by angle makes a cube's corner normals diagonals however its faces are split, and welding keeps them whole
 // though every face has its own vertices.
@@ -306,7 +309,7 @@ static void test_degenerate_normals(void **state) {
     assert_true(fabs(angles[2] - M_PI / 6) < 1e-6);
 }
 
-// ---- numbers ---------------------------------------------------------------------------------------------------------
+// ---- numbers -------------------------------------------------------------------------------------------------------
 
 static void check_number(const char *text) {
     float value = -1, expected = strtof(text, NULL);
@@ -318,12 +321,36 @@ static void check_number(const char *text) {
 
 static void test_numbers_round_like_the_c_library(void **state) {
     UNUSED(state);
-    static const char *const texts[] = {
-        "0", "-0", "+1", "1.", ".5", "-.5e+3", "1e5", "1E-5", "3.4028235e38", "3.4028236e38", "1e39", "-1e400",
-        "1.17549435e-38", "1e-45", "7e-46", "1e-400", "0e999999999999", "16777217", "16777217.0000000000000000000001",
-        "16777216.9999999999999999999999", "0.000000000000000000000000000000000000000000001", "00000000000000000000001",
-        "123456789012345678901234567890", "9007199791611905", "9007199791611904", "8589973000.00000000000000000001",
-        "1.000000059604644775390625", "100000000000000000000000000000000000000000000000000000000000e-59", "inf", "-inf"};
+    static const char *const texts[] = {"0",
+                                        "-0",
+                                        "+1",
+                                        "1.",
+                                        ".5",
+                                        "-.5e+3",
+                                        "1e5",
+                                        "1E-5",
+                                        "3.4028235e38",
+                                        "3.4028236e38",
+                                        "1e39",
+                                        "-1e400",
+                                        "1.17549435e-38",
+                                        "1e-45",
+                                        "7e-46",
+                                        "1e-400",
+                                        "0e999999999999",
+                                        "16777217",
+                                        "16777217.0000000000000000000001",
+                                        "16777216.9999999999999999999999",
+                                        "0.000000000000000000000000000000000000000000001",
+                                        "00000000000000000000001",
+                                        "123456789012345678901234567890",
+                                        "9007199791611905",
+                                        "9007199791611904",
+                                        "8589973000.00000000000000000001",
+                                        "1.000000059604644775390625",
+                                        "100000000000000000000000000000000000000000000000000000000000e-59",
+                                        "inf",
+                                        "-inf"};
     for (int i = 0; i < COUNT_OF(texts); i++) {
         check_number(texts[i]);
     }
@@ -361,7 +388,7 @@ static void test_numbers_round_like_the_c_library(void **state) {
     assert_ptr_equal(rey_parse_float("12345", text, &value), NULL);
 }
 
-// ---- meshes made by others -------------------------------------------------------------------------------------------
+// ---- meshes made by others -----------------------------------------------------------------------------------------
 
 static void conformance_folder(char *path, size_t size) {
     const char *given = getenv("REYNOLDS_CONFORMANCE_DIR");

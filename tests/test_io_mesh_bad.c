@@ -3,6 +3,7 @@
 #include "io/file.h"
 #include "io/mesh.h"
 
+#include <dirent.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,7 @@
 
 #define MESHES TEST_DATA_DIR "/meshes/"
 
-static const char *const data_names[] = {"house.obj",  "plain.obj",         "all_ascii.ply",    "all_little.ply",
+static const char *const data_names[] = {"house.obj",   "plain.obj",         "all_ascii.ply",    "all_little.ply",
                                          "all_big.ply", "two_v3.serialized", "two_v4.serialized"};
 
 // An allocator that counts what is held and fails after a number of allocations.
@@ -166,31 +167,38 @@ static void test_bad_ply(void **state) {
         {"a.ply", PLY "surprise\n", "a.ply:3: unknown header line 'surprise'"},
         {"a.ply", PLY "element vertex 3\n" XYZ "end_header\n", "a.ply:8: the header has no element face"},
         {"a.ply", PLY "element face 3\n" LIST "end_header\n", "a.ply:6: the header has no element vertex"},
-        {"a.ply", PLY "element vertex 3\n" XYZ "element face 0\n" LIST "end_header\n", "a.ply:10: the mesh has no faces"},
-        {"a.ply", PLY "element vertex 0\n" XYZ "element face 1\n" LIST "end_header\n", "a.ply:10: the mesh has no vert"},
+        {"a.ply", PLY "element vertex 3\n" XYZ "element face 0\n" LIST "end_header\n",
+         "a.ply:10: the mesh has no faces"},
+        {"a.ply", PLY "element vertex 0\n" XYZ "element face 1\n" LIST "end_header\n",
+         "a.ply:10: the mesh has no vert"},
         {"a.ply", PLY "element vertex 3000000000\n" XYZ "element face 1\n" LIST "end_header\n0 0 0 0",
          "a.ply:10: element 'vertex' has 3000000000 items of at least 6 bytes, but only 7 bytes are left"},
         {"a.ply", PLY "element vertex 1\n" XYZ "element face 999999999999999999\n" LIST "end_header\n0 0 0 0",
          "a.ply:10: element 'face' has 999999999999999999 items"},
-        {"a.ply", PLY "element vertex 1\nproperty float x\nproperty float y\nelement face 1\n" LIST "end_header\n0 0 3 0",
+        {"a.ply",
+         PLY "element vertex 1\nproperty float x\nproperty float y\nelement face 1\n" LIST "end_header\n0 0 3 0",
          "a.ply:9: element vertex has no coordinates"},
-        {"a.ply", PLY "element vertex 1\n" XYZ "element face 1\nproperty list uchar float vertex_index\nend_header\n"
-                      "0 0 0 3 0 0 0\n",
+        {"a.ply",
+         PLY "element vertex 1\n" XYZ "element face 1\nproperty list uchar float vertex_index\nend_header\n"
+             "0 0 0 3 0 0 0\n",
          "a.ply:10: element face has no indices"},
         {"a.ply", PLY "element vertex 1\n" XYZ "element face 1\nproperty int vertex_index\nend_header\n0 0 0 3",
          "a.ply:10: element face has no indices"},
-        {"a.ply", PLY "element vertex 1\n" XYZ "property float a_x\nproperty float b_x\nproperty float a_0\n"
-                      "element face 1\n" LIST "end_header\n0 0 0 1 1 1 3 0 0 0\n",
+        {"a.ply",
+         PLY "element vertex 1\n" XYZ "property float a_x\nproperty float b_x\nproperty float a_0\n"
+             "element face 1\n" LIST "end_header\n0 0 0 1 1 1 3 0 0 0\n",
          "a.ply:13: attribute 'vertex_a' appears twice"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 nan 0\n3 0 1 2\n", "a.ply:12: vertex 2: property y is nan, expected a finite"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 1e60\n3 0 1 2\n", "a.ply:12: vertex 2: property z is inf"},
         {"a.ply", SMALL "0 0 0\n0 zero 0\n0 0 0\n3 0 1 2\n", "a.ply:11: 'zero', expected a number"},
-        {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n3 0 1 3\n", "a.ply:13: face 0: vertex index 3 is out of range, expected 0 to 2"},
+        {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n3 0 1 3\n",
+         "a.ply:13: face 0: vertex index 3 is out of range, expected 0 to 2"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n3 0 1 -1\n", "a.ply:13: face 0: vertex index -1 is out of range"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n3 0 1 1.5\n", "a.ply:13: '1.5', expected an integer"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n2 0 1 1\n", "a.ply:13: face 0 has 2 corners, expected at least 3"},
         {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n4 0 1 2\n", "a.ply:14: the file ends inside its data"},
-        {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n2000000000 0 1 1\n", "a.ply:13: a list of 2000000000 values does not fit"},
+        {"a.ply", SMALL "0 0 0\n0 0 0\n0 0 0\n2000000000 0 1 1\n",
+         "a.ply:13: a list of 2000000000 values does not fit"},
     };
     check_cases(cases, COUNT_OF(cases));
 }
@@ -305,7 +313,7 @@ static void test_truncated(void **state) {
                 assert_empty(&mesh);
             }
             assert_int_equal(allocations.held, 2); // the context and the bytes
-            if (serialized && length < size) { // the second shape needs the list at the end
+            if (serialized && length < size) {     // the second shape needs the list at the end
                 result = rey_mesh_read_serialized_memory(ctx, data_names[i], bytes, length, 1, &mesh);
                 assert_int_equal(result, REY_ERROR_FORMAT);
             }
@@ -346,6 +354,44 @@ static void test_damaged(void **state) {
         rey_free(ctx, bytes);
         rey_context_destroy(ctx);
     }
+}
+
+// What the fuzzers found worth keeping: accepted or refused, but never more.
+static void check_corpus(const char *extension) {
+    Allocations allocations;
+    rey_context *ctx = create_context(&allocations);
+    char folder[1024], name[32];
+    snprintf(folder, sizeof folder, "%scorpus/%s", MESHES, extension);
+    snprintf(name, sizeof name, "a.%s", extension);
+    DIR *listing = opendir(folder);
+    assert_non_null(listing);
+    int found = 0;
+    for (struct dirent *entry; (entry = readdir(listing));) {
+        if (entry->d_name[0] != '.') {
+            char file[1400];
+            snprintf(file, sizeof file, "corpus/%s/%s", extension, entry->d_name);
+            size_t size;
+            unsigned char *bytes = load_data(ctx, file, &size);
+            rey_mesh mesh;
+            if (read_copy(ctx, name, bytes, size, &mesh) == REY_OK) {
+                assert_consistent(&mesh);
+                rey_mesh_free(ctx, &mesh);
+            }
+            rey_free(ctx, bytes);
+            assert_int_equal(allocations.held, 1);
+            found++;
+        }
+    }
+    closedir(listing);
+    assert_true(found >= 50);
+    rey_context_destroy(ctx);
+}
+
+static void test_corpus(void **state) {
+    UNUSED(state);
+    check_corpus("obj");
+    check_corpus("ply");
+    check_corpus("serialized");
 }
 
 // Reading, normals and writing with the first, second, ... allocation failing, until one run needs no more.
@@ -409,6 +455,7 @@ int main(void) {
         cmocka_unit_test(test_serialized_contents),
         cmocka_unit_test(test_truncated),
         cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_corpus),
         cmocka_unit_test(test_failing_allocations),
         cmocka_unit_test(test_unreadable_files),
     };

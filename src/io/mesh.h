@@ -33,7 +33,7 @@ typedef struct rey_mesh {
 // Frees all arrays and empties the mesh. An empty (zeroed) mesh is valid.
 void rey_mesh_free(rey_context *ctx, rey_mesh *mesh);
 
-// ---- readers: the _memory forms read size bytes; name is the path that messages give ---------------------------------
+// ---- readers: the _memory forms read size bytes; name is the path that messages give -------------------------------
 
 // OBJ: v, vt, vn and f; everything else is ignored. Polygons are split into fans from their first corner; indices may
 // be negative (relative) or point forward. Vertices are the distinct (v, vt, vn) triples in order of first use. Corners
@@ -55,16 +55,17 @@ rey_result rey_mesh_read_serialized(rey_context *ctx, const char *path, int shap
 rey_result rey_mesh_read_serialized_memory(rey_context *ctx, const char *name, const void *bytes, size_t size,
                                            int shape_index, rey_mesh *out);
 
-// ---- writer ----------------------------------------------------------------------------------------------------------
+// ---- writer --------------------------------------------------------------------------------------------------------
 
 // Binary little endian PLY with everything but position_index (recomputed on reading) and had_face_normals; reading it
-// back gives the same bits. The file appears complete or not at all. Attribute names need their vertex_ or face_ prefix.
+// back gives the same bits. The file appears complete or not at all. Attribute names need their vertex_ or face_
+// prefix.
 rey_result rey_mesh_write_ply(rey_context *ctx, const char *path, const rey_mesh *mesh);
 
-// ---- normals ---------------------------------------------------------------------------------------------------------
+// ---- normals -------------------------------------------------------------------------------------------------------
 
-// Replaces the normals by smooth ones: the unit sum of the unit normals of the faces at a position, each weighted by its
-// angle there [thurmer1998]. Degenerate faces add nothing; a vertex where the sum is zero gets (0,0,1).
+// Replaces the normals by smooth ones: the unit sum of the unit normals of the faces at a position, each weighted by
+// its angle there [thurmer1998]. Degenerate faces add nothing; a vertex where the sum is zero gets (0,0,1).
 rey_result rey_mesh_compute_normals(rey_context *ctx, rey_mesh *mesh);
 
 // The parts of that computation, for code that keeps its own positions or needs the intermediate sums.
@@ -76,7 +77,7 @@ void rey_mesh_normal_sums(const rey_mesh *mesh, const float *positions, double *
 // normals[3 v ..] = unit(sums[3 position_index[v] ..]), or (0,0,1) where the sum is zero.
 void rey_mesh_normals_from_sums(const rey_mesh *mesh, const double *sums, float *normals);
 
-// ---- for readers and other makers of meshes --------------------------------------------------------------------------
+// ---- for readers and other makers of meshes ------------------------------------------------------------------------
 
 // Adds a zeroed attribute for the current vertex_count or face_count; null (and a recorded message) on failure.
 float *rey_mesh_add_attribute(rey_context *ctx, rey_mesh *mesh, const char *name, bool per_face, int channels);

@@ -261,7 +261,8 @@ static float *gather(const ObjReader *r, int pool) {
     for (size_t i = 0; values && i < r->keys.count; i++) {
         uint32_t index = ARRAY_AT(r->keys, Triple, i).word[pool];
         if (index) {
-            memcpy(values + width * i, (const float *)r->pools[pool].data + width * (index - 1), width * sizeof *values);
+            memcpy(values + width * i, (const float *)r->pools[pool].data + width * (index - 1),
+                   width * sizeof *values);
         }
     }
     return values;
@@ -307,8 +308,8 @@ rey_result rey_mesh_read_obj_memory(rey_context *ctx, const char *name, const vo
                                     bool flip_tex_coords, rey_mesh *out) {
     *out = (rey_mesh){0};
     const char *text = size ? bytes : "";
-    ObjReader r = {.ctx = ctx, .name = name, .at = text, .end = text + size, .line = 1,
-                   .flip_tex_coords = flip_tex_coords};
+    ObjReader r = {
+        .ctx = ctx, .name = name, .at = text, .end = text + size, .line = 1, .flip_tex_coords = flip_tex_coords};
     rey_result result = read_statements(&r);
     if (result == REY_OK) {
         triple_free(ctx, &r.table);

@@ -9,13 +9,13 @@
 
 typedef struct PlyMesh { // what is under construction
     rey_mesh *mesh;
-    int64_t face_records;  // triangles and polygons
-    PlyProperty *corners;  // the list of vertex indices
-    rey_mesh *per_record;  // holds the face attributes, one item per record
-    Array faces, owners;   // 3 uint32_t per triangle; its record (uint32_t), kept if there are face attributes
+    int64_t face_records; // triangles and polygons
+    PlyProperty *corners; // the list of vertex indices
+    rey_mesh *per_record; // holds the face attributes, one item per record
+    Array faces, owners;  // 3 uint32_t per triangle; its record (uint32_t), kept if there are face attributes
 } PlyMesh;
 
-// ---- which property goes where ---------------------------------------------------------------------------------------
+// ---- which property goes where -------------------------------------------------------------------------------------
 
 static PlyElement *find_element(PlyReader *r, const char *name) {
     for (int i = 0; i < r->element_count; i++) {
@@ -206,7 +206,7 @@ static rey_result check_counts(PlyReader *r, const PlyElement *vertices, const P
     return REY_OK;
 }
 
-// ---- data ------------------------------------------------------------------------------------------------------------
+// ---- data ----------------------------------------------------------------------------------------------------------
 
 static rey_result add_triangle(PlyReader *r, PlyMesh *m, const uint32_t corners[3], int64_t record) {
     if (m->faces.count >= MESH_MOST_ITEMS) {
@@ -231,7 +231,8 @@ static rey_result read_corners(PlyReader *r, PlyMesh *m, int64_t record) {
     int64_t count;
     rey_result result = rey_ply_read_length(r, m->corners, &count);
     if (result == REY_OK && count < 3) {
-        result = rey_ply_fail(r, "face %lld has %lld corners, expected at least 3", (long long)record, (long long)count);
+        result =
+            rey_ply_fail(r, "face %lld has %lld corners, expected at least 3", (long long)record, (long long)count);
     }
     uint32_t corners[3] = {0}; // the first, the one before and the current
     for (int64_t i = 0; result == REY_OK && i < count; i++) {
@@ -241,8 +242,8 @@ static rey_result read_corners(PlyReader *r, PlyMesh *m, int64_t record) {
             break;
         }
         if (index < 0 || index >= m->mesh->vertex_count) {
-            return rey_ply_fail(r, "face %lld: vertex index %lld is out of range, expected 0 to %lld", (long long)record,
-                                (long long)index, (long long)m->mesh->vertex_count - 1);
+            return rey_ply_fail(r, "face %lld: vertex index %lld is out of range, expected 0 to %lld",
+                                (long long)record, (long long)index, (long long)m->mesh->vertex_count - 1);
         }
         corners[1] = corners[2];
         corners[2] = (uint32_t)index;

@@ -4,7 +4,15 @@
 #include "io/mesh.h"
 
 typedef enum PlyType {
-    PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64, PLY_TYPE_COUNT
+    PLY_INT8,
+    PLY_UINT8,
+    PLY_INT16,
+    PLY_UINT16,
+    PLY_INT32,
+    PLY_UINT32,
+    PLY_FLOAT32,
+    PLY_FLOAT64,
+    PLY_TYPE_COUNT
 } PlyType;
 
 typedef enum PlyEncoding { PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN } PlyEncoding;
@@ -54,7 +62,7 @@ rey_result rey_ply_fail(PlyReader *r, const char *format, ...) PRINTF_LIKE(2, 3)
 int rey_ply_type_size(PlyType type); // [bytes]
 bool rey_ply_word_is(PlyWord word, const char *text);
 
-// ---- values, in the file's encoding: each checks the end of the file and moves on ------------------------------------
+// ---- values, in the file's encoding: each checks the end of the file and moves on ----------------------------------
 
 rey_result rey_ply_read_int(PlyReader *r, PlyType type, int64_t *value);
 rey_result rey_ply_read_float(PlyReader *r, PlyType type, float *value); // may be infinite or not a number

@@ -11,9 +11,9 @@ typedef struct PlyTypeRow {
 } PlyTypeRow;
 
 static const PlyTypeRow type_rows[] = {
-    [PLY_INT8] = {{"char", "int8"}, 1},       [PLY_UINT8] = {{"uchar", "uint8"}, 1},
-    [PLY_INT16] = {{"short", "int16"}, 2},    [PLY_UINT16] = {{"ushort", "uint16"}, 2},
-    [PLY_INT32] = {{"int", "int32"}, 4},      [PLY_UINT32] = {{"uint", "uint32"}, 4},
+    [PLY_INT8] = {{"char", "int8"}, 1},        [PLY_UINT8] = {{"uchar", "uint8"}, 1},
+    [PLY_INT16] = {{"short", "int16"}, 2},     [PLY_UINT16] = {{"ushort", "uint16"}, 2},
+    [PLY_INT32] = {{"int", "int32"}, 4},       [PLY_UINT32] = {{"uint", "uint32"}, 4},
     [PLY_FLOAT32] = {{"float", "float32"}, 4}, [PLY_FLOAT64] = {{"double", "float64"}, 8},
 };
 
@@ -73,7 +73,8 @@ static rey_result read_type(PlyReader *r, PlyType *type) {
             return REY_OK;
         }
     }
-    return rey_ply_fail(r, "unknown property type '%.*s', expected char, uchar, short, ushort, int, uint, float or double",
+    return rey_ply_fail(r,
+                        "unknown property type '%.*s', expected char, uchar, short, ushort, int, uint, float or double",
                         shown(word), word.text);
 }
 
@@ -95,7 +96,8 @@ static rey_result read_element(PlyReader *r) {
     PlyWord count = next_word(r);
     const char *end = count.text + count.length;
     if (!element.name.length || rey_parse_int(count.text, end, &element.count) != end || element.count < 0) {
-        return rey_ply_fail(r, "'%.*s' is not an element count, expected 'element NAME COUNT'", shown(count), count.text);
+        return rey_ply_fail(r, "'%.*s' is not an element count, expected 'element NAME COUNT'", shown(count),
+                            count.text);
     }
     for (int i = 0; i < r->element_count; i++) {
         PlyWord other = r->elements[i].name;
@@ -168,8 +170,10 @@ rey_result rey_ply_read_header(PlyReader *r) {
         } else if (rey_ply_word_is(word, "property")) {
             result = read_property(r);
         } else if (word.length && !rey_ply_word_is(word, "comment") && !rey_ply_word_is(word, "obj_info")) {
-            result = rey_ply_fail(r, "unknown header line '%.*s', expected format, comment, obj_info, element, property "
-                                     "or end_header", shown(word), word.text);
+            result = rey_ply_fail(r,
+                                  "unknown header line '%.*s', expected format, comment, obj_info, element, property "
+                                  "or end_header",
+                                  shown(word), word.text);
         }
         if (result != REY_OK) {
             return result;

@@ -60,10 +60,18 @@ rey_result rey_ply_read_int(PlyReader *r, PlyType type, int64_t *value) {
     }
     uint64_t bits = load(r, size);
     switch (type) {
-    case PLY_INT8: *value = (int8_t)bits; break;
-    case PLY_INT16: *value = (int16_t)bits; break;
-    case PLY_INT32: *value = (int32_t)bits; break;
-    default: *value = (int64_t)bits; break;
+    case PLY_INT8:
+        *value = (int8_t)bits;
+        break;
+    case PLY_INT16:
+        *value = (int16_t)bits;
+        break;
+    case PLY_INT32:
+        *value = (int32_t)bits;
+        break;
+    default:
+        *value = (int64_t)bits;
+        break;
     }
     r->at += size;
     return REY_OK;

@@ -1,11 +1,12 @@
 // serialized.c: Mitsuba's serialized meshes, versions 3 and 4. Little endian: uint16 0x041C, uint16 version, then one
 // zlib stream: uint32 flags, name (version 4), uint64 vertex and triangle counts, then tight arrays of positions,
-// normals, uv, colours and index triples. A file of several meshes ends with their offsets (uint64, in version 3 uint32)
-// and a uint32 count.
+// normals, uv, colours and index triples. A file of several meshes ends with their offsets (uint64, in version 3
+// uint32) and a uint32 count.
 #include "io/file.h"
 #include "io/mesh.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <zlib.h>
 
@@ -31,8 +32,20 @@ static uint64_t load(const unsigned char *bytes, int size) {
     return value;
 }
 
-static long long offset(const SerializedReader *r) {
-    return (long long)(r->at - (int64_t)r->stream.avail_in);
+// Where in the file the stream stands.
+static int64_t offset(const SerializedReader *r) {
+    return r->at - (int64_t)r->stream.avail_in;
+}
+
+static rey_result fail(SerializedReader *r, int64_t at, const char *format, ...) PRINTF_LIKE(3, 4);
+
+static rey_result fail(SerializedReader *r, int64_t at, const char *format, ...) {
+    char message[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: %s", r->name, (long long)at, message);
 }
 
 // Hands the stream its next piece of the file; zlib counts in 32 bits.
@@ -51,8 +64,7 @@ static rey_result read_bytes(SerializedReader *r, void *to, size_t size, const c
     while (r->stream.avail_out) {
         if (r->stream.avail_in == 0) {
             if (r->at == r->end) {
-                return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the file ends inside the compressed data, "
-                                "expected %s", r->name, offset(r), what);
+                return fail(r, offset(r), "the file ends inside the compressed data, expected %s", what);
             }
             feed(r);
         }
@@ -64,12 +76,11 @@ static rey_result read_bytes(SerializedReader *r, void *to, size_t size, const c
             return REY_ERROR_MEMORY;
         }
         if (status == Z_STREAM_END) {
-            return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the compressed data end early, expected %s",
-                            r->name, offset(r), what);
+            return fail(r, offset(r), "the compressed data end early, expected %s", what);
         }
         if (status != Z_OK && status != Z_BUF_ERROR) {
-            return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the compressed data are damaged (%s), expected %s",
-                            r->name, offset(r), r->stream.msg ? r->stream.msg : "no zlib stream", what);
+            return fail(r, offset(r), "the compressed data are damaged (%s), expected %s",
+                        r->stream.msg ? r->stream.msg : "no zlib stream", what);
         }
     }
     return REY_OK;
@@ -86,8 +97,8 @@ static rey_result check_end(SerializedReader *r) {
             return REY_OK;
         }
         if ((status != Z_OK && status != Z_BUF_ERROR) || (r->stream.avail_in == 0 && r->at == r->end)) {
-            return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the compressed data are damaged at their end (%s)",
-                            r->name, offset(r), r->stream.msg ? r->stream.msg : "checksum missing");
+            return fail(r, offset(r), "the compressed data are damaged at their end (%s)",
+                        r->stream.msg ? r->stream.msg : "checksum missing");
         }
         if (r->stream.avail_in == 0) {
             feed(r);
@@ -119,8 +130,7 @@ static rey_result read_floats(SerializedReader *r, int64_t count, int width, flo
             memcpy(&values[done], &low, sizeof low);
             values[done] = r->doubles ? (float)wide : values[done];
             if (!isfinite(values[done])) {
-                return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: %s of vertex %lld are not finite", r->name,
-                                offset(r), what, (long long)(done / width));
+                return fail(r, offset(r), "%s of vertex %lld are not finite", what, (long long)(done / width));
             }
         }
     }
@@ -138,9 +148,8 @@ static rey_result read_faces(SerializedReader *r, rey_mesh *mesh) {
         for (int64_t i = 0; i < piece; i++, done++) {
             uint64_t index = load(r->buffer + 4 * i, 4);
             if (index >= (uint64_t)mesh->vertex_count) {
-                return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: vertex index %llu of face %lld is out of "
-                                "range, expected 0 to %lld", r->name, offset(r), (unsigned long long)index,
-                                (long long)(done / 3), (long long)mesh->vertex_count - 1);
+                return fail(r, offset(r), "vertex index %llu of face %lld is out of range, expected 0 to %lld",
+                            (unsigned long long)index, (long long)(done / 3), (long long)mesh->vertex_count - 1);
             }
             mesh->faces[done] = (uint32_t)index;
         }
@@ -156,8 +165,7 @@ static rey_result read_name(SerializedReader *r) {
             return result;
         }
     }
-    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the mesh's name has no end, expected at most %d characters",
-                    r->name, offset(r), LONGEST_NAME);
+    return fail(r, offset(r), "the mesh's name has no end, expected at most %d characters", LONGEST_NAME);
 }
 
 // Counts, checked against what the rest of the file could hold: deflate shrinks at most 1032 times [zlib manual].
@@ -169,16 +177,15 @@ static rey_result read_counts(SerializedReader *r, uint64_t flags, rey_mesh *mes
         return result;
     }
     if (vertices == 0 || faces == 0) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the mesh has no %s", r->name, offset(r),
-                        faces ? "vertices" : "faces");
+        return fail(r, offset(r), "the mesh has no %s", faces ? "vertices" : "faces");
     }
-    uint64_t width = 3u + (flags & HAS_NORMALS ? 3u : 0u) + (flags & HAS_UVS ? 2u : 0u) + (flags & HAS_COLORS ? 3u : 0u);
+    uint64_t width =
+        3u + (flags & HAS_NORMALS ? 3u : 0u) + (flags & HAS_UVS ? 2u : 0u) + (flags & HAS_COLORS ? 3u : 0u);
     uint64_t left = (uint64_t)(r->end - offset(r));
     if (vertices > MESH_MOST_ITEMS || faces > MESH_MOST_ITEMS ||
         vertices * width * (r->doubles ? 8 : 4) + 12 * faces > 1032 * left + BUFFER_BYTES) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: %llu vertices and %llu triangles do not fit the %llu "
-                        "bytes left", r->name, offset(r), (unsigned long long)vertices, (unsigned long long)faces,
-                        (unsigned long long)left);
+        return fail(r, offset(r), "%llu vertices and %llu triangles do not fit the %llu bytes left",
+                    (unsigned long long)vertices, (unsigned long long)faces, (unsigned long long)left);
     }
     mesh->vertex_count = (int64_t)vertices;
     mesh->face_count = (int64_t)faces;
@@ -220,8 +227,7 @@ static rey_result read_stream(SerializedReader *r, int version, rey_mesh *mesh) 
         return result;
     }
     if (flags & FLOAT32 && flags & FLOAT64) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the flags 0x%llx ask for both float and double",
-                        r->name, offset(r), (unsigned long long)flags);
+        return fail(r, offset(r), "the flags 0x%llx ask for both float and double", (unsigned long long)flags);
     }
     r->doubles = flags & FLOAT64;
     mesh->had_face_normals = flags & FACE_NORMALS;
@@ -234,18 +240,18 @@ static rey_result read_stream(SerializedReader *r, int version, rey_mesh *mesh) 
 // Magic number and version of the mesh at r->at, which moves behind them.
 static rey_result read_header(SerializedReader *r, int *version) {
     if (r->end - r->at < HEADER_BYTES) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the file ends, expected a serialized mesh", r->name,
-                        (long long)r->at);
+        return fail(r, r->at, "the file ends, expected a serialized mesh");
     }
     uint64_t magic = load(r->bytes + r->at, 2);
     *version = (int)load(r->bytes + r->at + 2, 2);
     if (magic != MAGIC) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: not a serialized mesh: 0x%04llx, expected 0x%04x",
-                        r->name, (long long)r->at, (unsigned long long)magic, (unsigned)MAGIC);
+        return fail(r, r->at, "not a serialized mesh: 0x%04llx, expected 0x%04x", (unsigned long long)magic,
+                    (unsigned)MAGIC);
     }
     if (*version != 3 && *version != 4) {
-        return rey_fail(r->ctx, REY_ERROR_UNSUPPORTED, "%s: byte %lld: serialized version %d is not supported, expected "
-                        "3 or 4", r->name, (long long)r->at + 2, *version);
+        return rey_fail(r->ctx, REY_ERROR_UNSUPPORTED,
+                        "%s: byte %lld: serialized version %d is not supported, expected 3 or 4", r->name,
+                        (long long)r->at + 2, *version);
     }
     r->at += HEADER_BYTES;
     return REY_OK;
@@ -256,19 +262,17 @@ static rey_result find_shape(SerializedReader *r, int version, int shape_index) 
     int64_t width = version == 3 ? 4 : 8;
     int64_t count = r->size >= 4 ? (int64_t)load(r->bytes + r->size - 4, 4) : 0;
     if (shape_index >= count) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: the file has %lld meshes, expected more than the shape "
-                        "index %d", r->name, (long long)r->size - 4, (long long)count, shape_index);
+        return fail(r, r->size - 4, "the file has %lld meshes, expected more than the shape index %d", (long long)count,
+                    shape_index);
     }
     int64_t list = r->size - 4 - count * width;
     if (list < HEADER_BYTES) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: a list of %lld meshes does not fit the file", r->name,
-                        (long long)r->size - 4, (long long)count);
+        return fail(r, r->size - 4, "a list of %lld meshes does not fit the file", (long long)count);
     }
     uint64_t at = load(r->bytes + list + shape_index * width, (int)width);
     if (at >= (uint64_t)list) {
-        return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %lld: offset %llu of mesh %d is out of range, expected less "
-                        "than %lld", r->name, (long long)(list + shape_index * width), (unsigned long long)at,
-                        shape_index, (long long)list);
+        return fail(r, list + shape_index * width, "offset %llu of mesh %d is out of range, expected less than %lld",
+                    (unsigned long long)at, shape_index, (long long)list);
     }
     r->at = (int64_t)at;
     r->end = list;

@@ -1,4 +1,4 @@
-// fuzz_serialized.c: any bytes as a serialized file. Nothing may crash, leak or take long; what is accepted must be consistent.
+// fuzz_serialized.c: any bytes as a serialized file. Nothing may crash, leak or take long; what is accepted is checked.
 #include "base/context.h"
 #include "io/mesh.h"
 
