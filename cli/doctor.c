@@ -19,8 +19,8 @@
 
 #include <jpeglib.h> // needs stdio.h before it
 
-// A square that fills the view under a constant sky of radiance 1: every pixel is its reflectance, and the derivative
-// with respect to the reflectance is 1.
+// A square that fills the view under a constant sky of radiance 1: the mean of the pixels is its reflectance, and each
+// pixel is the reflectance times its derivative.
 static const char scene_text[] =
     "<scene version=\"3.0.0\">\n"
     "  <integrator type=\"path\"><integer name=\"max_depth\" value=\"2\"/></integrator>\n"
@@ -99,21 +99,13 @@ static void find_libraries(Library list[LIBRARIES]) {
     library_version(&list[6], "libyaml", yaml_get_version_string());
 }
 
-static double worst_deviation(const float *image, const double expected[3]) {
-    double worst = 0;
-    for (int i = 0; i < TEST_PIXELS * 3; i++) {
-        double e = fabs((double)image[i] - expected[i % 3]);
-        worst = e <= worst ? worst : e;
-    }
-    return worst;
-}
-
 // Renders the scene and its derivative; the sentence on what was found goes to test->verdict.
 static void test_pictures(WidthTest *test, rey_context *ctx, rey_scene *scene) {
-    static const double reflectance[3] = {0.25, 0.5, 0.75}, one[3] = {1, 1, 1};
+    static const double reflectance[3] = {0.25, 0.5, 0.75};
     const float tangent[3] = {1, 1, 1};
     float image[TEST_PIXELS * 3] = {0}, derivative[TEST_PIXELS * 3] = {0};
     rey_render_def def = rey_default_render_def();
+    def.sets = 1; // the derivative then uses the picture's samples
     int param = rey_param_find(scene, "wall.bsdf.reflectance.value");
     rey_result result = rey_render(scene, &def, image, NULL);
     if (!result && param >= 0) {
@@ -124,9 +116,16 @@ static void test_pictures(WidthTest *test, rey_context *ctx, rey_scene *scene) {
                  param < 0 ? "the test scene lost its parameter" : rey_error(ctx));
         return;
     }
-    double picture = worst_deviation(image, reflectance), slope = worst_deviation(derivative, one);
-    test->passed = picture < 1e-3 && slope < 1e-3;
-    snprintf(test->verdict, sizeof test->verdict, "picture off by %.1e, derivative by %.1e", picture, slope);
+    double mean[3] = {0}, slope_error = 0;
+    for (int i = 0; i < TEST_PIXELS * 3; i++) {
+        mean[i % 3] += (double)image[i] / reflectance[i % 3] / TEST_PIXELS;
+        double e = fabs((double)image[i] - reflectance[i % 3] * (double)derivative[i]);
+        slope_error = e <= slope_error ? slope_error : e;
+    }
+    double picture_error = fmax(fabs(mean[0] - 1), fmax(fabs(mean[1] - 1), fabs(mean[2] - 1)));
+    test->passed = picture_error < 0.02 && slope_error < 1e-4;
+    snprintf(test->verdict, sizeof test->verdict, "picture off by %.2f %%, derivative by %.1e", 100 * picture_error,
+             slope_error);
 }
 
 static void test_width(WidthTest *test, const char *path, int threads) {

@@ -11,6 +11,7 @@ typedef struct Suite {
     const char *only;   // glob on case names, null = all
     int seeds;          // every case runs with seeds 0 to seeds - 1, and all of them must pass
     int scale;          // times the prescribed number of samples
+    int sampler;        // REY_SAMPLER_*; default: what each scene names
     bool quick;         // only cases of at most a few million samples
     rey_context *ctx;
     int passed, failed, skipped;

@@ -93,6 +93,7 @@ static int part_spp(const Run *r, const char *part) {
 
 static rey_render_def part_def(const Run *r, const char *part, int seed) {
     rey_render_def def = rey_default_render_def();
+    def.sampler = r->suite->sampler;
     def.spp = part_spp(r, part);
     def.seed = (uint32_t)json_value(r->config->spec, "seed", 0) + (uint32_t)seed;
     return def;

@@ -1,4 +1,5 @@
 // main.c: conformance [FOLDER] [--seeds N] [--scale N] [--only GLOB] [--quick] [-t N] [--lanes N]
+//             [--sampler sobol|independent]
 #include "conformance.h"
 
 #include "base/context.h"
@@ -61,7 +62,8 @@ float *suite_image(Suite *suite, int width, int height) {
 }
 
 static int usage(void) {
-    fprintf(stderr, "usage: conformance [FOLDER] [--seeds N] [--scale N] [--only GLOB] [--quick] [-t N] [--lanes N]\n");
+    fprintf(stderr, "usage: conformance [FOLDER] [--seeds N] [--scale N] [--only GLOB] [--quick] [-t N] [--lanes N]"
+                    " [--sampler sobol|independent]\n");
     return 2;
 }
 
@@ -80,6 +82,10 @@ static bool parse(int argc, char **argv, Suite *suite, rey_context_def *def) {
         }
         if (!strcmp(name, "--only")) {
             suite->only = value;
+        } else if (!strcmp(name, "--sampler") && !strcmp(value, "sobol")) {
+            suite->sampler = REY_SAMPLER_SOBOL;
+        } else if (!strcmp(name, "--sampler") && !strcmp(value, "independent")) {
+            suite->sampler = REY_SAMPLER_INDEPENDENT;
         } else if (!strcmp(name, "--seeds") && good) {
             suite->seeds = (int)number;
         } else if (!strcmp(name, "--scale") && good) {

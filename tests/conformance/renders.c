@@ -55,6 +55,7 @@ static Figures z_test(const Case *c, const float *image, const float *mean, cons
 static rey_result test_seed(Suite *suite, const Case *c, rey_scene *scene, int seed, float *image, const float *mean,
                             const float *variance, Figures *worst) {
     rey_render_def def = rey_default_render_def();
+    def.sampler = suite->sampler;
     def.spp = c->spp * suite->scale;
     def.seed = (uint32_t)seed;
     rey_result result = rey_render(scene, &def, image, NULL);
