@@ -133,7 +133,8 @@ void cli_terms_text(int terms, char *text, size_t size);
 
 // One joint direction in parameter space: a tangent vector over the selection of the parameters that it moves.
 typedef struct Direction {
-    int *params; // indices, none twice
+    int *params;  // indices, none twice
+    char **names; // of the parameters, as they were given first
     int count;
     int64_t *offsets; // count + 1 entries: where each parameter starts in tangent
     float *tangent;

@@ -224,22 +224,21 @@ static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info 
     return result;
 }
 
-static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spec, int *param) {
+// Index of the parameter that spec names. *name is a copy of the name, for the caller to free.
+static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spec, int *param, char **name) {
     size_t length = name_length(spec);
-    char *name = rey_alloc(ctx, length + 1);
-    if (!name) {
+    *name = rey_alloc(ctx, length + 1);
+    if (!*name) {
         return REY_ERROR_MEMORY;
     }
-    memcpy(name, spec, length);
-    rey_result result = REY_OK;
-    *param = rey_param_find(scene, name);
-    if (*param < 0) {
-        const char *nearest = rey_param_nearest(scene, name);
-        result = rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s'%s%s%s", name, nearest ? ", did you mean '" : "",
-                          nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
+    memcpy(*name, spec, length);
+    *param = rey_param_find(scene, *name);
+    if (*param >= 0) {
+        return REY_OK;
     }
-    rey_free(ctx, name);
-    return result;
+    const char *nearest = rey_param_nearest(scene, *name);
+    return rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s'%s%s%s", *name, nearest ? ", did you mean '" : "",
+                    nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
 }
 
 static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec, int param, float *tangent) {
@@ -266,30 +265,27 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
     }
 }
 
-// Collects the distinct parameters of specs and where each one starts in the joint tangent.
-static rey_result select_params(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
-                                int *spec_slots, Direction *d) {
-    for (int i = 0; i < spec_count; i++) {
-        int param;
-        rey_result result = find_param(ctx, scene, specs[i], &param);
-        if (result) {
-            return result;
-        }
-        int slot = 0;
-        while (slot < d->count && d->params[slot] != param) {
-            slot++;
-        }
-        if (slot == d->count) {
-            rey_param_info info;
-            result = rey_param_get_info(scene, param, &info);
-            if (result) {
-                return result;
-            }
-            d->params[d->count++] = param;
-            d->offsets[d->count] = d->offsets[slot] + info.count;
-        }
-        spec_slots[i] = slot;
+// Puts the parameter of one spec into the direction, unless it is there already; *slot is where it is.
+static rey_result select_param(rey_context *ctx, rey_scene *scene, const char *spec, int *slot, Direction *d) {
+    int param;
+    char *name;
+    rey_result result = find_param(ctx, scene, spec, &param, &name);
+    *slot = 0;
+    while (*slot < d->count && d->params[*slot] != param) {
+        ++*slot;
     }
+    rey_param_info info;
+    if (!result) {
+        result = rey_param_get_info(scene, param, &info);
+    }
+    if (result || *slot < d->count) {
+        rey_free(ctx, name);
+        return result;
+    }
+    d->params[d->count] = param;
+    d->names[d->count] = name;
+    d->count++;
+    d->offsets[d->count] = d->offsets[*slot] + info.count;
     return REY_OK;
 }
 
@@ -298,10 +294,12 @@ rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *c
     *direction = (Direction){0};
     int *slots = rey_alloc_array(ctx, (size_t)spec_count, sizeof *slots);
     direction->params = rey_alloc_array(ctx, (size_t)spec_count, sizeof *direction->params);
+    direction->names = rey_alloc_array(ctx, (size_t)spec_count, sizeof *direction->names);
     direction->offsets = rey_alloc_array(ctx, (size_t)spec_count + 1, sizeof *direction->offsets);
-    rey_result result = REY_ERROR_MEMORY;
-    if (slots && direction->params && direction->offsets) {
-        result = select_params(ctx, scene, specs, spec_count, slots, direction);
+    bool room = slots && direction->params && direction->names && direction->offsets;
+    rey_result result = room ? REY_OK : REY_ERROR_MEMORY;
+    for (int i = 0; i < spec_count && !result; i++) {
+        result = select_param(ctx, scene, specs[i], &slots[i], direction);
     }
     if (!result) {
         size_t size = (size_t)direction->offsets[direction->count];
@@ -320,6 +318,10 @@ rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *c
 }
 
 void cli_direction_free(rey_context *ctx, Direction *direction) {
+    for (int i = 0; i < direction->count; i++) {
+        rey_free(ctx, direction->names[i]);
+    }
+    rey_free(ctx, direction->names);
     rey_free(ctx, direction->params);
     rey_free(ctx, direction->offsets);
     rey_free(ctx, direction->tangent);

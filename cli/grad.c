@@ -54,9 +54,7 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     cli_json_terms(&json, "needed_terms", g->needed);
     json_array(&json, "parameters");
     for (int i = 0; i < g->direction.count; i++) {
-        rey_param_info info;
-        rey_param_get_info(g->session.scene, g->direction.params[i], &info);
-        json_string(&json, NULL, info.name);
+        json_string(&json, NULL, g->direction.names[i]);
     }
     json_array_end(&json);
     json_integer(&json, "width", g->session.width);
@@ -137,7 +135,7 @@ static rey_result write_gradient(Grad *g, const double *gradient) {
         for (int64_t i = 0; i < info.count; i++) {
             values[i] = (float)gradient[g->direction.offsets[k] + i];
         }
-        snprintf(path, sizeof path, "%s/%s.npy", folder, info.name);
+        snprintf(path, sizeof path, "%s/%s.npy", folder, g->direction.names[k]);
         for (char *c = path + strlen(folder) + 1; *c; c++) {
             *c = *c == '/' ? '_' : *c; // names are not paths
         }

@@ -15,8 +15,8 @@ enum { MAX_PARAMS = 16 };
 
 typedef struct Config {
     const JsonNode *spec;
-    char folder[4096];
-    char name[256];
+    char folder[4608];
+    char name[272];
     int width, height;
     bool gated;
     char specs[MAX_PARAMS][512]; // directions, NAME:OP
