@@ -57,7 +57,7 @@ static const OptionRow option_rows[] = {
     {OPTION_SPP, 0, "spp", "N", RENDERS, "samples per pixel (default: the scene's)"},
     {OPTION_SEED, 0, "seed", "N", RENDERS | FITS, "seed of the random numbers (default 0)"},
     {OPTION_SENSOR, 0, "sensor", "K", RENDERS, "which sensor, from 0"},
-    {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default: the scene's)"},
+    {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default sobol)"},
     {OPTION_DEFINE, 'D', NULL, "key=value", RENDERS | READS, "value of $key in the scene; may be repeated"},
     {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR,
      "worker threads (default: all that are allowed)"},
