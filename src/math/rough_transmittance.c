@@ -141,24 +141,36 @@ static Dual inner_panel(const Coat *coat, Dual outer, Dual low, Dual high, bool 
     return mul(sum, width);
 }
 
-// The inner integral over t > 0; critical: whether part of it transmits and part is in total reflection.
-static Dual inner(const Coat *coat, Dual outer, bool critical, bool total) {
-    Dual end = constant(coat->ggx ? 0.5 * PI_D : beckmann_end);
-    if (!critical) {
-        return inner_panel(coat, outer, constant(0), end, false, total);
+// t where (q / r at t = 0's r)^2 is y2: tan t or Y; at most the end of the domain.
+static Dual inner_coordinate(const Coat *coat, Dual y2, Dual end) {
+    if (y2.value <= 0) {
+        return constant(0);
     }
-    // wi . m = kappa = sqrt(1 - eta^2) where g^2 = kappa^2 (a2 + alpha^2 y^2), with y = tan t or Y, and, at t = 0,
-    // g = c r - alpha s p, a2 = alpha^2 p^2 + r^2.
+    Dual y = root(y2);
+    Dual t = coat->ggx ? chain(y, atan(y.value), 1 / (1 + y.value * y.value)) : y;
+    return t.value < end.value ? t : end;
+}
+
+// The inner integral over t > 0, at an outer coordinate at which the normal of t = 0 is beyond the critical angle (total)
+// or not. With y = tan t or Y, and, at t = 0, g = c r - alpha s p and a2 = alpha^2 p^2 + r^2:
+// wi . m = g / length, length^2 = a2 + alpha^2 y^2, which falls with y.
+static Dual inner(const Coat *coat, Dual outer, bool total) {
+    Dual end = constant(coat->ggx ? 0.5 * PI_D : beckmann_end), zero = constant(0);
     Dual p = coat->ggx ? sine(outer) : outer, r = coat->ggx ? cosine(outer) : constant(1);
-    Dual ap = mul(coat->alpha, p), kappa2 = sub(constant(1), square(coat->eta));
+    Dual ap = mul(coat->alpha, p), alpha2 = square(coat->alpha);
     Dual g = sub(scale(r, coat->c), scale(ap, coat->s)), a2 = add(square(ap), square(r));
-    Dual y = root(divide(sub(square(g), mul(kappa2, a2)), mul(kappa2, square(coat->alpha))));
-    Dual edge = y;
-    if (coat->ggx) {
-        edge = chain(y, atan(y.value), 1 / (1 + y.value * y.value));
+    if (!coat->transmit) {
+        // the mirror direction has height 2 (wi . m) m.z - c: positive where 2 g r > c length^2
+        Dual y2 = divide(sub(scale(mul(g, r), 2 / coat->c), a2), alpha2);
+        end = inner_coordinate(coat, y2, end);
     }
-    edge = clamp(edge, constant(0), end);
-    Dual through = inner_panel(coat, outer, constant(0), edge, true, false);
+    if (total || coat->eta.value >= 1) {
+        return inner_panel(coat, outer, zero, end, false, total);
+    }
+    // critical where wi . m = kappa = sqrt(1 - eta^2), g^2 = kappa^2 length^2
+    Dual kappa2 = sub(constant(1), square(coat->eta));
+    Dual edge = inner_coordinate(coat, divide(sub(square(g), mul(kappa2, a2)), mul(kappa2, alpha2)), end);
+    Dual through = inner_panel(coat, outer, zero, edge, true, false);
     if (edge.value >= end.value) {
         return through;
     }
@@ -166,11 +178,8 @@ static Dual inner(const Coat *coat, Dual outer, bool critical, bool total) {
 }
 
 // One panel of the outer integral.
-static Dual outer_panel(const Coat *coat, Dual low, Dual high, bool critical, bool total) {
+static Dual outer_panel(const Coat *coat, Dual low, Dual high, bool total) {
     Dual sum = constant(0), width = sub(high, low);
-    if (width.value <= 0) {
-        return sum;
-    }
     Dual c = cosine(coat->angle), s = sine(coat->angle);
     for (int i = 0; i < RULE; i++) {
         Dual o = add(low, scale(width, coat->node[i])), density;
@@ -180,37 +189,55 @@ static Dual outer_panel(const Coat *coat, Dual low, Dual high, bool critical, bo
             double e = exp(-o.value * o.value) * 2 / PI_D; // the inner integral runs over one half
             density = mul(chain(o, e, -2 * o.value * e), sub(c, mul(s, o)));
         }
-        sum = add(sum, scale(mul(density, inner(coat, o, critical, total)), coat->weight[i]));
+        sum = add(sum, scale(mul(density, inner(coat, o, total)), coat->weight[i]));
     }
     return mul(sum, width);
 }
 
-// The outer coordinate of the normal in the plane of incidence that is turned by beta from +z (away from wi if > 0).
-static Dual outer_coordinate(const Coat *coat, Dual beta) {
+// The outer coordinate, clamped to the domain, of the normal in the plane of incidence that is turned by beta from +z,
+// away from wi if negative.
+static Dual outer_coordinate(const Coat *coat, Dual beta, Dual low, Dual high) {
+    if (fabs(beta.value) > 0.5 * PI_D - 1e-9) {
+        return beta.value < 0 ? low : high;
+    }
     Dual slope = divide(divide(sine(beta), cosine(beta)), coat->alpha);
-    return coat->ggx ? chain(slope, atan(slope.value), 1 / (1 + slope.value * slope.value)) : slope;
+    return clamp(coat->ggx ? chain(slope, atan(slope.value), 1 / (1 + slope.value * slope.value)) : slope, low, high);
 }
 
+// The outer integral, in panels between the places where the integrand is not smooth. In the plane of incidence
+// wi . m = cos(beta + theta).
 static Dual outer(const Coat *coat, Dual low, Dual high) {
-    if (coat->eta.value >= 1) {
-        return outer_panel(coat, low, high, false, false);
-    }
-    // In the plane of incidence wi . m = cos(beta + theta): above the critical cosine between these two turns.
-    double kappa = sqrt(1 - coat->eta.value * coat->eta.value);
-    Dual critical = chain(coat->eta, acos(kappa), 1 / kappa);
     double theta = atan2(coat->s, coat->c);
-    Dual from = sub(scale(critical, -1), constant(theta)), to = sub(critical, constant(theta));
+    if (!coat->transmit) {
+        // mirror directions above the horizon: |2 beta + theta| < pi / 2
+        Dual from = outer_coordinate(coat, constant(-0.5 * (0.5 * PI_D + theta)), low, high);
+        high = outer_coordinate(coat, constant(0.5 * (0.5 * PI_D - theta)), low, high);
+        low = from;
+    }
     Dual first = low, last = high;
-    if (from.value > -0.5 * PI_D + 1e-9) {
-        first = clamp(outer_coordinate(coat, from), low, high);
+    if (coat->eta.value < 1) {
+        double kappa = sqrt(1 - coat->eta.value * coat->eta.value);
+        Dual critical = chain(coat->eta, acos(kappa), 1 / kappa);
+        first = outer_coordinate(coat, sub(scale(critical, -1), constant(theta)), low, high);
+        last = outer_coordinate(coat, sub(critical, constant(theta)), low, high);
     }
-    if (to.value <= -0.5 * PI_D + 1e-9) {
-        last = first;
-    } else if (to.value < 0.5 * PI_D - 1e-9) {
-        last = clamp(outer_coordinate(coat, to), first, high);
+    // the long tail of GGX, where the normal itself turns
+    Dual tail = coat->ggx && coat->alpha.value < 0.25 ? outer_coordinate(coat, constant(-0.4), low, high) : low;
+    Dual ends[5] = {low, tail, first, last, high};
+    if (tail.value > first.value) {
+        ends[1] = first;
+        ends[2] = tail.value < last.value ? tail : last;
+        ends[3] = tail.value < last.value ? last : tail;
     }
-    Dual sum = add(outer_panel(coat, low, first, false, true), outer_panel(coat, last, high, false, true));
-    return add(sum, outer_panel(coat, first, last, true, false));
+    Dual sum = constant(0);
+    for (int i = 0; i < 4; i++) {
+        if (ends[i + 1].value > ends[i].value) {
+            double middle = 0.5 * (ends[i].value + ends[i + 1].value);
+            bool total = middle < first.value || middle > last.value;
+            sum = add(sum, outer_panel(coat, ends[i], ends[i + 1], total));
+        }
+    }
+    return sum;
 }
 
 static Dual average(Coat *coat, double mu) {
