@@ -89,7 +89,7 @@ static void assert_empty(const rey_mesh *mesh) {
 }
 
 static unsigned char *load_data(rey_context *ctx, const char *name, size_t *size) {
-    char path[1024];
+    char path[4096];
     snprintf(path, sizeof path, "%s%s", MESHES, name);
     unsigned char *bytes;
     assert_int_equal(rey_file_read(ctx, path, &bytes, size), REY_OK);

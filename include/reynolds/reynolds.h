@@ -153,7 +153,8 @@ typedef struct rey_render_def {
     int spp;           /* samples per pixel, 0 (default) = the scene's own count */
     uint32_t seed;     /* default 0 */
     uint32_t set;      /* which independently scrambled sample set; same seed, other set = independent noise */
-    int sampler;       /* REY_SAMPLER_*; default: what the scene names */
+    int sampler;       /* REY_SAMPLER_*; default: Sobol. A scene's `independent` asks for any unbiased sampler, and
+                          scrambled Sobol points are that with less noise */
     int terms;         /* derivative terms to estimate, 0 (default) = all that the parameters need, else a refusal */
     int sets;          /* derivatives: spp is split over this many independent sets (default 16, at least 1) */
     bool (*progress)(void *user, double fraction); /* may be null; false cancels. Called from one thread at a time */

@@ -126,50 +126,74 @@ static rey_result set_environment(Builder *b, rey_xml_node *node, int32_t id) {
     return REY_OK;
 }
 
-rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out) {
-    EmitterRecord e = {.shape = shape, .slot = -1, .scale = -1, .position = -1, .to_world = -1, .table = -1};
-    double weight;
+// Radiance and sampling weight of an area light. Several shapes may share one by reference: its values are read once.
+static rey_result build_area(Builder *b, rey_xml_node *node, const char *path, EmitterRecord *e) {
     bool first;
+    double weight;
+    e->kind = EMITTER_AREA;
+    TRY(build_visit(b, node, path, &first));
+    if (first) {
+        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "emitted radiance", path, &node->built));
+    }
+    e->slot = node->built;
+    TRY(rey_xml_get_float(b->ctx, node, "sampling_weight", 1, &weight));
+    e->weight = (float)weight;
+    if (first) {
+        TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+        TRY(build_finish(b, node, path));
+    }
+    return REY_OK;
+}
+
+// Lights that belong to no shape.
+static rey_result build_free_emitter(Builder *b, rey_xml_node *node, int32_t id, const char *path, EmitterRecord *e) {
+    bool first;
+    double weight;
     TRY(build_visit(b, node, path, &first));
     if (!first) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "an emitter can belong to one place only");
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "this emitter can stand in one place only");
     }
-    int32_t id = rey_scene_append(b->scene, &b->scene->build.emitters, sizeof e, 1);
-    if (id < 0) {
-        return REY_ERROR_MEMORY;
-    }
-    if ((strcmp(node->type, "area") == 0) != (shape >= 0)) {
-        if (shape < 0 || strcmp(node->type, "point") == 0 || strcmp(node->type, "envmap") == 0 ||
-            strcmp(node->type, "constant") == 0) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                                shape < 0 ? "an '%s' emitter must be a child of a shape" : "'%s' cannot belong to a shape",
-                                node->type);
-        }
-    }
-    if (strcmp(node->type, "area") == 0) {
-        e.kind = EMITTER_AREA;
-        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "emitted radiance", path, &e.slot));
-    } else if (strcmp(node->type, "constant") == 0) {
-        e.kind = EMITTER_CONSTANT;
-        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "radiance from everywhere", path, &e.slot));
+    if (strcmp(node->type, "constant") == 0) {
+        e->kind = EMITTER_CONSTANT;
+        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "radiance from everywhere", path, &e->slot));
         TRY(set_environment(b, node, id));
     } else if (strcmp(node->type, "point") == 0) {
-        e.kind = EMITTER_POINT;
-        TRY(build_point(b, node, path, &e));
+        e->kind = EMITTER_POINT;
+        TRY(build_point(b, node, path, e));
     } else if (strcmp(node->type, "envmap") == 0) {
-        e.kind = EMITTER_ENVMAP;
-        TRY(build_envmap(b, node, id, path, &e));
+        e->kind = EMITTER_ENVMAP;
+        TRY(build_envmap(b, node, id, path, e));
         TRY(set_environment(b, node, id));
     } else {
         return build_unknown(b, node, emitter_word, NULL);
     }
     TRY(rey_xml_get_float(b->ctx, node, "sampling_weight", 1, &weight));
-    if (!(weight >= 0) || !isfinite(weight)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "sampling_weight is %g, expected a number >= 0", weight);
-    }
-    e.weight = (float)weight;
-    ARRAY_AT(b->scene->build.emitters, EmitterRecord, id) = e;
-    node->built = *out = id;
+    e->weight = (float)weight;
+    node->built = id;
     TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
     return build_finish(b, node, path);
+}
+
+rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out) {
+    EmitterRecord e = {.shape = shape, .slot = -1, .scale = -1, .position = -1, .to_world = -1, .table = -1};
+    bool area = strcmp(node->type, "area") == 0;
+    if (!area && shape >= 0) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape's emitter must be an 'area' light, not '%s'",
+                            node->type);
+    }
+    if (area && shape < 0) { // declared here, for shapes to refer to
+        return build_area(b, node, path, &e);
+    }
+    int32_t id = rey_scene_append(b->scene, &b->scene->build.emitters, sizeof e, 1);
+    if (id < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    TRY(area ? build_area(b, node, path, &e) : build_free_emitter(b, node, id, path, &e));
+    if (!(e.weight >= 0) || !isfinite(e.weight)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "sampling_weight is %g, expected a number >= 0",
+                            (double)e.weight);
+    }
+    ARRAY_AT(b->scene->build.emitters, EmitterRecord, id) = e;
+    *out = id;
+    return REY_OK;
 }

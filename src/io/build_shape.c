@@ -78,7 +78,8 @@ static void mesh_transform(rey_mesh *mesh, const double m[16]) {
     }
 }
 
-static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh) {
+// *smooth: the normals were computed here.
+static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh, bool *smooth) {
     char *file = NULL;
     bool obj = strcmp(node->type, "obj") == 0, ply = strcmp(node->type, "ply") == 0, flip, flat;
     int64_t index = 0;
@@ -103,6 +104,7 @@ static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh) {
         rey_free(b->ctx, mesh->normals);
         mesh->normals = NULL;
     } else if (!mesh->normals) {
+        *smooth = true;
         TRY(rey_mesh_compute_normals(b->ctx, mesh));
     }
     return REY_OK;
@@ -146,16 +148,18 @@ static rey_result copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const 
 
 static rey_result build_mesh(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
     rey_mesh mesh = {0};
-    rey_result result = mesh_load(b, node, &mesh);
+    bool smooth = false;
+    rey_result result = mesh_load(b, node, &mesh, &smooth);
     if (result == REY_OK) {
+        shape->flags |= smooth ? SHAPE_SMOOTH_NORMALS : 0;
         result = copy_mesh(b, &mesh, id, path, shape);
     }
     rey_mesh_free(b->ctx, &mesh);
     return result;
 }
 
-// Rectangle or cube: a mesh whose vertices follow to_world; only the pose is a parameter.
-static rey_result build_posed_mesh(Builder *b, bool cube, ShapeRecord *shape) {
+// Rectangle or cube: a mesh whose vertices follow to_world when that changes.
+static rey_result build_posed_mesh(Builder *b, bool cube, int32_t id, const char *path, ShapeRecord *shape) {
     rey_scene *scene = b->scene;
     float vertices[CUBE_VERTICES][8];
     int32_t triangles[CUBE_TRIANGLES][3];
@@ -167,11 +171,13 @@ static rey_result build_posed_mesh(Builder *b, bool cube, ShapeRecord *shape) {
     shape->vertex_count = cube ? CUBE_VERTICES : RECTANGLE_VERTICES;
     shape->triangle_count = cube ? CUBE_TRIANGLES : RECTANGLE_TRIANGLES;
     shape->flags |= SHAPE_HAS_UVS;
-    shape->positions = rey_scene_append(scene, &scene->build.theta, sizeof(float), 3 * shape->vertex_count);
+    Param positions = {PARAM_DEFAULTS, .unit = "scene units", .description = "vertex positions", .terms = GEOMETRY_TERMS,
+                       .why = moving_why, .geometry = id};
+    TRY(vertex_param(b, path, "positions", "vertex_positions", shape->vertex_count, 3, positions, &shape->positions));
     shape->uvs = rey_scene_append(scene, &scene->build.theta, sizeof(float), 2 * shape->vertex_count);
     int32_t at = rey_scene_append(scene, &scene->build.triangles, sizeof(int32_t), 3 * shape->triangle_count);
     shape->welded = rey_scene_append(scene, &scene->build.welded, sizeof(int32_t), shape->vertex_count);
-    if (shape->positions < 0 || shape->uvs < 0 || at < 0 || shape->welded < 0) {
+    if (shape->uvs < 0 || at < 0 || shape->welded < 0) {
         return REY_ERROR_MEMORY;
     }
     shape->triangle = at / 3;
@@ -225,7 +231,7 @@ static rey_result build_analytic(Builder *b, rey_xml_node *node, int32_t id, con
         shape->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), sphere ? 13 : 24);
         return shape->table >= 0 ? REY_OK : REY_ERROR_MEMORY;
     }
-    return build_posed_mesh(b, strcmp(node->type, "cube") == 0, shape);
+    return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
 }
 
 static rey_result assign_group(Builder *b, ShapeRecord *shape) {

@@ -6,7 +6,7 @@
 // files), REY_ERROR_UNSUPPORTED or REY_ERROR_MEMORY, and leave *out empty (all zero).
 #pragma once
 
-#include "base/context.h"
+#include "shape/normals.h"
 
 enum { MESH_MOST_ITEMS = INT32_MAX }; // vertices or triangles of one mesh
 
@@ -69,8 +69,6 @@ rey_result rey_mesh_write_ply(rey_context *ctx, const char *path, const rey_mesh
 rey_result rey_mesh_compute_normals(rey_context *ctx, rey_mesh *mesh);
 
 // The parts of that computation, for code that keeps its own positions or needs the intermediate sums.
-// Unit normal of triangle (a, b, c) and the angles at its corners [rad]; false (and zeros) when it has no area.
-bool rey_face_normal(const float a[3], const float b[3], const float c[3], double normal[3], double angles[3]);
 // sums[3 position_index[v] ..] = sum over faces of angle times normal; sums holds vertex_count x 3 and is overwritten.
 // The order of summation is that of the faces, so results are the same for any number of threads.
 void rey_mesh_normal_sums(const rey_mesh *mesh, const float *positions, double *sums);

@@ -105,8 +105,7 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
     r->plan = rey_film_plan(sensor);
     r->tiles = r->plan.columns * r->plan.rows;
     r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
-    r->job.sobol = def->sampler == REY_SAMPLER_DEFAULT ? sensor->sampler == REY_SAMPLER_SOBOL
-                                                       : def->sampler == REY_SAMPLER_SOBOL;
+    r->job.sobol = def->sampler != REY_SAMPLER_INDEPENDENT;
     r->columns = rey_alloc_array(ctx, (size_t)sensor->crop_width, sizeof(double));
     r->rows = rey_alloc_array(ctx, (size_t)sensor->crop_height, sizeof(double));
     r->workspaces = rey_alloc_array(ctx, (size_t)ctx->def.threads, sizeof(void *));

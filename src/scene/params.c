@@ -120,7 +120,8 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
         texture_changed(scene, p->texture);
     }
     if (p->geometry >= 0) {
-        scene->dirty_shapes[p->geometry] = 1;
+        bool pose = p->theta == scene->view.shapes[p->geometry].to_world;
+        scene->dirty_shapes[p->geometry] |= pose ? SHAPE_DIRTY_POSE : SHAPE_DIRTY_VERTICES;
     }
     if (p->emitter >= 0) {
         scene->dirty_emitters[p->emitter] = 1;

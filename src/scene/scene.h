@@ -31,6 +31,8 @@ typedef struct BsdfNode {
 // Analytic kinds hit through their own geometry; rectangle and cube are meshes whose vertices follow to_world.
 enum { SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK };
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4 };
+// Host only: the vertex normals were computed from the positions and follow them.
+enum { SHAPE_SMOOTH_NORMALS = 8 };
 
 typedef struct ShapeRecord {
     int32_t kind, flags, group, bsdf, emitter;
@@ -70,6 +72,9 @@ typedef struct SensorRecord {
     float near_clip, far_clip;
     int32_t medium;
 } SensorRecord;
+
+// What changed of a shape.
+enum { SHAPE_DIRTY_POSE = 1, SHAPE_DIRTY_VERTICES = 2 };
 
 // Lanes of one batch share a group: scattering function, emitter, shape kind and flags are uniform in kernels.
 typedef struct Group {

@@ -1,6 +1,8 @@
 // update.c: derived data of shapes.
 #include "shape/update.h"
 
+#include "shape/normals.h"
+
 #include <string.h>
 
 double rey_affine_determinant(const float m[16]) {
@@ -159,6 +161,21 @@ static void mesh_areas(SceneView *view, ShapeRecord *shape) {
     }
 }
 
+// Vertex normals that were computed when the mesh was loaded follow its vertices.
+static rey_result smooth_normals(rey_scene *scene, const ShapeRecord *shape) {
+    SceneView *view = &scene->view;
+    MeshView mesh = {view->theta + shape->positions, (const uint32_t *)view->triangles + 3 * (size_t)shape->triangle,
+                     (const uint32_t *)view->welded + shape->welded, shape->vertex_count, shape->triangle_count};
+    double *sums = rey_alloc_array(scene->ctx, 3 * (size_t)shape->vertex_count, sizeof *sums);
+    if (!sums) {
+        return REY_ERROR_MEMORY;
+    }
+    rey_normal_sums(&mesh, sums);
+    rey_normals_from_sums(&mesh, sums, view->theta + shape->normals);
+    rey_free(scene->ctx, sums);
+    return REY_OK;
+}
+
 rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     ShapeRecord *shape = scene->view.shapes + id;
     rey_result result = REY_OK;
@@ -168,8 +185,11 @@ rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     if (shape->kind == SHAPE_DISK) {
         return disk_follow(scene, shape);
     }
-    if (shape->to_world >= 0) {
+    if (shape->to_world >= 0 && (scene->dirty_shapes[id] & SHAPE_DIRTY_POSE)) {
         result = mesh_follow(scene, shape);
+    }
+    if (result == REY_OK && (shape->flags & SHAPE_SMOOTH_NORMALS) && (scene->dirty_shapes[id] & SHAPE_DIRTY_VERTICES)) {
+        result = smooth_normals(scene, shape);
     }
     if (result == REY_OK) {
         mesh_areas(&scene->view, shape);
