@@ -195,7 +195,7 @@ static bool parse_set(Options *o, const char *value) {
 }
 
 static bool apply_option(Options *o, const OptionRow *row, const char *value) {
-    static const char *const samplers[] = {"default", "independent", "sobol", NULL};
+    static const char *const samplers[] = {"independent", "sobol", NULL};
     static const char *const modes[] = {"forward", "reverse", NULL};
     static const char *const widths[] = {"1", "8", "16", NULL};
     static const int width_values[] = {1, 8, 16};
@@ -221,7 +221,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         o->lanes = width_values[choice];
         return true;
     case OPTION_SAMPLER:
-        if (!parse_choice(o, "--sampler", value, samplers + 1, &choice)) {
+        if (!parse_choice(o, "--sampler", value, samplers, &choice)) {
             return false;
         }
         o->sampler = choice == 0 ? REY_SAMPLER_INDEPENDENT : REY_SAMPLER_SOBOL;
