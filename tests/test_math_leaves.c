@@ -81,6 +81,14 @@ static void random_input(int leaf, Random *r, double *x, double *scale) {
         x[0] = between(r, -0.2, 1.2);
         scale[0] = fabs(1 - x[0]);
         break;
+    case LEAF_EXP: x[0] = between(r, -85, 85); break;
+    case LEAF_LOG: x[0] = log_between(r, 1e-37, 1e37); break;
+    case LEAF_SINCOS: x[0] = between(r, -1, 1) * log_between(r, 0.1, 8000); break;
+    case LEAF_ATAN2:
+        x[0] = between(r, -1, 1);
+        x[1] = between(r, -1, 1) * log_between(r, 1e-3, 1e3);
+        break;
+    case LEAF_ACOS: x[0] = between(r, -1, 1); break;
     case LEAF_ERFINV: x[0] = uniform(r) < 0.5 ? between(r, -1, 1) : 1 - log_between(r, 1e-6, 1); break;
     case LEAF_ERF: x[0] = between(r, -5, 5); break;
     case LEAF_SAMPLE_ALL_GGX:

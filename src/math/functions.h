@@ -122,7 +122,7 @@ KFN Float f_acos(Float x) {
     return f_atan2(f_sqrt((1.0f - x) * (1.0f + x)), x);
 }
 
-// erf x: absolute error 2e-7 [abramowitz1972 eq. 7.1.28, as a rational function of the 16th power].
+// erf x: absolute error 3e-7, relative error 5e-7.
 KFN Float f_erf(Float x) {
     Float a = f_abs(x);
     // Series where it is exact to rounding, e^(-x^2) form elsewhere [abramowitz1972 eq. 7.1.26].

@@ -30,6 +30,11 @@ typedef struct LeafInfo {
     L(SAMPLE_BECKMANN, microfacet_sample_beckmann, 7, 3, false, 2e-5, 2e-5, 0)                                         \
     L(SAMPLE_ALL_GGX, microfacet_sample_all_ggx, 4, 3, false, 1e-5, 2e-5, 0)                                           \
     L(SAMPLE_ALL_BECKMANN, microfacet_sample_all_beckmann, 4, 3, false, 1e-5, 2e-5, 0)                                 \
+    L(EXP, f_exp, 1, 1, false, 1e-6, 0, 0)                                                                             \
+    L(LOG, f_log, 1, 1, false, 1e-6, 0, 0)                                                                             \
+    L(SINCOS, f_sincos, 1, 2, false, 0, 1.2e-7, 0)                                                                     \
+    L(ATAN2, f_atan2, 2, 1, false, 0, 4e-7, 0)                                                                         \
+    L(ACOS, f_acos, 1, 1, false, 0, 4e-7, 0)                                                                           \
     L(ERFINV, f_erfinv, 1, 1, false, 1e-5, 1e-7, 0)                                                                    \
     L(ERF, f_erf, 1, 1, false, 2e-6, 3e-7, 0)
 

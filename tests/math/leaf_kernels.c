@@ -63,6 +63,11 @@ static void leaf_value(int leaf, const Float *in, Float *out) {
         put3(out, microfacet_sample(&mf, up(), in[2], in[3]));
         break;
     }
+    case LEAF_EXP: out[0] = f_exp(in[0]); break;
+    case LEAF_LOG: out[0] = f_log(in[0]); break;
+    case LEAF_SINCOS: f_sincos(in[0], &out[0], &out[1]); break;
+    case LEAF_ATAN2: out[0] = f_atan2(in[0], in[1]); break;
+    case LEAF_ACOS: out[0] = f_acos(in[0]); break;
     case LEAF_ERFINV: out[0] = f_erfinv(in[0]); break;
     case LEAF_ERF: out[0] = f_erf(in[0]); break;
     default: break;
