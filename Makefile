@@ -1,0 +1,61 @@
+# Reynolds: `make demo` recovers a scene from images, `make test` passes all tests. Both install what is missing.
+BUILD ?= build
+PREFIX ?= /usr/local
+CONFORMANCE ?=
+JOBS ?= $(shell nproc)
+PACKAGES = gcc g++ make cmake pkg-config libembree-dev libexpat1-dev libopenexr-dev libpng-dev libjpeg62-turbo-dev \
+           zlib1g-dev libyaml-dev libcmocka-dev python3
+
+.PHONY: all setup demo test conformance bench bench-peer check fuzz sanitize tsan install clean
+
+all: $(BUILD)/CMakeCache.txt
+	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS)
+
+$(BUILD)/CMakeCache.txt: | setup
+	@cmake -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=$(PREFIX) > /dev/null
+
+# Installs missing Debian packages; does nothing, and needs no rights, when all are there.
+setup:
+	@sh scripts/setup.sh $(PACKAGES)
+
+demo: all
+	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml
+
+test: all
+	@cd $(BUILD) && ctest --output-on-failure
+
+conformance: all
+	@$(BUILD)/bin/conformance $(CONFORMANCE)
+
+bench: all
+	@python3 bench/bench.py --reynolds $(BUILD)/bin/reynolds
+
+bench-peer: all
+	@sh bench/peer.sh $(BUILD)/bin/reynolds
+
+check:
+	@for script in scripts/check_*.py; do python3 $$script || exit 1; done
+
+# A few minutes of every reader on hostile input (clang).
+FUZZ_SECONDS ?= 60
+fuzz:
+	@sh scripts/setup.sh $(PACKAGES) clang libclang-rt-14-dev
+	@CC=clang cmake -S . -B build-fuzz -DREYNOLDS_FUZZ=ON -DREYNOLDS_SANITIZE=ON > /dev/null
+	@$(MAKE) --no-print-directory -C build-fuzz -j$(JOBS)
+	@sh scripts/fuzz.sh build-fuzz $(FUZZ_SECONDS)
+
+sanitize: setup
+	@cmake -S . -B build-asan -DREYNOLDS_SANITIZE=ON > /dev/null
+	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
+	@cd build-asan && ctest --output-on-failure -LE slow
+
+tsan: setup
+	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON > /dev/null
+	@$(MAKE) --no-print-directory -C build-tsan -j$(JOBS)
+	@cd build-tsan && ctest --output-on-failure -L threads
+
+install: all
+	@cmake --install $(BUILD) --prefix $(PREFIX)
+
+clean:
+	rm -rf build build-asan build-tsan build-fuzz
