@@ -267,7 +267,7 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
 
 // Puts the parameter of one spec into the direction, unless it is there already; *slot is where it is.
 static rey_result select_param(rey_context *ctx, rey_scene *scene, const char *spec, int *slot, Direction *d) {
-    int param;
+    int param = -1;
     char *name;
     rey_result result = find_param(ctx, scene, spec, &param, &name);
     *slot = 0;
