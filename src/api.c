@@ -1,5 +1,6 @@
 // api.c: the parts of the public interface that belong to no module: they check arguments and hold no logic.
 #include "io/mitsuba.h"
+#include "io/save.h"
 #include "render/update.h"
 
 rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
@@ -16,6 +17,10 @@ rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *
         *out = NULL;
     }
     return result;
+}
+
+rey_result rey_scene_save(const rey_scene *scene, const char *path) {
+    return scene && path ? rey_mitsuba_save(scene, path) : REY_ERROR_ARGUMENT;
 }
 
 rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height) {

@@ -46,7 +46,11 @@ static double determinant(const double m[16]) {
 // World vertices; normals by the cofactor matrix, which is the inverse transpose up to a positive factor once its sign
 // follows the determinant's; a mirroring pose turns the winding over so that outside stays outside.
 static void mesh_transform(rey_mesh *mesh, const double m[16]) {
+    static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     bool mirrored = determinant(m) < 0;
+    if (memcmp(m, identity, sizeof identity) == 0) {
+        return; // a saved scene reads back to the same bits
+    }
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
         float *p = mesh->positions + 3 * i;
         double x = p[0], y = p[1], z = p[2];
