@@ -1,0 +1,484 @@
+// job.c: job files become Job: every key has one row in a table, so that unknown keys and their neighbours are known.
+#include "fit/job.h"
+
+#include "io/file.h"
+#include "io/number.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define NAMES(function, ...)                                                                                           \
+    static const char *const function##_list[] = {__VA_ARGS__, NULL};                                                  \
+    const char *function(int kind) {                                                                                   \
+        return function##_list[kind];                                                                                  \
+    }
+NAMES(rey_loss_name, "l1", "l2", "relative_l2", "log_l2")
+NAMES(rey_optimizer_name, "adam", "sgd")
+NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
+NAMES(rey_parameterisation_name, "identity", "log", "logit")
+NAMES(rey_moment_name, "per_entry", "shared")
+
+typedef enum FieldType {
+    FIELD_TEXT,    // const char *
+    FIELD_REAL,    // double in [low, high]
+    FIELD_INTEGER, // int in [low, high]
+    FIELD_SEED,    // uint32_t
+    FIELD_CHOICE,  // int, index into names
+    FIELD_READER   // read(job, node, target)
+} FieldType;
+
+typedef struct Field {
+    const char *key;
+    FieldType type;
+    size_t offset;
+    double low, high;
+    const char *const *names;
+    rey_result (*read)(Job *job, const YamlNode *node, void *target);
+    bool required;
+} Field;
+
+static rey_result fail_at(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
+static rey_result fail_at(Job *job, const YamlNode *node, const char *format, ...) {
+    char message[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    if (node->line == 0) {
+        return rey_fail(job->ctx, REY_ERROR_FORMAT, "--set: %s", message);
+    }
+    return rey_fail(job->ctx, REY_ERROR_FORMAT, "%s:%d: %s", job->path, node->line, message);
+}
+
+void *rey_job_alloc(Job *job, size_t count, size_t item_bytes) {
+    void *memory = rey_alloc_array(job->ctx, count, item_bytes);
+    void **slot = memory ? rey_array_push(job->ctx, &job->memory, sizeof(void *), 1) : NULL;
+    if (!slot) {
+        rey_free(job->ctx, memory);
+        return NULL;
+    }
+    *slot = memory;
+    return memory;
+}
+
+static bool is_real(const YamlNode *node, double *value) {
+    const char *end;
+    return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
+}
+
+static rey_result read_real(Job *job, const YamlNode *node, double low, double high, double *out) {
+    double value;
+    if (!is_real(node, &value)) {
+        return fail_at(job, node, "%s%sexpected a number", node->key ? node->key : "", node->key ? ": " : "");
+    }
+    if (value < low || value > high) {
+        return fail_at(job, node, "%s = %g, expected %g to %g", node->key ? node->key : "value", value, low, high);
+    }
+    *out = value;
+    return REY_OK;
+}
+
+static const char *word_at(void *user, int i) {
+    const char *const *names = user;
+    return names[i];
+}
+
+static rey_result read_choice(Job *job, const YamlNode *node, const char *const *names, int *out) {
+    const char *text = node->kind == YAML_SCALAR && node->text ? node->text : "";
+    char all[256] = "";
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return REY_OK;
+        }
+        size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", names[i]);
+    }
+    const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
+    return nearest ? fail_at(job, node, "unknown value '%s', did you mean '%s'?", text, nearest)
+                   : fail_at(job, node, "unknown value '%s', expected one of %s", text, all);
+}
+
+static rey_result read_text(Job *job, const YamlNode *node, const char **out) {
+    if (node->kind != YAML_SCALAR || !node->text || !node->text[0]) {
+        return fail_at(job, node, "%s: expected a text", node->key ? node->key : "entry");
+    }
+    *out = node->text;
+    return REY_OK;
+}
+
+static rey_result read_field(Job *job, const Field *field, const YamlNode *node, char *base) {
+    void *target = base + field->offset;
+    double value;
+    rey_result result;
+    switch (field->type) {
+    case FIELD_TEXT:
+        return read_text(job, node, target);
+    case FIELD_REAL:
+        return read_real(job, node, field->low, field->high, target);
+    case FIELD_INTEGER:
+    case FIELD_SEED:
+        result = read_real(job, node, field->low, field->high, &value);
+        if (!result && value != floor(value)) {
+            result = fail_at(job, node, "%s = %g, expected a whole number", field->key, value);
+        }
+        if (!result && field->type == FIELD_SEED) {
+            *(uint32_t *)target = (uint32_t)value;
+        } else if (!result) {
+            *(int *)target = (int)value;
+        }
+        return result;
+    case FIELD_CHOICE:
+        return read_choice(job, node, field->names, target);
+    default:
+        return field->read(job, node, target);
+    }
+}
+
+static const char *key_at(void *user, int i) {
+    const Field *fields = user;
+    return fields[i].key;
+}
+
+// Reads a map by its table, which ends with a key of null.
+static rey_result read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base) {
+    if (map->kind != YAML_MAP) {
+        return fail_at(job, map, "%s: expected 'key: value' lines", what);
+    }
+    for (const YamlNode *node = map->child; node; node = node->next) {
+        const Field *field = fields;
+        while (field->key && strcmp(field->key, node->key)) {
+            field++;
+        }
+        if (!field->key) {
+            const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
+            return nearest ? fail_at(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
+                           : fail_at(job, node, "unknown key '%s' in %s", node->key, what);
+        }
+        rey_result result = read_field(job, field, node, base);
+        if (result) {
+            return result;
+        }
+    }
+    for (const Field *field = fields; field->key; field++) {
+        if (field->required && !rey_yaml_find(map, field->key)) {
+            return fail_at(job, map, "%s: key '%s' is missing", what, field->key);
+        }
+    }
+    return REY_OK;
+}
+
+static rey_result open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count) {
+    if (node->kind != YAML_LIST || !node->child) {
+        return fail_at(job, node, "%s: expected a list of at least one entry", node->key ? node->key : "entry");
+    }
+    *count = rey_yaml_count(node);
+    *items = rey_job_alloc(job, (size_t)*count, item_bytes);
+    return *items ? REY_OK : REY_ERROR_MEMORY;
+}
+
+static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
+    rey_define **defines = target;
+    if (node->kind != YAML_MAP) {
+        return node->child || (node->text && node->text[0])
+                   ? fail_at(job, node, "defines: expected 'name: value' lines") : REY_OK;
+    }
+    job->define_count = rey_yaml_count(node);
+    *defines = rey_job_alloc(job, (size_t)job->define_count, sizeof **defines);
+    rey_result result = *defines ? REY_OK : REY_ERROR_MEMORY;
+    int i = 0;
+    for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
+        (*defines)[i].name = entry->key;
+        result = read_text(job, entry, &(*defines)[i].value);
+    }
+    return result;
+}
+
+static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "from", .type = FIELD_INTEGER, .offset = offsetof(JobSpp, from), .high = 1e9, .required = true},
+        {.key = "spp", .type = FIELD_INTEGER, .offset = offsetof(JobSpp, spp), .low = 2, .high = 65536,
+         .required = true},
+        {0},
+    };
+    JobSpp **steps = target;
+    if (node->kind == YAML_SCALAR) {
+        *steps = rey_job_alloc(job, 1, sizeof **steps);
+        job->spp_count = 1;
+        return *steps ? read_field(job, &fields[1], node, (char *)*steps) : REY_ERROR_MEMORY;
+    }
+    void *items;
+    rey_result result = open_list(job, node, sizeof **steps, &items, &job->spp_count);
+    if (result) {
+        return result;
+    }
+    *steps = items;
+    int i = 0;
+    for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
+        result = read_map(job, entry, "spp", fields, &(*steps)[i]);
+        if (!result && (i ? (*steps)[i].from <= (*steps)[i - 1].from : (*steps)[0].from != 0)) {
+            result = fail_at(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
+        }
+    }
+    return result;
+}
+
+static rey_result read_views(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
+        {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
+        {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
+        {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .high = 1e9},
+        {0},
+    };
+    JobView **views = target;
+    void *items = NULL;
+    rey_result result = open_list(job, node, sizeof **views, &items, &job->view_count);
+    *views = items;
+    int i = 0;
+    for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
+        (*views)[i] = (JobView){.sensor = i, .weight = 1, .line = entry->line};
+        result = read_map(job, entry, "views", fields, &(*views)[i]);
+    }
+    return result;
+}
+
+static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(Job, loss), .names = rey_loss_name_list,
+         .required = true},
+        {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(Job, loss_epsilon), .low = 1e-12, .high = 1e6},
+        {0},
+    };
+    UNUSED(target);
+    return node->kind == YAML_SCALAR ? read_field(job, fields, node, (char *)job)
+                                     : read_map(job, node, "loss", fields, job);
+}
+
+static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobSchedule, kind), .names = rey_schedule_name_list,
+         .required = true},
+        {.key = "end", .type = FIELD_REAL, .offset = offsetof(JobSchedule, end), .high = 1},
+        {.key = "length", .type = FIELD_INTEGER, .offset = offsetof(JobSchedule, length), .low = 1, .high = 1e9},
+        {.key = "factor", .type = FIELD_REAL, .offset = offsetof(JobSchedule, factor), .low = 1e-9, .high = 1},
+        {.key = "every", .type = FIELD_INTEGER, .offset = offsetof(JobSchedule, every), .low = 1, .high = 1e9},
+        {0},
+    };
+    return node->kind == YAML_SCALAR ? read_field(job, fields, node, target)
+                                     : read_map(job, node, "schedule", fields, target);
+}
+
+static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobOptimizer, kind),
+         .names = rey_optimizer_name_list},
+        {.key = "learning_rate", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, learning_rate), .low = 1e-12,
+         .high = 1e12},
+        {.key = "beta1", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, beta1), .high = 0.999999},
+        {.key = "beta2", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, beta2), .high = 0.99999999},
+        {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, epsilon), .low = 1e-30, .high = 1e6},
+        {.key = "momentum", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, momentum), .high = 0.999999},
+        {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
+        {0},
+    };
+    return read_map(job, node, "optimizer", fields, target);
+}
+
+static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
+    double *bounds = target;
+    if (node->kind != YAML_LIST || rey_yaml_count(node) != 2) {
+        return fail_at(job, node, "bounds: expected [low, high]");
+    }
+    rey_result result = read_real(job, node->child, -1e30, 1e30, &bounds[0]);
+    if (!result) {
+        result = read_real(job, node->child->next, -1e30, 1e30, &bounds[1]);
+    }
+    if (!result && !(bounds[0] < bounds[1])) {
+        result = fail_at(job, node, "bounds: %g is not below %g", bounds[0], bounds[1]);
+    }
+    return result;
+}
+
+static rey_result read_start(Job *job, const YamlNode *node, void *target) {
+    JobParameter *parameter = target;
+    double value;
+    if (node->kind == YAML_SCALAR && !is_real(node, &value)) {
+        return read_text(job, node, &parameter->start_file);
+    }
+    int count = node->kind == YAML_LIST ? rey_yaml_count(node) : 1;
+    if (node->kind == YAML_MAP || count < 1) {
+        return fail_at(job, node, "start: expected a number, a list of numbers, or a file");
+    }
+    double *values = rey_job_alloc(job, (size_t)count, sizeof *values);
+    rey_result result = values ? REY_OK : REY_ERROR_MEMORY;
+    const YamlNode *entry = node->kind == YAML_LIST ? node->child : node;
+    for (int i = 0; i < count && !result; i++, entry = entry->next) {
+        result = read_real(job, entry, -1e30, 1e30, &values[i]);
+    }
+    parameter->start = values;
+    parameter->start_count = count;
+    return result;
+}
+
+static rey_result read_parameters(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "name", .type = FIELD_TEXT, .offset = offsetof(JobParameter, name), .required = true},
+        {.key = "learning_rate", .type = FIELD_REAL, .offset = offsetof(JobParameter, learning_rate), .low = 1e-12,
+         .high = 1e12},
+        {.key = "bounds", .type = FIELD_READER, .offset = offsetof(JobParameter, bounds), .read = read_bounds},
+        {.key = "parameterisation", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, parameterisation),
+         .names = rey_parameterisation_name_list},
+        {.key = "moment", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, moment),
+         .names = rey_moment_name_list},
+        {.key = "start", .type = FIELD_READER, .offset = 0, .read = read_start},
+        {0},
+    };
+    JobParameter **parameters = target;
+    void *items = NULL;
+    rey_result result = open_list(job, node, sizeof **parameters, &items, &job->parameter_count);
+    *parameters = items;
+    int i = 0;
+    for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
+        (*parameters)[i] = (JobParameter){.bounds = {NAN, NAN}, .line = entry->line};
+        result = read_map(job, entry, "parameters", fields, &(*parameters)[i]);
+    }
+    return result;
+}
+
+static rey_result read_stop(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "window", .type = FIELD_INTEGER, .offset = offsetof(Job, stop_window), .high = 1e9, .required = true},
+        {.key = "tolerance", .type = FIELD_REAL, .offset = offsetof(Job, stop_tolerance), .high = 1},
+        {0},
+    };
+    UNUSED(target);
+    return read_map(job, node, "stop", fields, job);
+}
+
+static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "scene", .type = FIELD_TEXT, .offset = offsetof(Job, truth_scene), .required = true},
+        {0},
+    };
+    UNUSED(target);
+    return read_map(job, node, "truth", fields, job);
+}
+
+static const Field job_fields[] = {
+    {.key = "folder", .type = FIELD_TEXT, .offset = offsetof(Job, folder)},
+    {.key = "scene", .type = FIELD_TEXT, .offset = offsetof(Job, scene), .required = true},
+    {.key = "defines", .type = FIELD_READER, .offset = offsetof(Job, defines), .read = read_defines},
+    {.key = "output", .type = FIELD_TEXT, .offset = offsetof(Job, output)},
+    {.key = "seed", .type = FIELD_SEED, .offset = offsetof(Job, seed), .high = 4294967295.0},
+    {.key = "iterations", .type = FIELD_INTEGER, .offset = offsetof(Job, iterations), .high = 1e9},
+    {.key = "spp", .type = FIELD_READER, .offset = offsetof(Job, spp), .read = read_spp},
+    {.key = "views", .type = FIELD_READER, .offset = offsetof(Job, views), .read = read_views, .required = true},
+    {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
+    {.key = "loss", .type = FIELD_READER, .read = read_loss},
+    {.key = "optimizer", .type = FIELD_READER, .offset = offsetof(Job, optimizer), .read = read_optimizer},
+    {.key = "parameters", .type = FIELD_READER, .offset = offsetof(Job, parameters), .read = read_parameters,
+     .required = true},
+    {.key = "stop", .type = FIELD_READER, .read = read_stop},
+    {.key = "checkpoint_every", .type = FIELD_INTEGER, .offset = offsetof(Job, checkpoint_every), .high = 1e9},
+    {.key = "image_every", .type = FIELD_INTEGER, .offset = offsetof(Job, image_every), .high = 1e9},
+    {.key = "report_spp", .type = FIELD_INTEGER, .offset = offsetof(Job, report_spp), .high = 65536},
+    {.key = "truth", .type = FIELD_READER, .read = read_truth},
+    {0},
+};
+
+static rey_result set_defaults(Job *job) {
+    const char *slash = strrchr(job->path, '/');
+    size_t length = slash ? (size_t)(slash - job->path) + (slash == job->path) : 1;
+    char *folder = rey_job_alloc(job, length + 1, 1);
+    job->spp = rey_job_alloc(job, 1, sizeof *job->spp);
+    if (!folder || !job->spp) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(folder, slash ? job->path : ".", length);
+    job->folder = folder;
+    job->output = "fit";
+    job->iterations = 200;
+    job->spp[0].spp = 16;
+    job->spp_count = 1;
+    job->loss = LOSS_RELATIVE_L2;
+    job->loss_epsilon = 0.01;
+    job->optimizer = (JobOptimizer){.learning_rate = 0.02, .beta1 = 0.9, .beta2 = 0.99, .epsilon = 1e-12,
+                                    .momentum = 0.9,
+                                    .schedule = {.end = 0.05, .factor = 0.5, .every = 100}};
+    job->checkpoint_every = 50;
+    job->image_every = 50;
+    job->report_spp = 64;
+    return REY_OK;
+}
+
+rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
+                               const char *const *overrides, int override_count, Job *job) {
+    *job = (Job){.ctx = ctx, .path = path};
+    rey_result result = rey_yaml_read(ctx, path, bytes, size, &job->tree);
+    for (int i = 0; i < override_count && !result; i++) {
+        result = rey_yaml_override(ctx, job->tree, overrides[i]);
+    }
+    if (!result) {
+        result = set_defaults(job);
+    }
+    if (!result) {
+        result = read_map(job, job->tree, "the job", job_fields, job);
+    }
+    if (!result && !job->optimizer.schedule.length) {
+        job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
+    }
+    if (!result && job->views_per_iteration > job->view_count) {
+        result = fail_at(job, rey_yaml_find(job->tree, "views_per_iteration"), "views_per_iteration = %d, but there are %d views",
+                         job->views_per_iteration, job->view_count);
+    }
+    return result;
+}
+
+rey_result rey_job_read(rey_context *ctx, const char *path, const char *const *overrides, int override_count,
+                        Job *job) {
+    unsigned char *bytes;
+    size_t size;
+    *job = (Job){.ctx = ctx};
+    rey_result result = rey_file_read(ctx, path, &bytes, &size);
+    if (!result) {
+        result = rey_job_read_memory(ctx, path, bytes, size, overrides, override_count, job);
+    }
+    rey_free(ctx, bytes);
+    return result;
+}
+
+void rey_job_free(Job *job) {
+    if (!job->ctx) {
+        return;
+    }
+    for (size_t i = 0; i < job->memory.count; i++) {
+        rey_free(job->ctx, ARRAY_AT(job->memory, void *, i));
+    }
+    rey_array_free(job->ctx, &job->memory);
+    rey_yaml_free(job->ctx, job->tree);
+    *job = (Job){0};
+}
+
+const char *rey_job_path(Job *job, const char *name) {
+    if (name[0] == '/' || !strcmp(job->folder, ".")) {
+        return name;
+    }
+    size_t folder = strlen(job->folder), length = strlen(name);
+    char *path = rey_job_alloc(job, folder + length + 2, 1);
+    if (path) {
+        memcpy(path, job->folder, folder);
+        path[folder] = '/';
+        memcpy(path + folder + 1, name, length);
+    }
+    return path;
+}
+
+int rey_job_spp_at(const Job *job, int iteration) {
+    int spp = job->spp[0].spp;
+    for (int i = 0; i < job->spp_count && job->spp[i].from <= iteration; i++) {
+        spp = job->spp[i].spp;
+    }
+    return spp;
+}

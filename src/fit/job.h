@@ -1,0 +1,116 @@
+// job.h: what a fit job file says.
+#pragma once
+
+#include "fit/yaml.h"
+
+typedef enum LossKind { LOSS_L1, LOSS_L2, LOSS_RELATIVE_L2, LOSS_LOG_L2, LOSS_COUNT } LossKind;
+typedef enum OptimizerKind { OPTIMIZER_ADAM, OPTIMIZER_SGD, OPTIMIZER_COUNT } OptimizerKind;
+typedef enum ScheduleKind {
+    SCHEDULE_CONSTANT,
+    SCHEDULE_COSINE,
+    SCHEDULE_EXPONENTIAL,
+    SCHEDULE_STEP,
+    SCHEDULE_COUNT
+} ScheduleKind;
+typedef enum Parameterisation {
+    PARAMETERISATION_IDENTITY,
+    PARAMETERISATION_LOG,
+    PARAMETERISATION_LOGIT,
+    PARAMETERISATION_COUNT
+} Parameterisation;
+typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_COUNT } MomentKind;
+
+typedef struct JobView {
+    int sensor;         // of the scene
+    const char *target; // picture file
+    const char *mask;   // picture file of weights, null = 1 everywhere
+    double weight;      // of this view in the loss
+    int line;
+} JobView;
+
+typedef struct JobParameter {
+    const char *name; // may hold * for any text
+    double learning_rate; // 0 = the optimizer's
+    double bounds[2];     // NaN = the parameter's own range
+    Parameterisation parameterisation;
+    MomentKind moment;
+    const double *start; // values, null = none
+    int start_count;     // 1 = the same for every entry
+    const char *start_file; // picture file, null = none
+    int line;
+} JobParameter;
+
+typedef struct JobSpp { // samples per pixel from this iteration on
+    int from, spp;
+} JobSpp;
+
+typedef struct JobSchedule { // factor of every learning rate at iteration i
+    ScheduleKind kind;       // cosine: from 1 to `end` over `length`; exponential: end^(i / length);
+    double end;              // step: factor^floor(i / every)
+    int length;
+    double factor;
+    int every;
+} JobSchedule;
+
+typedef struct JobOptimizer {
+    OptimizerKind kind;
+    double learning_rate, beta1, beta2, epsilon, momentum;
+    JobSchedule schedule;
+} JobOptimizer;
+
+typedef struct Job {
+    rey_context *ctx;
+    const char *path;   // of the job file
+    const char *folder; // that paths are relative to
+    const char *scene, *truth_scene, *output;
+    rey_define *defines;
+    int define_count;
+    uint32_t seed;
+    int iterations, views_per_iteration; // 0 = all views
+    int checkpoint_every, image_every;   // 0 = never
+    int report_spp;                      // 0 = no report
+    JobSpp *spp;
+    int spp_count;
+    JobView *views;
+    int view_count;
+    LossKind loss;
+    double loss_epsilon;
+    JobOptimizer optimizer;
+    JobParameter *parameters;
+    int parameter_count;
+    int stop_window; // 0 = run through
+    double stop_tolerance;
+    YamlNode *tree; // owns the texts
+    Array memory;   // everything else that was allocated, as pointers
+} Job;
+
+// Reads a job with overrides ("key=value"). Errors read "job.yaml:12: ...". The caller frees *job with rey_job_free,
+// also after a failure.
+rey_result rey_job_read(rey_context *ctx, const char *path, const char *const *overrides, int override_count, Job *job);
+void rey_job_free(Job *job);
+// The same from memory.
+rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
+                               const char *const *overrides, int override_count, Job *job);
+
+// Path of a file that the job names; owned by the job, null (and a recorded message) when memory runs out.
+const char *rey_job_path(Job *job, const char *name);
+// Memory that lives as long as the job.
+void *rey_job_alloc(Job *job, size_t count, size_t item_bytes);
+
+int rey_job_spp_at(const Job *job, int iteration);
+
+// Names of the enumerations above.
+const char *rey_loss_name(int kind);
+const char *rey_optimizer_name(int kind);
+const char *rey_schedule_name(int kind);
+const char *rey_parameterisation_name(int kind);
+const char *rey_moment_name(int kind);
+
+/* ---- the resolved job ---------------------------------------------------------------------------------- */
+
+// Every setting that decides the result, one "dotted.key: value" a line, defaults included. Freed with rey_free.
+rey_result rey_job_flat(const Job *job, char **out);
+// The whole job as a YAML file that reads back as the same job. Freed with rey_free.
+rey_result rey_job_yaml(const Job *job, char **out);
+// Key of the first line in which two flat texts differ, into key; false when they are the same.
+bool rey_job_difference(const char *a, const char *b, char *key, size_t size);
