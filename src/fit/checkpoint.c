@@ -1,0 +1,161 @@
+// checkpoint.c: little-endian binary: magic, counts, resolved job, history, start and value as floats, variables and
+// moments as doubles, and a 64-bit FNV-1a hash of everything before it.
+#include "fit/checkpoint.h"
+
+#include "fit/job.h"
+#include "io/file.h"
+
+#include <string.h>
+
+static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '1'};
+
+typedef struct CheckpointHeader {
+    char magic[8];
+    uint64_t job_bytes, numbers, rows, width;
+    uint64_t iteration, converged;
+    uint64_t job_hash; // of the resolved job
+    double seconds;
+} CheckpointHeader;
+
+static uint64_t hash_bytes(const void *bytes, size_t size) {
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ ((const unsigned char *)bytes)[i]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+// The arrays of numbers, in the file's order.
+typedef struct Part {
+    void *data;
+    size_t bytes;
+} Part;
+enum { PART_COUNT = 5 };
+static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
+    size_t n = (size_t)u->count;
+    parts[0] = (Part){u->start, n * sizeof(float)};
+    parts[1] = (Part){u->value, n * sizeof(float)};
+    parts[2] = (Part){u->variable, n * sizeof(double)};
+    parts[3] = (Part){u->first, n * sizeof(double)};
+    parts[4] = (Part){u->second, n * sizeof(double)};
+}
+
+static void append(unsigned char *bytes, size_t *at, const void *data, size_t size) {
+    if (size) {
+        memcpy(bytes + *at, data, size);
+    }
+    *at += size;
+}
+
+rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknowns *u, const FitState *state) {
+    Part parts[PART_COUNT];
+    list_parts(u, parts);
+    size_t job_bytes = strlen(flat), history = state->history.count * sizeof(double);
+    size_t size = sizeof(CheckpointHeader) + job_bytes + history + sizeof(uint64_t);
+    for (int i = 0; i < PART_COUNT; i++) {
+        size += parts[i].bytes;
+    }
+    unsigned char *bytes = rey_alloc(u->ctx, size);
+    if (!bytes) {
+        return REY_ERROR_MEMORY;
+    }
+    CheckpointHeader header = {.job_bytes = job_bytes, .numbers = (uint64_t)u->count,
+                               .rows = state->history.count / (size_t)state->history_width,
+                               .width = (uint64_t)state->history_width, .iteration = (uint64_t)state->iteration,
+                               .converged = state->converged, .job_hash = hash_bytes(flat, job_bytes),
+                               .seconds = state->seconds};
+    memcpy(header.magic, MAGIC, sizeof MAGIC);
+    size_t at = 0;
+    append(bytes, &at, &header, sizeof header);
+    append(bytes, &at, flat, job_bytes);
+    append(bytes, &at, state->history.data, history);
+    for (int i = 0; i < PART_COUNT; i++) {
+        append(bytes, &at, parts[i].data, parts[i].bytes);
+    }
+    uint64_t hash = hash_bytes(bytes, at);
+    append(bytes, &at, &hash, sizeof hash);
+    rey_result result = rey_file_write(u->ctx, path, bytes, size);
+    rey_free(u->ctx, bytes);
+    return result;
+}
+
+// Whether the sizes that the header claims make up the file's size exactly.
+static bool sizes_agree(const CheckpointHeader *h, size_t size) {
+    const uint64_t most = (uint64_t)1 << 40;
+    if (h->job_bytes > most || h->numbers > most || h->rows > most || h->width > 1 << 20) {
+        return false;
+    }
+    uint64_t per_number = 2 * sizeof(float) + 3 * sizeof(double);
+    uint64_t expected = sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
+                        sizeof(uint64_t);
+    return expected == size;
+}
+
+static rey_result check_job(rey_context *ctx, const char *path, const CheckpointHeader *header, const char *stored,
+                            const char *flat) {
+    char *old = rey_alloc(ctx, (size_t)header->job_bytes + 1);
+    if (!old) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(old, stored, (size_t)header->job_bytes);
+    char key[256];
+    bool other = rey_job_difference(old, flat, key, sizeof key);
+    rey_free(ctx, old);
+    return other ? rey_fail(ctx, REY_ERROR_ARGUMENT,
+                            "%s is from a different job: '%s' differs; finish with the old one or use another -o", path,
+                            key)
+                 : REY_OK;
+}
+
+static rey_result decode(const char *path, const char *flat, const unsigned char *bytes, size_t size, Unknowns *u,
+                         FitState *state) {
+    CheckpointHeader header;
+    uint64_t hash;
+    if (size < sizeof header + sizeof hash || memcmp(bytes, MAGIC, sizeof MAGIC)) {
+        return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: not a checkpoint of this version", path);
+    }
+    memcpy(&header, bytes, sizeof header);
+    memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
+    if (!sizes_agree(&header, size) || hash != hash_bytes(bytes, size - sizeof hash)) {
+        return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: damaged checkpoint", path);
+    }
+    rey_result result = check_job(u->ctx, path, &header, (const char *)bytes + sizeof header, flat);
+    if (result) {
+        return result;
+    }
+    if (header.numbers != (uint64_t)u->count || header.width != (uint64_t)state->history_width ||
+        header.rows != header.iteration || header.rows > INT32_MAX) {
+        return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: made for %llu numbers, but the scene now has %lld", path,
+                        (unsigned long long)header.numbers, (long long)u->count);
+    }
+    size_t at = sizeof header + (size_t)header.job_bytes, cells = (size_t)(header.rows * header.width);
+    state->history.count = 0;
+    double *history = rey_array_push(u->ctx, &state->history, sizeof *history, cells ? cells : 1);
+    if (!history) {
+        return REY_ERROR_MEMORY;
+    }
+    state->history.count = cells;
+    memcpy(history, bytes + at, cells * sizeof *history);
+    at += cells * sizeof *history;
+    Part parts[PART_COUNT];
+    list_parts(u, parts);
+    for (int i = 0; i < PART_COUNT; i++) {
+        memcpy(parts[i].data, bytes + at, parts[i].bytes);
+        at += parts[i].bytes;
+    }
+    state->iteration = (int)header.iteration;
+    state->seconds = header.seconds;
+    state->converged = header.converged != 0;
+    return REY_OK;
+}
+
+rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state) {
+    unsigned char *bytes;
+    size_t size;
+    rey_result result = rey_file_read(u->ctx, path, &bytes, &size);
+    if (!result) {
+        result = decode(path, flat, bytes, size, u, state);
+    }
+    rey_free(u->ctx, bytes);
+    return result;
+}

@@ -1,0 +1,23 @@
+// checkpoint.h: everything that a fit needs to go on as if it had never stopped, in one file.
+#pragma once
+
+#include "fit/optimizer.h"
+
+// History: one row of doubles an iteration: loss, gradient norm, factor of the learning rate, seconds since the start,
+// then the values of the small parameters.
+enum { HISTORY_LOSS, HISTORY_NORM, HISTORY_FACTOR, HISTORY_SECONDS, HISTORY_VALUES };
+enum { HISTORY_LARGEST = 16 }; // parameters of up to so many numbers are kept in the history
+
+typedef struct FitState {
+    int iteration;     // how many are done
+    double seconds;    // spent so far, over all runs
+    Array history;     // doubles, iteration x history_width
+    int history_width;
+    bool converged;    // the stop rule has ended the fit
+} FitState;
+
+// Writes so that the file is complete or the former one. flat: the resolved job's flat text.
+rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknowns *u, const FitState *state);
+
+// Reads one that was written for the same job; names the first key that differs otherwise.
+rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state);

@@ -1,0 +1,131 @@
+// optimizer.c: Adam [kingma2015 algorithm 1] and gradient descent with momentum, in double precision.
+#include "fit/optimizer.h"
+
+#include <math.h>
+
+static const double PI_VALUE = 3.14159265358979323846;
+static const double LOGIT_MARGIN = 1e-6; // values stay this far, as a share of the range, inside their bounds
+
+static double to_value(const Unknown *p, double u) {
+    switch (p->parameterisation) {
+    case PARAMETERISATION_LOG:
+        return exp(u);
+    case PARAMETERISATION_LOGIT:
+        return p->low + (p->high - p->low) / (1 + exp(-u));
+    default:
+        return u;
+    }
+}
+
+static double to_variable(const Unknown *p, double x) {
+    double s;
+    switch (p->parameterisation) {
+    case PARAMETERISATION_LOG:
+        return log(x);
+    case PARAMETERISATION_LOGIT:
+        s = fmin(fmax((x - p->low) / (p->high - p->low), LOGIT_MARGIN), 1 - LOGIT_MARGIN);
+        return log(s / (1 - s));
+    default:
+        return x;
+    }
+}
+
+// d value / d variable.
+static double value_derivative(const Unknown *p, double u) {
+    double s;
+    switch (p->parameterisation) {
+    case PARAMETERISATION_LOG:
+        return exp(u);
+    case PARAMETERISATION_LOGIT:
+        s = 1 / (1 + exp(-u));
+        return (p->high - p->low) * s * (1 - s);
+    default:
+        return 1;
+    }
+}
+
+// Rounds into the bounds, which a float may otherwise leave by half its last digit.
+static float round_inside(const Unknown *p, double x) {
+    float f = (float)fmin(fmax(x, p->low), p->high);
+    if ((double)f < p->low) {
+        f = nextafterf(f, INFINITY);
+    }
+    if ((double)f > p->high) {
+        f = nextafterf(f, -INFINITY);
+    }
+    return f;
+}
+
+void rey_unknowns_begin(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            u->variable[i] = to_variable(p, fmin(fmax((double)u->start[i], p->low), p->high));
+            u->start[i] = u->value[i] = round_inside(p, to_value(p, u->variable[i]));
+        }
+    }
+}
+
+double rey_schedule_factor(const JobSchedule *s, int iteration) {
+    double t = fmin((double)iteration / s->length, 1);
+    switch (s->kind) {
+    case SCHEDULE_COSINE:
+        return s->end + (1 - s->end) * 0.5 * (1 + cos(PI_VALUE * t));
+    case SCHEDULE_EXPONENTIAL:
+        return pow(fmax(s->end, 1e-12), t);
+    case SCHEDULE_STEP:
+        return pow(s->factor, iteration / s->every);
+    default:
+        return 1;
+    }
+}
+
+// The change of each variable of one parameter; g is the gradient in the variables.
+static void adam_step(const JobOptimizer *o, const Unknown *p, double *variable, double *m, double *v, const double *g,
+                      double rate, int iteration) {
+    double correct1 = 1 - pow(o->beta1, iteration + 1.0), correct2 = 1 - pow(o->beta2, iteration + 1.0);
+    double mean_square = 0;
+    for (int64_t i = 0; i < p->count; i++) {
+        mean_square += g[i] * g[i] / (double)p->count;
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        double square = p->shared_moment ? mean_square : g[i] * g[i];
+        m[i] = o->beta1 * m[i] + (1 - o->beta1) * g[i];
+        v[i] = o->beta2 * v[i] + (1 - o->beta2) * square;
+        variable[i] -= rate * (m[i] / correct1) / (sqrt(v[i] / correct2) + o->epsilon);
+    }
+}
+
+static void sgd_step(const JobOptimizer *o, const Unknown *p, double *variable, double *velocity, const double *g,
+                     double rate) {
+    for (int64_t i = 0; i < p->count; i++) {
+        velocity[i] = o->momentum * velocity[i] + g[i];
+        variable[i] -= rate * velocity[i];
+    }
+}
+
+double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
+    double factor = rey_schedule_factor(&o->schedule, iteration), norm = 0;
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        double *variable = u->variable + p->offset, *g = u->gradient + p->offset;
+        double rate = (p->learning_rate > 0 ? p->learning_rate : o->learning_rate) * factor;
+        for (int64_t i = 0; i < p->count; i++) {
+            g[i] *= value_derivative(p, variable[i]);
+            norm += g[i] * g[i];
+        }
+        if (o->kind == OPTIMIZER_ADAM) {
+            adam_step(o, p, variable, u->first + p->offset, u->second + p->offset, g, rate, iteration);
+        } else {
+            sgd_step(o, p, variable, u->first + p->offset, g, rate);
+        }
+        for (int64_t i = 0; i < p->count; i++) {
+            double x = fmin(fmax(to_value(p, variable[i]), p->low), p->high);
+            if (x <= p->low || x >= p->high) {
+                variable[i] = to_variable(p, x);
+            }
+            u->value[p->offset + i] = round_inside(p, x);
+        }
+    }
+    return sqrt(norm);
+}

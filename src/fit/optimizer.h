@@ -1,0 +1,40 @@
+// optimizer.h: the unknowns of a fit and the steps that move them.
+#pragma once
+
+#include "fit/job.h"
+
+typedef struct Unknown { // one parameter of the scene
+    int param;           // its index
+    const char *name;
+    int64_t offset, count; // place in the arrays of Unknowns
+    int dims;
+    int64_t shape[3];
+    double learning_rate; // 0 = the optimizer's
+    double low, high;
+    Parameterisation parameterisation;
+    bool shared_moment;
+} Unknown;
+
+typedef struct Unknowns {
+    rey_context *ctx;
+    Array items;   // Unknown
+    int *params;   // their indices, for rey_selection
+    int64_t count; // numbers in all
+    float *start, *value; // as the scene holds them
+    double *variable;     // what the optimizer moves: x, log x, or logit of x's place within the bounds
+    double *first, *second; // moments; SGD uses the first as its velocity
+    double *gradient;     // d loss / d value
+} Unknowns;
+
+// Finds the job's parameters in the scene, gives the scene their start values, and clears the moments.
+rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *out);
+// Fills variable and value from start, which moves inside its bounds.
+void rey_unknowns_begin(Unknowns *u);
+void rey_unknowns_free(Unknowns *u);
+// Gives the scene the values.
+rey_result rey_unknowns_apply(const Unknowns *u, rey_scene *scene, const float *values);
+
+double rey_schedule_factor(const JobSchedule *schedule, int iteration);
+
+// One step along u->gradient at iteration i (from 0); returns the gradient's Euclidean norm in the variables.
+double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration);

@@ -1,0 +1,214 @@
+// unknowns.c: the job's parameters found in the scene, with their bounds and start values.
+#include "fit/optimizer.h"
+#include "io/image.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static bool glob_match(const char *pattern, const char *text) {
+    const char *star = NULL, *resume = NULL;
+    while (*text) {
+        if (*pattern == '*') {
+            star = pattern++;
+            resume = text;
+        } else if (*pattern == *text) {
+            pattern++;
+            text++;
+        } else if (star) {
+            pattern = star + 1;
+            text = ++resume;
+        } else {
+            return false;
+        }
+    }
+    while (*pattern == '*') {
+        pattern++;
+    }
+    return !*pattern;
+}
+
+static rey_result fail_at(Job *job, const JobParameter *p, const char *name, const char *why) {
+    if (p->line == 0) {
+        return rey_fail(job->ctx, REY_ERROR_PARAM, "--set: parameter '%s': %s", name, why);
+    }
+    return rey_fail(job->ctx, REY_ERROR_PARAM, "%s:%d: parameter '%s': %s", job->path, p->line, name, why);
+}
+
+// Which numbers are allowed, from the job and from the parameter itself.
+static rey_result set_bounds(Job *job, const JobParameter *p, const rey_param_info *info, Unknown *unknown) {
+    bool given = !isnan(p->bounds[0]);
+    unknown->low = given ? fmax(p->bounds[0], (double)info->low) : (double)info->low;
+    unknown->high = given ? fmin(p->bounds[1], (double)info->high) : (double)info->high;
+    if (unknown->low > unknown->high) {
+        return fail_at(job, p, info->name, "the bounds lie outside of the parameter's range");
+    }
+    if (p->parameterisation == PARAMETERISATION_LOG) {
+        if (!(unknown->low > 0)) {
+            unknown->low = 1e-6; // log needs a positive lower bound
+        }
+        if (!(unknown->high > unknown->low)) {
+            return fail_at(job, p, info->name, "parameterisation log needs positive bounds");
+        }
+    }
+    if (p->parameterisation == PARAMETERISATION_LOGIT && !(isfinite(unknown->low) && isfinite(unknown->high))) {
+        return fail_at(job, p, info->name, "parameterisation logit needs bounds: [low, high]");
+    }
+    return REY_OK;
+}
+
+static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown *unknown, float *start) {
+    const char *path = rey_job_path(job, p->start_file);
+    rey_image image = {0};
+    rey_result result = path ? rey_image_read(job->ctx, path, &image) : REY_ERROR_MEMORY;
+    if (!result) {
+        rey_image_decode_srgb(&image);
+        int64_t count = (int64_t)image.width * image.height * image.channels;
+        if (count != unknown->count) {
+            char why[1024];
+            snprintf(why, sizeof why, "%s holds %d x %d x %d numbers, expected %lld", p->start_file, image.height,
+                     image.width, image.channels, (long long)unknown->count);
+            result = fail_at(job, p, unknown->name, why);
+        } else {
+            memcpy(start, image.data, (size_t)count * sizeof *start);
+        }
+    }
+    rey_image_free(job->ctx, &image);
+    return result;
+}
+
+static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter *p, const Unknown *unknown,
+                            float *start) {
+    if (p->start_file) {
+        return start_from_file(job, p, unknown, start);
+    }
+    if (p->start_count == 0) {
+        memcpy(start, rey_param_values(scene, unknown->param), (size_t)unknown->count * sizeof *start);
+        return REY_OK;
+    }
+    int64_t last = unknown->dims ? unknown->shape[unknown->dims - 1] : 1;
+    if (p->start_count != 1 && p->start_count != unknown->count && p->start_count != last) {
+        char why[128];
+        snprintf(why, sizeof why, "start holds %d numbers, expected 1 or %lld", p->start_count,
+                 (long long)unknown->count);
+        return fail_at(job, p, unknown->name, why);
+    }
+    for (int64_t i = 0; i < unknown->count; i++) { // shorter lists repeat: a colour for every texel
+        start[i] = (float)p->start[i % p->start_count];
+    }
+    return REY_OK;
+}
+
+static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index, Array *owners,
+                              Unknowns *u) {
+    rey_param_info info;
+    rey_result result = rey_param_get_info(scene, param, &info);
+    if (result) {
+        return result;
+    }
+    if (info.terms != REY_TERM_INTERIOR) {
+        return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
+    }
+    for (size_t i = 0; i < u->items.count; i++) {
+        if (ARRAY_AT(u->items, Unknown, i).param == param) {
+            char why[96];
+            snprintf(why, sizeof why, "entry %d of 'parameters' names it already", ARRAY_AT(*owners, int, i));
+            return fail_at(job, p, info.name, why);
+        }
+    }
+    Unknown *unknown = rey_array_push(job->ctx, &u->items, sizeof *unknown, 1);
+    int *owner = unknown ? rey_array_push(job->ctx, owners, sizeof *owner, 1) : NULL;
+    if (!owner) {
+        return REY_ERROR_MEMORY;
+    }
+    *owner = job_index;
+    *unknown = (Unknown){.param = param, .name = info.name, .offset = u->count, .count = info.count, .dims = info.dims,
+                         .shape = {info.shape[0], info.shape[1], info.shape[2]}, .learning_rate = p->learning_rate,
+                         .parameterisation = p->parameterisation, .shared_moment = p->moment == MOMENT_SHARED};
+    u->count += info.count;
+    return set_bounds(job, p, &info, unknown);
+}
+
+static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
+    const JobParameter *p = &job->parameters[index];
+    size_t before = u->items.count;
+    rey_result result = REY_OK;
+    if (!strchr(p->name, '*')) {
+        int param = rey_param_find(scene, p->name);
+        if (param < 0) {
+            const char *nearest = rey_param_nearest(scene, p->name);
+            char why[512];
+            snprintf(why, sizeof why, "the scene has none of this name%s%s%s", nearest ? ", did you mean '" : "",
+                     nearest ? nearest : "", nearest ? "'?" : "");
+            return fail_at(job, p, p->name, why);
+        }
+        return add_unknown(job, scene, param, p, index, owners, u);
+    }
+    for (int i = 0; i < rey_param_count(scene) && !result; i++) { // a glob passes over what cannot be differentiated
+        rey_param_info info;
+        result = rey_param_get_info(scene, i, &info);
+        if (!result && info.terms == REY_TERM_INTERIOR && glob_match(p->name, info.name)) {
+            result = add_unknown(job, scene, i, p, index, owners, u);
+        }
+    }
+    if (!result && u->items.count == before) {
+        return fail_at(job, p, p->name, "matches no differentiable parameter of the scene");
+    }
+    return result;
+}
+
+static rey_result allocate(Unknowns *u) {
+    size_t n = (size_t)u->count;
+    u->params = rey_alloc_array(u->ctx, u->items.count, sizeof *u->params);
+    u->start = rey_alloc_array(u->ctx, n, sizeof *u->start);
+    u->value = rey_alloc_array(u->ctx, n, sizeof *u->value);
+    u->variable = rey_alloc_array(u->ctx, n, sizeof *u->variable);
+    u->first = rey_alloc_array(u->ctx, n, sizeof *u->first);
+    u->second = rey_alloc_array(u->ctx, n, sizeof *u->second);
+    u->gradient = rey_alloc_array(u->ctx, n, sizeof *u->gradient);
+    bool had = u->params && u->start && u->value && u->variable && u->first && u->second && u->gradient;
+    return had ? REY_OK : REY_ERROR_MEMORY;
+}
+
+rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
+    Array owners = {0}; // for every unknown the index of the job's entry that chose it
+    *u = (Unknowns){.ctx = job->ctx};
+    rey_result result = REY_OK;
+    for (int i = 0; i < job->parameter_count && !result; i++) {
+        result = match_parameter(job, scene, i, &owners, u);
+    }
+    if (!result) {
+        result = allocate(u);
+    }
+    for (size_t i = 0; i < u->items.count && !result; i++) {
+        const Unknown *unknown = &ARRAY_AT(u->items, Unknown, i);
+        u->params[i] = unknown->param;
+        result = set_start(job, scene, &job->parameters[ARRAY_AT(owners, int, i)], unknown, u->start + unknown->offset);
+    }
+    rey_array_free(job->ctx, &owners);
+    if (!result) {
+        rey_unknowns_begin(u);
+        result = rey_unknowns_apply(u, scene, u->value);
+    }
+    return result;
+}
+
+void rey_unknowns_free(Unknowns *u) {
+    if (u->ctx) {
+        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->gradient};
+        for (int i = 0; i < COUNT_OF(blocks); i++) {
+            rey_free(u->ctx, blocks[i]);
+        }
+        rey_array_free(u->ctx, &u->items);
+        *u = (Unknowns){0};
+    }
+}
+
+rey_result rey_unknowns_apply(const Unknowns *u, rey_scene *scene, const float *values) {
+    rey_result result = REY_OK;
+    for (size_t i = 0; i < u->items.count && !result; i++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, i);
+        result = rey_param_set(scene, p->param, values + p->offset, p->count);
+    }
+    return result;
+}
