@@ -1,0 +1,186 @@
+// fit.c: `reynolds fit`: runs a job, shows its progress, and prints what was found.
+#include "cli.h"
+
+#include "base/parallel.h"
+#include "fit/fit.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { SHOWN_ENTRIES = 3, LINE_SECONDS = 5 };
+
+static volatile sig_atomic_t terminated; // SIGTERM, as batch systems send it before they take the machine away
+
+static void on_terminate(int number) {
+    UNUSED(number);
+    terminated = 1;
+}
+
+typedef struct Display {
+    bool terminal;
+    double shown; // time of the last line [s]
+} Display;
+
+static bool show_progress(void *user, const FitProgress *p) {
+    Display *display = user;
+    double now = rey_seconds(), wait = display->terminal ? 0.1 : LINE_SECONDS;
+    if (now - display->shown >= wait || p->iteration == p->iterations) {
+        fprintf(stderr, "%siteration %d/%d  loss %.4g  gradient %.3g  %.0f s left%s", display->terminal ? "\r\033[K" : "",
+                p->iteration, p->iterations, p->loss, p->gradient_norm, p->seconds_left,
+                display->terminal ? "" : "\n");
+        display->shown = now;
+    }
+    return !cli_interrupted() && !terminated;
+}
+
+static void entries_text(const FitRow *row, const float *values, char *text, size_t size) {
+    text[0] = 0;
+    if (!values) {
+        snprintf(text, size, "-");
+    } else if (row->count > SHOWN_ENTRIES) {
+        double mean = 0;
+        for (int64_t i = 0; i < row->count; i++) {
+            mean += (double)values[i] / (double)row->count;
+        }
+        snprintf(text, size, "mean %.4g", mean);
+    } else {
+        for (int64_t i = 0; i < row->count; i++) {
+            size_t used = strlen(text);
+            snprintf(text + used, size - used, "%s%.4g", i ? " " : "", (double)values[i]);
+        }
+    }
+}
+
+static void print_table(const FitResult *result) {
+    int width = 9;
+    for (size_t i = 0; i < result->rows.count; i++) {
+        int length = (int)strlen(ARRAY_AT(result->rows, FitRow, i).name);
+        width = length > width ? length : width;
+    }
+    printf("%-*s  %-22s %-22s %-22s %s\n", width, "parameter", "truth", "start", "found", "error");
+    for (size_t i = 0; i < result->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
+        char truth[128], start[128], found[128], error[32] = "-";
+        entries_text(row, row->truth, truth, sizeof truth);
+        entries_text(row, row->start, start, sizeof start);
+        entries_text(row, row->found, found, sizeof found);
+        if (row->truth) {
+            snprintf(error, sizeof error, "%.2f %%%s", 100 * row->error, row->weighted ? " (weighted)" : "");
+        }
+        printf("%-*s  %-22s %-22s %-22s %s\n", width, row->name, truth, start, found, error);
+    }
+}
+
+static void json_values(Json *json, const char *key, const FitRow *row, const float *values) {
+    if (!values || row->count > HISTORY_LARGEST) {
+        return;
+    }
+    json_array(json, key);
+    for (int64_t i = 0; i < row->count; i++) {
+        json_number(json, NULL, (double)values[i]);
+    }
+    json_array_end(json);
+}
+
+static void print_json(const FitResult *result) {
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    json_integer(&json, "iterations", result->iterations);
+    json_bool(&json, "converged", result->converged);
+    json_number(&json, "loss", result->loss);
+    json_number(&json, "seconds", result->seconds);
+    json_number(&json, "seconds_total", cli_seconds_total());
+    json_number(&json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
+    json_integer(&json, "threads", rey_threads(result->ctx));
+    json_integer(&json, "lanes", rey_lanes(result->ctx));
+    json_integer(&json, "numbers", result->numbers);
+    json_array(&json, "parameters");
+    for (size_t i = 0; i < result->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
+        json_object(&json, NULL);
+        json_string(&json, "name", row->name);
+        json_integer(&json, "count", row->count);
+        json_values(&json, "truth", row, row->truth);
+        json_values(&json, "start", row, row->start);
+        json_values(&json, "found", row, row->found);
+        json_number(&json, "error", row->truth ? row->error : (double)NAN);
+        json_string(&json, "measure", row->weighted ? "weighted_mean" : "largest_relative");
+        json_object_end(&json);
+    }
+    json_array_end(&json);
+    json_string(&json, "output", result->output);
+    json_string(&json, "report", result->report);
+    json_string(&json, "scene", result->scene);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+static void print_words(const FitResult *result) {
+    print_table(result);
+    printf("\n%lld numbers, %d iterations%s, %.1f s, loss %.4g\n", (long long)result->numbers, result->iterations,
+           result->converged ? " (converged)" : "", result->seconds, result->loss);
+    if (result->report) {
+        printf("report  %s\n", result->report);
+    }
+    if (result->scene) {
+        printf("scene   %s\n", result->scene);
+    } else if (result->note) {
+        cli_note("the recovered scene was not written: %s", result->note);
+    }
+}
+
+static int run(const Options *options, Session *session) {
+    Display display = {.terminal = isatty(STDERR_FILENO) != 0, .shown = rey_seconds()};
+    FitDef def = {.job_path = options->files[0],
+                  .overrides = options->sets,
+                  .override_count = options->set_count,
+                  .output = options->output,
+                  .resume = options->resume,
+                  .seed_given = options->seed_given,
+                  .seed = options->seed,
+                  .progress = show_progress,
+                  .user = &display};
+    FitResult result;
+    rey_result code = rey_fit(session->ctx, &def, &result);
+    int status = EXIT_OK;
+    if (display.terminal) {
+        fprintf(stderr, "\r\033[K");
+    }
+    if (code == REY_ERROR_CANCELLED) {
+        cli_note("%s", rey_error(session->ctx));
+        status = EXIT_INTERRUPTED;
+    } else if (code) {
+        status = cli_report_failure(options, session->ctx, code);
+    } else {
+        if (options->json) {
+            print_json(&result);
+        } else {
+            print_words(&result);
+        }
+        status = cli_finish_output();
+    }
+    rey_fit_result_free(&result);
+    return status;
+}
+
+int cli_fit(int argc, char **argv) {
+    Options options;
+    Session session;
+    int status;
+    if (!cli_options_parse(COMMAND_FIT, argc, argv, &options, &status)) {
+        return status;
+    }
+    struct sigaction action = {.sa_handler = on_terminate, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGTERM, &action, NULL);
+    status = cli_context_open(&options, &session);
+    if (!status) {
+        status = run(&options, &session);
+        cli_session_close(&session);
+    }
+    cli_options_free(&options);
+    return status;
+}

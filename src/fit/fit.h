@@ -1,0 +1,95 @@
+// fit.h: parameters recovered from images: the loop behind `reynolds fit`.
+#pragma once
+
+#include "fit/checkpoint.h"
+#include "fit/loss.h"
+
+typedef struct FitProgress {
+    int iteration, iterations; // done, and in all
+    double loss, gradient_norm;
+    double seconds, seconds_left;
+} FitProgress;
+
+typedef struct FitDef {
+    const char *job_path;
+    const char *const *overrides; // "key=value"
+    int override_count;
+    const char *output; // folder, null = the job's
+    bool resume;
+    bool seed_given; // seed replaces the job's
+    uint32_t seed;
+    // Called after every iteration, and while longer calls render; false stops: the iteration is finished, the state
+    // saved, and rey_fit returns REY_ERROR_CANCELLED. May be null.
+    bool (*progress)(void *user, const FitProgress *progress);
+    void *user;
+} FitDef;
+
+typedef struct FitRow { // one unknown, in the final table
+    char *name;
+    int64_t count;
+    int64_t shape[3];
+    int dims;
+    float *truth, *start, *found; // truth null: not known
+    double error; // largest relative error of an entry; weighted: see below
+    bool weighted; // mean absolute error over mean, each entry weighted by |d sum(I) / d entry| at the truth
+} FitRow;
+
+typedef struct FitResult {
+    rey_context *ctx;
+    int iterations;
+    bool converged; // by the stop rule
+    double loss;    // mean over the last 10 iterations
+    double seconds; // of all runs
+    int64_t numbers;
+    Array rows; // FitRow
+    char *output, *report, *scene; // paths; null = not written
+    char *note; // why the scene was not written, null = it was
+} FitResult;
+
+rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out);
+void rey_fit_result_free(FitResult *result); // also after a failure
+
+/* ---- what the parts of a fit share --------------------------------------------------------------------- */
+
+typedef struct FitView {
+    int sensor, width, height;
+    float *target, *mask; // mask null = 1 everywhere
+    double mask_sum, weight;
+} FitView;
+
+typedef struct Fit {
+    rey_context *ctx;
+    const FitDef *def;
+    Job job;
+    char *flat; // the resolved job
+    rey_scene *scene;
+    Unknowns unknowns;
+    FitView *views;
+    FitState state;
+    char *output;          // folder
+    float *a, *b;          // halves of the view at work
+    float *adjoint_a, *adjoint_b;
+    double *gradient;      // of one product
+    int64_t largest;       // floats of the largest picture
+    struct TensorBoard *board;
+    void *metrics;         // FILE *
+    double start_seconds;  // clock at which this run started, less the time of earlier runs
+    bool stop;             // the user asked to stop
+} Fit;
+
+// Path of a file in the output folder; freed with rey_free.
+char *rey_fit_output_path(const Fit *fit, const char *name);
+// Renders a view's sensor of any scene with plenty of samples.
+rey_result rey_fit_picture(const Fit *fit, rey_scene *scene, const FitView *view, uint32_t set, int spp, float *image);
+
+rey_result rey_views_load(Fit *fit);
+void rey_views_free(Fit *fit);
+
+// metrics.jsonl and the TensorBoard file. open truncates to the iterations that are done.
+rey_result rey_metrics_open(Fit *fit);
+rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count);
+rey_result rey_metrics_image(Fit *fit, int view, const float *image);
+void rey_metrics_close(Fit *fit);
+
+// Fills result->rows; opens the truth when the job names one, which nothing does before.
+rey_result rey_fit_table(Fit *fit, FitResult *result);

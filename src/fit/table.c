@@ -1,0 +1,143 @@
+// table.c: the final table: truth, start, found and error of every unknown. The truth is opened here, after the
+// optimisation is over, and nowhere else.
+#include "fit/fit.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LARGEST_SMALL = 64, WEIGHT_SPP = 64 }; // parameters up to this size are judged by their worst entry
+
+static float *copy_floats(rey_context *ctx, const float *values, int64_t count) {
+    float *copy = rey_alloc_array(ctx, (size_t)count, sizeof *copy);
+    if (copy) {
+        memcpy(copy, values, (size_t)count * sizeof *copy);
+    }
+    return copy;
+}
+
+static rey_result add_rows(Fit *fit, FitResult *result) {
+    const Unknowns *u = &fit->unknowns;
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        FitRow *row = rey_array_push(fit->ctx, &result->rows, sizeof *row, 1);
+        if (!row) {
+            return REY_ERROR_MEMORY;
+        }
+        *row = (FitRow){.count = p->count, .dims = p->dims, .shape = {p->shape[0], p->shape[1], p->shape[2]},
+                        .weighted = p->count > LARGEST_SMALL};
+        row->name = rey_strdup(fit->ctx, p->name);
+        row->start = copy_floats(fit->ctx, u->start + p->offset, p->count);
+        row->found = copy_floats(fit->ctx, u->value + p->offset, p->count);
+        if (!row->name || !row->start || !row->found) {
+            return REY_ERROR_MEMORY;
+        }
+    }
+    return REY_OK;
+}
+
+// Adds the views' |d sum(I) / d entry|, entry by entry of the row's parameter, to weights.
+static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t count, const float *ones, double *weights) {
+    double *gradient = rey_alloc_array(fit->ctx, (size_t)count, sizeof *gradient);
+    rey_result result = gradient ? REY_OK : REY_ERROR_MEMORY;
+    memset(weights, 0, (size_t)count * sizeof *weights);
+    for (int v = 0; v < fit->job.view_count && !result; v++) {
+        rey_render_def def = rey_default_render_def();
+        def.sensor = fit->views[v].sensor;
+        def.spp = WEIGHT_SPP;
+        def.seed = fit->job.seed;
+        def.sampler = REY_SAMPLER_SOBOL;
+        def.sets = 1;
+        result = rey_vjp(truth, &def, (rey_selection){&param, 1}, ones, gradient, NULL, NULL);
+        for (int64_t i = 0; i < count && !result; i++) {
+            weights[i] += gradient[i];
+        }
+    }
+    for (int64_t i = 0; i < count; i++) {
+        weights[i] = fabs(weights[i]);
+    }
+    rey_free(fit->ctx, gradient);
+    return result;
+}
+
+static double worst_error(const FitRow *row) {
+    double worst = 0;
+    for (int64_t i = 0; i < row->count; i++) {
+        double truth = (double)row->truth[i], off = fabs((double)row->found[i] - truth);
+        worst = fmax(worst, truth != 0 ? off / fabs(truth) : off); // an entry of truth 0 counts absolutely
+    }
+    return worst;
+}
+
+static double weighted_error(const FitRow *row, const double *weights) {
+    double error = 0, mean = 0;
+    for (int64_t i = 0; i < row->count; i++) {
+        error += weights[i] * fabs((double)row->found[i] - (double)row->truth[i]);
+        mean += weights[i] * fabs((double)row->truth[i]);
+    }
+    return mean > 0 ? error / mean : 0;
+}
+
+static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRow *row) {
+    int param = rey_param_find(truth, row->name);
+    rey_param_info info;
+    if (param < 0 || rey_param_get_info(truth, param, &info) || info.count != row->count) {
+        return REY_OK; // nothing to compare with
+    }
+    row->truth = copy_floats(fit->ctx, rey_param_values(truth, param), row->count);
+    if (!row->truth) {
+        return REY_ERROR_MEMORY;
+    }
+    if (!row->weighted) {
+        row->error = worst_error(row);
+        return REY_OK;
+    }
+    double *weights = rey_alloc_array(fit->ctx, (size_t)row->count, sizeof *weights);
+    rey_result result = weights ? add_weights(fit, truth, param, row->count, ones, weights) : REY_ERROR_MEMORY;
+    if (!result) {
+        row->error = weighted_error(row, weights);
+    }
+    rey_free(fit->ctx, weights);
+    return result;
+}
+
+// The truth's pictures have the views' sizes, or the weights would be those of other pictures.
+static rey_result check_films(Fit *fit, const rey_scene *truth) {
+    for (int v = 0; v < fit->job.view_count; v++) {
+        const FitView *view = &fit->views[v];
+        int width, height;
+        rey_result result = rey_scene_film_size(truth, view->sensor, &width, &height);
+        if (result) {
+            return result;
+        }
+        if (width != view->width || height != view->height) {
+            return rey_fail(fit->ctx, REY_ERROR_SCENE, "%s: sensor %d delivers %d x %d, the scene's %d x %d",
+                            fit->job.truth_scene, view->sensor, width, height, view->width, view->height);
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_fit_table(Fit *fit, FitResult *out) {
+    rey_result result = add_rows(fit, out);
+    if (result || !fit->job.truth_scene) {
+        return result;
+    }
+    rey_scene *truth = NULL;
+    const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
+    float *ones = rey_alloc_array(fit->ctx, (size_t)fit->largest, sizeof *ones);
+    result = path && ones
+                 ? rey_scene_load(fit->ctx, path, fit->job.defines, fit->job.define_count, &truth)
+                 : REY_ERROR_MEMORY;
+    for (int64_t i = 0; ones && i < fit->largest; i++) {
+        ones[i] = 1;
+    }
+    if (!result) {
+        result = check_films(fit, truth);
+    }
+    for (size_t i = 0; i < out->rows.count && !result; i++) {
+        result = judge_row(fit, truth, ones, &ARRAY_AT(out->rows, FitRow, i));
+    }
+    rey_free(fit->ctx, ones);
+    rey_scene_destroy(truth);
+    return result;
+}

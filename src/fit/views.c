@@ -1,0 +1,104 @@
+// views.c: target pictures and masks, and what they must agree with.
+#include "fit/fit.h"
+#include "io/image.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static rey_result fail_view(Fit *fit, const JobView *job_view, const char *why) {
+    return job_view->line ? rey_fail(fit->ctx, REY_ERROR_FORMAT, "%s:%d: %s", fit->job.path, job_view->line, why)
+                          : rey_fail(fit->ctx, REY_ERROR_FORMAT, "--set: %s", why);
+}
+
+static rey_result load_picture(Fit *fit, const JobView *job_view, const FitView *view, const char *name,
+                               rey_image *image) {
+    const char *path = rey_job_path(&fit->job, name);
+    rey_result result = path ? rey_image_read(fit->ctx, path, image) : REY_ERROR_MEMORY;
+    if (result) {
+        return result;
+    }
+    rey_image_decode_srgb(image);
+    if (image->width != view->width || image->height != view->height) {
+        char why[1024];
+        snprintf(why, sizeof why, "%s is %d x %d, but sensor %d delivers %d x %d", name, image->width, image->height,
+                 view->sensor, view->width, view->height);
+        return fail_view(fit, job_view, why);
+    }
+    return rey_image_to_rgb(fit->ctx, image);
+}
+
+static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
+    int64_t pixels = (int64_t)view->width * view->height;
+    view->mask_sum = (double)pixels;
+    if (!job_view->mask) {
+        return REY_OK;
+    }
+    rey_image image = {0};
+    rey_result result = load_picture(fit, job_view, view, job_view->mask, &image);
+    if (!result) {
+        view->mask = rey_alloc_array(fit->ctx, (size_t)pixels, sizeof *view->mask);
+        result = view->mask ? REY_OK : REY_ERROR_MEMORY;
+    }
+    view->mask_sum = 0;
+    for (int64_t i = 0; i < pixels && !result; i++) {
+        view->mask[i] = image.data[3 * i];
+        view->mask_sum += (double)view->mask[i];
+        if (!(view->mask[i] >= 0) || !isfinite(view->mask[i])) {
+            result = fail_view(fit, job_view, "the mask holds values below 0 or not finite");
+        }
+    }
+    if (!result && !(view->mask_sum > 0)) {
+        result = fail_view(fit, job_view, "the mask is 0 everywhere");
+    }
+    rey_image_free(fit->ctx, &image);
+    return result;
+}
+
+static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
+    *view = (FitView){.sensor = job_view->sensor, .weight = job_view->weight};
+    rey_result result = rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height);
+    if (result) {
+        char why[256];
+        snprintf(why, sizeof why, "%.200s", rey_error(fit->ctx));
+        return fail_view(fit, job_view, why);
+    }
+    rey_image image = {0};
+    result = load_picture(fit, job_view, view, job_view->target, &image);
+    if (!result) {
+        result = load_mask(fit, job_view, view);
+    }
+    int64_t floats = (int64_t)view->width * view->height * 3;
+    for (int64_t i = 0; i < floats && !result; i++) {
+        if (!isfinite(image.data[i]) && (!view->mask || view->mask[i / 3] > 0)) {
+            char why[1024];
+            snprintf(why, sizeof why, "%s holds a value that is not finite at pixel %d, %d", job_view->target,
+                     (int)(i / 3 % view->width), (int)(i / 3 / view->width));
+            result = fail_view(fit, job_view, why);
+        }
+    }
+    if (!result) {
+        view->target = image.data; // from here on the view's
+        image.data = NULL;
+        fit->largest = floats > fit->largest ? floats : fit->largest;
+    }
+    rey_image_free(fit->ctx, &image);
+    return result;
+}
+
+rey_result rey_views_load(Fit *fit) {
+    fit->views = rey_alloc_array(fit->ctx, (size_t)fit->job.view_count, sizeof *fit->views);
+    rey_result result = fit->views ? REY_OK : REY_ERROR_MEMORY;
+    for (int i = 0; i < fit->job.view_count && !result; i++) {
+        result = load_view(fit, &fit->job.views[i], &fit->views[i]);
+    }
+    return result;
+}
+
+void rey_views_free(Fit *fit) {
+    for (int i = 0; fit->views && i < fit->job.view_count; i++) {
+        rey_free(fit->ctx, fit->views[i].target);
+        rey_free(fit->ctx, fit->views[i].mask);
+    }
+    rey_free(fit->ctx, fit->views);
+    fit->views = NULL;
+}
