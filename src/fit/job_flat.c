@@ -2,8 +2,10 @@
 #include "fit/job.h"
 #include "fit/text.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 // Quotes a text as YAML does with double quotes, whose escapes contain JSON's.
@@ -162,7 +164,8 @@ static void nest_line(Text *t, const char *before, const char *line) {
 
 rey_result rey_job_yaml(const Job *job, char **out) {
     Text flat = {.ctx = job->ctx}, nested = {.ctx = job->ctx};
-    line_text(&flat, "folder", job->folder);
+    char absolute[PATH_MAX]; // the text lies in another folder than the job
+    line_text(&flat, "folder", realpath(job->folder, absolute) ? absolute : job->folder);
     line_text(&flat, "output", job->output);
     line_integer(&flat, "iterations", job->iterations);
     line_integer(&flat, "checkpoint_every", job->checkpoint_every);

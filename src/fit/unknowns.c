@@ -62,7 +62,9 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
     rey_image image = {0};
     rey_result result = path ? rey_image_read(job->ctx, path, &image) : REY_ERROR_MEMORY;
     if (!result) {
-        rey_image_decode_srgb(&image);
+        if (image.srgb) {
+            rey_image_decode_srgb(&image);
+        }
         int64_t count = (int64_t)image.width * image.height * image.channels;
         if (count != unknown->count) {
             char why[1024];

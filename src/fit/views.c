@@ -17,7 +17,9 @@ static rey_result load_picture(Fit *fit, const JobView *job_view, const FitView 
     if (result) {
         return result;
     }
-    rey_image_decode_srgb(image);
+    if (image->srgb) {
+        rey_image_decode_srgb(image);
+    }
     if (image->width != view->width || image->height != view->height) {
         char why[1024];
         snprintf(why, sizeof why, "%s is %d x %d, but sensor %d delivers %d x %d", name, image->width, image->height,

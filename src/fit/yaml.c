@@ -233,8 +233,17 @@ int rey_yaml_count(const YamlNode *node) {
 static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, const char *assignment,
                             YamlNode **out) {
     YamlNode **place = &node->child;
-    if (node->kind == YAML_SCALAR && node->text && node->text[0]) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %s: there is a plain value above '%s'", assignment, part);
+    if (node->kind == YAML_SCALAR && node->text && node->text[0]) { // "loss: l2" is short for "loss: {type: l2}"
+        YamlNode *type = rey_alloc(ctx, sizeof *type);
+        char *key = type ? rey_strdup(ctx, "type") : NULL;
+        if (!key) {
+            rey_free(ctx, type);
+            return REY_ERROR_MEMORY;
+        }
+        *type = (YamlNode){.line = node->line, .key = key, .text = node->text};
+        node->text = NULL;
+        node->child = type;
+        node->kind = YAML_MAP;
     }
     if (node->kind == YAML_LIST) {
         char *end;
