@@ -24,7 +24,7 @@ const char rey_report_style[] =
     "figure{margin:0}\n"
     "figcaption,.note{font-size:.82rem;color:var(--dim);margin-top:.3rem}\n"
     ".four{display:grid;grid-template-columns:repeat(4,1fr);gap:.7rem;margin-top:.7rem}\n"
-    ".four img,.slide img{width:100%;display:block;image-rendering:auto}\n"
+    ".four img,.slide img{width:100%;height:auto;display:block}\n"
     ".view{display:none}\n"
     ".js .view{display:block;max-width:34rem;margin:0 auto}\n"
     ".slide{position:relative;overflow:hidden;background:var(--well);touch-action:none;cursor:ew-resize}\n"
