@@ -339,7 +339,7 @@ static void close_fit(Fit *fit) {
 }
 
 static rey_result save_scene(Fit *fit, FitResult *out) {
-    char *path = rey_fit_output_path(fit, "scene.xml");
+    char *path = rey_fit_output_path(fit, "recovered.xml");
     if (!path) {
         return REY_ERROR_MEMORY;
     }
