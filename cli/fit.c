@@ -27,10 +27,10 @@ typedef struct Display {
 static bool show_progress(void *user, const FitProgress *p) {
     Display *display = user;
     double now = rey_seconds(), wait = display->terminal ? 0.1 : LINE_SECONDS;
-    if (now - display->shown >= wait || p->iteration == p->iterations) {
-        fprintf(stderr, "%siteration %d/%d  loss %.4g  gradient %.3g  %.0f s left%s", display->terminal ? "\r\033[K" : "",
-                p->iteration, p->iterations, p->loss, p->gradient_norm, p->seconds_left,
-                display->terminal ? "" : "\n");
+    if (!p->finishing && (now - display->shown >= wait || p->iteration == p->iterations)) {
+        fprintf(stderr, "%siteration %d/%d  loss %.4g  gradient %.3g  %.0f s left%s",
+                display->terminal ? "\r\033[K" : "", p->iteration, p->iterations, p->loss, p->gradient_norm,
+                p->seconds_left, display->terminal ? "" : "\n");
         display->shown = now;
     }
     return !cli_interrupted() && !terminated;

@@ -59,10 +59,13 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
     if (!bytes) {
         return REY_ERROR_MEMORY;
     }
-    CheckpointHeader header = {.job_bytes = job_bytes, .numbers = (uint64_t)u->count,
+    CheckpointHeader header = {.job_bytes = job_bytes,
+                               .numbers = (uint64_t)u->count,
                                .rows = state->history.count / (size_t)state->history_width,
-                               .width = (uint64_t)state->history_width, .iteration = (uint64_t)state->iteration,
-                               .converged = state->converged, .job_hash = hash_bytes(flat, job_bytes),
+                               .width = (uint64_t)state->history_width,
+                               .iteration = (uint64_t)state->iteration,
+                               .converged = state->converged,
+                               .job_hash = hash_bytes(flat, job_bytes),
                                .seconds = state->seconds};
     memcpy(header.magic, MAGIC, sizeof MAGIC);
     size_t at = 0;
@@ -86,9 +89,22 @@ static bool sizes_agree(const CheckpointHeader *h, size_t size) {
         return false;
     }
     uint64_t per_number = 2 * sizeof(float) + 3 * sizeof(double);
-    uint64_t expected = sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
-                        sizeof(uint64_t);
+    uint64_t expected =
+        sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number + sizeof(uint64_t);
     return expected == size;
+}
+
+// The value in the line of a key, "absent" when there is none.
+static const char *find_line(const char *text, const char *key) {
+    size_t length = strlen(key);
+    while (*text) {
+        if (!strncmp(text, key, length) && !strncmp(text + length, ": ", 2)) {
+            return text + length + 2;
+        }
+        text += strcspn(text, "\n");
+        text += *text != 0;
+    }
+    return "absent";
 }
 
 static rey_result check_job(rey_context *ctx, const char *path, const CheckpointHeader *header, const char *stored,
@@ -100,11 +116,18 @@ static rey_result check_job(rey_context *ctx, const char *path, const Checkpoint
     memcpy(old, stored, (size_t)header->job_bytes);
     char key[256];
     bool other = rey_job_difference(old, flat, key, sizeof key);
+    const char *hint = "finish with the old job or use another -o";
+    if (other && !strcmp(key, "optimizer.schedule.length")) { // by default it follows the number of iterations
+        hint = "set it to its former value to go on with other iterations";
+    }
+    rey_result result = REY_OK;
+    if (other) {
+        const char *was = find_line(old, key), *now = find_line(flat, key);
+        result = rey_fail(ctx, REY_ERROR_ARGUMENT, "%s is from a different job: '%s' was %.*s and is now %.*s; %s",
+                          path, key, (int)strcspn(was, "\n"), was, (int)strcspn(now, "\n"), now, hint);
+    }
     rey_free(ctx, old);
-    return other ? rey_fail(ctx, REY_ERROR_ARGUMENT,
-                            "%s is from a different job: '%s' differs; finish with the old one or use another -o", path,
-                            key)
-                 : REY_OK;
+    return result;
 }
 
 static rey_result decode(const char *path, const char *flat, const unsigned char *bytes, size_t size, Unknowns *u,

@@ -9,11 +9,11 @@ enum { HISTORY_LOSS, HISTORY_NORM, HISTORY_FACTOR, HISTORY_SECONDS, HISTORY_VALU
 enum { HISTORY_LARGEST = 16 }; // parameters of up to so many numbers are kept in the history
 
 typedef struct FitState {
-    int iteration;     // how many are done
-    double seconds;    // spent so far, over all runs
-    Array history;     // doubles, iteration x history_width
+    int iteration;  // how many are done
+    double seconds; // spent so far, over all runs
+    Array history;  // doubles, iteration x history_width
     int history_width;
-    bool converged;    // the stop rule has ended the fit
+    bool converged; // the stop rule has ended the fit
 } FitState;
 
 // Writes so that the file is complete or the former one. flat: the resolved job's flat text.

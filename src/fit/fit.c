@@ -10,6 +10,7 @@
 #include "io/file.h"
 
 #include <errno.h>
+#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -72,9 +73,23 @@ static rey_render_def view_def(const Fit *fit, const FitView *view, uint32_t set
     return def;
 }
 
-rey_result rey_fit_picture(const Fit *fit, rey_scene *scene, const FitView *view, uint32_t set, int spp, float *image) {
+static bool finishing_step(void *user, double fraction) {
+    const Fit *fit = user;
+    FitProgress progress = {.iteration = fit->state.iteration, .iterations = fit->job.iterations, .finishing = true};
+    UNUSED(fraction);
+    return !fit->def->progress || fit->def->progress(fit->def->user, &progress);
+}
+
+rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set, int spp) {
     rey_render_def def = view_def(fit, view, set, spp);
-    return rey_render(scene, &def, image, NULL);
+    def.progress = finishing_step;
+    def.user = fit;
+    return def;
+}
+
+static rey_result render_half(const Fit *fit, const FitView *view, uint32_t set, int spp, float *image) {
+    rey_render_def def = view_def(fit, view, set, spp);
+    return rey_render(fit->scene, &def, image, NULL);
 }
 
 static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int spp, const float *adjoint) {
@@ -91,9 +106,9 @@ static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int s
 static rey_result add_view(Fit *fit, const FitView *view, int batch_count, double *loss) {
     int iteration = fit->state.iteration, spp = rey_job_spp_at(&fit->job, iteration) / 2;
     uint32_t set_a = 2 * (uint32_t)iteration, set_b = set_a + 1;
-    rey_result result = rey_fit_picture(fit, fit->scene, view, set_a, spp, fit->a);
+    rey_result result = render_half(fit, view, set_a, spp, fit->a);
     if (!result) {
-        result = rey_fit_picture(fit, fit->scene, view, set_b, spp, fit->b);
+        result = render_half(fit, view, set_b, spp, fit->b);
     }
     if (result) {
         return result;
@@ -161,7 +176,7 @@ static rey_result iterate(Fit *fit, int *order) {
 static double mean_loss(const FitState *state, int end, int count) {
     double sum = 0;
     for (int i = end - count; i < end; i++) {
-        sum += ARRAY_AT(state->history, double, (size_t)i * (size_t)state->history_width + HISTORY_LOSS) / count;
+        sum += ARRAY_AT(state->history, double, (size_t)i *(size_t)state->history_width + HISTORY_LOSS) / count;
     }
     return sum;
 }
@@ -189,11 +204,14 @@ static bool report_progress(Fit *fit, double run_start, int first) {
         return true;
     }
     const double *row = fit->state.history.count ? (const double *)fit->state.history.data + fit->state.history.count -
-                                                       fit->state.history_width : NULL;
+                                                       fit->state.history_width
+                                                 : NULL;
     int done = fit->state.iteration - first, left = fit->job.iterations - fit->state.iteration;
     double now = rey_seconds();
-    FitProgress progress = {.iteration = fit->state.iteration, .iterations = fit->job.iterations,
-                            .loss = row ? row[HISTORY_LOSS] : 0, .gradient_norm = row ? row[HISTORY_NORM] : 0,
+    FitProgress progress = {.iteration = fit->state.iteration,
+                            .iterations = fit->job.iterations,
+                            .loss = row ? row[HISTORY_LOSS] : 0,
+                            .gradient_norm = row ? row[HISTORY_NORM] : 0,
                             .seconds = now - fit->start_seconds,
                             .seconds_left = done ? (now - run_start) / done * left : 0};
     return fit->def->progress(fit->def->user, &progress);
@@ -374,14 +392,23 @@ static rey_result finish(Fit *fit, FitResult *out) {
 rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out) {
     Fit fit = {.ctx = ctx, .def = def};
     *out = (FitResult){.ctx = ctx};
+    locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0); // files hold decimal points, whatever the host has set
+    locale_t host = plain ? uselocale(plain) : (locale_t)0;
     rey_result result = open_fit(&fit);
     if (!result) {
         result = optimise(&fit);
     }
     if (!result) {
         result = finish(&fit, out);
+        if (result == REY_ERROR_CANCELLED) {
+            rey_fail(ctx, result, "stopped before the report was written; --resume writes it");
+        }
     }
     close_fit(&fit);
+    if (plain) {
+        uselocale(host);
+        freelocale(plain);
+    }
     return result;
 }
 

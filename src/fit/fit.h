@@ -8,6 +8,7 @@ typedef struct FitProgress {
     int iteration, iterations; // done, and in all
     double loss, gradient_norm;
     double seconds, seconds_left;
+    bool finishing; // the iterations are over; table and report are at work
 } FitProgress;
 
 typedef struct FitDef {
@@ -30,7 +31,7 @@ typedef struct FitRow { // one unknown, in the final table
     int64_t shape[3];
     int dims;
     float *truth, *start, *found; // truth null: not known
-    double error; // largest relative error of an entry; weighted: see below
+    double error;                 // largest relative error of an entry; weighted: see below
     bool weighted; // mean absolute error over mean, each entry weighted by |d sum(I) / d entry| at the truth
 } FitRow;
 
@@ -41,9 +42,9 @@ typedef struct FitResult {
     double loss;    // mean over the last 10 iterations
     double seconds; // of all runs
     int64_t numbers;
-    Array rows; // FitRow
+    Array rows;                    // FitRow
     char *output, *report, *scene; // paths; null = not written
-    char *note; // why the scene was not written, null = it was
+    char *note;                    // why the scene was not written, null = it was
 } FitResult;
 
 rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out);
@@ -66,21 +67,21 @@ typedef struct Fit {
     Unknowns unknowns;
     FitView *views;
     FitState state;
-    char *output;          // folder
-    float *a, *b;          // halves of the view at work
+    char *output; // folder
+    float *a, *b; // halves of the view at work
     float *adjoint_a, *adjoint_b;
-    double *gradient;      // of one product
-    int64_t largest;       // floats of the largest picture
+    double *gradient; // of one product
+    int64_t largest;  // floats of the largest picture
     struct TensorBoard *board;
-    void *metrics;         // FILE *
-    double start_seconds;  // clock at which this run started, less the time of earlier runs
-    bool stop;             // the user asked to stop
+    void *metrics;        // FILE *
+    double start_seconds; // clock at which this run started, less the time of earlier runs
+    bool stop;            // the user asked to stop
 } Fit;
 
 // Path of a file in the output folder; freed with rey_free.
 char *rey_fit_output_path(const Fit *fit, const char *name);
-// Renders a view's sensor of any scene with plenty of samples.
-rey_result rey_fit_picture(const Fit *fit, rey_scene *scene, const FitView *view, uint32_t set, int spp, float *image);
+// How table and report render a view; the user may cancel.
+rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set, int spp);
 
 rey_result rey_views_load(Fit *fit);
 void rey_views_free(Fit *fit);

@@ -51,17 +51,6 @@ static rey_result fail_at(Job *job, const YamlNode *node, const char *format, ..
     return rey_fail(job->ctx, REY_ERROR_FORMAT, "%s:%d: %s", job->path, node->line, message);
 }
 
-void *rey_job_alloc(Job *job, size_t count, size_t item_bytes) {
-    void *memory = rey_alloc_array(job->ctx, count, item_bytes);
-    void **slot = memory ? rey_array_push(job->ctx, &job->memory, sizeof(void *), 1) : NULL;
-    if (!slot) {
-        rey_free(job->ctx, memory);
-        return NULL;
-    }
-    *slot = memory;
-    return memory;
-}
-
 static bool is_real(const YamlNode *node, double *value) {
     const char *end;
     return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
@@ -178,11 +167,18 @@ static rey_result open_list(Job *job, const YamlNode *node, size_t item_bytes, v
     return *items ? REY_OK : REY_ERROR_MEMORY;
 }
 
+// Letters, digits and underscores, the first no digit.
+static bool is_name(const char *text) {
+    static const char rest[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789";
+    return *text && !(*text >= '0' && *text <= '9') && !text[strspn(text, rest)];
+}
+
 static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
     rey_define **defines = target;
     if (node->kind != YAML_MAP) {
         return node->child || (node->text && node->text[0])
-                   ? fail_at(job, node, "defines: expected 'name: value' lines") : REY_OK;
+                   ? fail_at(job, node, "defines: expected 'name: value' lines")
+                   : REY_OK;
     }
     job->define_count = rey_yaml_count(node);
     *defines = rey_job_alloc(job, (size_t)job->define_count, sizeof **defines);
@@ -190,7 +186,8 @@ static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*defines)[i].name = entry->key;
-        result = read_text(job, entry, &(*defines)[i].value);
+        result = is_name(entry->key) ? read_text(job, entry, &(*defines)[i].value)
+                                     : fail_at(job, entry, "defines: '%s' is not a name", entry->key);
     }
     return result;
 }
@@ -198,7 +195,11 @@ static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
 static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "from", .type = FIELD_INTEGER, .offset = offsetof(JobSpp, from), .high = 1e9, .required = true},
-        {.key = "spp", .type = FIELD_INTEGER, .offset = offsetof(JobSpp, spp), .low = 2, .high = 65536,
+        {.key = "spp",
+         .type = FIELD_INTEGER,
+         .offset = offsetof(JobSpp, spp),
+         .low = 2,
+         .high = 65536,
          .required = true},
         {0},
     };
@@ -246,7 +247,10 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
 
 static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
-        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(Job, loss), .names = rey_loss_name_list,
+        {.key = "type",
+         .type = FIELD_CHOICE,
+         .offset = offsetof(Job, loss),
+         .names = rey_loss_name_list,
          .required = true},
         {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(Job, loss_epsilon), .low = 1e-12, .high = 1e6},
         {0},
@@ -258,7 +262,10 @@ static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
 
 static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
-        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobSchedule, kind), .names = rey_schedule_name_list,
+        {.key = "type",
+         .type = FIELD_CHOICE,
+         .offset = offsetof(JobSchedule, kind),
+         .names = rey_schedule_name_list,
          .required = true},
         {.key = "end", .type = FIELD_REAL, .offset = offsetof(JobSchedule, end), .high = 1},
         {.key = "length", .type = FIELD_INTEGER, .offset = offsetof(JobSchedule, length), .low = 1, .high = 1e9},
@@ -272,9 +279,11 @@ static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
 
 static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
-        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobOptimizer, kind),
-         .names = rey_optimizer_name_list},
-        {.key = "learning_rate", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, learning_rate), .low = 1e-12,
+        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobOptimizer, kind), .names = rey_optimizer_name_list},
+        {.key = "learning_rate",
+         .type = FIELD_REAL,
+         .offset = offsetof(JobOptimizer, learning_rate),
+         .low = 1e-12,
          .high = 1e12},
         {.key = "beta1", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, beta1), .high = 0.999999},
         {.key = "beta2", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, beta2), .high = 0.99999999},
@@ -286,14 +295,23 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
     return read_map(job, node, "optimizer", fields, target);
 }
 
+static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
+    bool text = node->kind == YAML_SCALAR && node->text;
+    if (text && (!strcmp(node->text, ".inf") || !strcmp(node->text, "-.inf"))) {
+        *out = node->text[0] == '-' ? -INFINITY : INFINITY;
+        return REY_OK;
+    }
+    return read_real(job, node, -1e30, 1e30, out);
+}
+
 static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
     double *bounds = target;
     if (node->kind != YAML_LIST || rey_yaml_count(node) != 2) {
         return fail_at(job, node, "bounds: expected [low, high]");
     }
-    rey_result result = read_real(job, node->child, -1e30, 1e30, &bounds[0]);
+    rey_result result = read_bound(job, node->child, &bounds[0]);
     if (!result) {
-        result = read_real(job, node->child->next, -1e30, 1e30, &bounds[1]);
+        result = read_bound(job, node->child->next, &bounds[1]);
     }
     if (!result && !(bounds[0] < bounds[1])) {
         result = fail_at(job, node, "bounds: %g is not below %g", bounds[0], bounds[1]);
@@ -325,12 +343,19 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
 static rey_result read_parameters(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "name", .type = FIELD_TEXT, .offset = offsetof(JobParameter, name), .required = true},
-        {.key = "learning_rate", .type = FIELD_REAL, .offset = offsetof(JobParameter, learning_rate), .low = 1e-12,
+        {.key = "learning_rate",
+         .type = FIELD_REAL,
+         .offset = offsetof(JobParameter, learning_rate),
+         .low = 1e-12,
          .high = 1e12},
         {.key = "bounds", .type = FIELD_READER, .offset = offsetof(JobParameter, bounds), .read = read_bounds},
-        {.key = "parameterisation", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, parameterisation),
+        {.key = "parameterisation",
+         .type = FIELD_CHOICE,
+         .offset = offsetof(JobParameter, parameterisation),
          .names = rey_parameterisation_name_list},
-        {.key = "moment", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, moment),
+        {.key = "moment",
+         .type = FIELD_CHOICE,
+         .offset = offsetof(JobParameter, moment),
          .names = rey_moment_name_list},
         {.key = "start", .type = FIELD_READER, .offset = 0, .read = read_start},
         {0},
@@ -378,7 +403,10 @@ static const Field job_fields[] = {
     {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
     {.key = "loss", .type = FIELD_READER, .read = read_loss},
     {.key = "optimizer", .type = FIELD_READER, .offset = offsetof(Job, optimizer), .read = read_optimizer},
-    {.key = "parameters", .type = FIELD_READER, .offset = offsetof(Job, parameters), .read = read_parameters,
+    {.key = "parameters",
+     .type = FIELD_READER,
+     .offset = offsetof(Job, parameters),
+     .read = read_parameters,
      .required = true},
     {.key = "stop", .type = FIELD_READER, .read = read_stop},
     {.key = "checkpoint_every", .type = FIELD_INTEGER, .offset = offsetof(Job, checkpoint_every), .high = 1e9},
@@ -404,7 +432,10 @@ static rey_result set_defaults(Job *job) {
     job->spp_count = 1;
     job->loss = LOSS_RELATIVE_L2;
     job->loss_epsilon = 0.01;
-    job->optimizer = (JobOptimizer){.learning_rate = 0.02, .beta1 = 0.9, .beta2 = 0.99, .epsilon = 1e-12,
+    job->optimizer = (JobOptimizer){.learning_rate = 0.02,
+                                    .beta1 = 0.9,
+                                    .beta2 = 0.99,
+                                    .epsilon = 1e-12,
                                     .momentum = 0.9,
                                     .schedule = {.end = 0.05, .factor = 0.5, .every = 100}};
     job->checkpoint_every = 50;
@@ -430,8 +461,8 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
         job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
     }
     if (!result && job->views_per_iteration > job->view_count) {
-        result = fail_at(job, rey_yaml_find(job->tree, "views_per_iteration"), "views_per_iteration = %d, but there are %d views",
-                         job->views_per_iteration, job->view_count);
+        result = fail_at(job, rey_yaml_find(job->tree, "views_per_iteration"),
+                         "views_per_iteration = %d, but there are %d views", job->views_per_iteration, job->view_count);
     }
     return result;
 }
@@ -447,38 +478,4 @@ rey_result rey_job_read(rey_context *ctx, const char *path, const char *const *o
     }
     rey_free(ctx, bytes);
     return result;
-}
-
-void rey_job_free(Job *job) {
-    if (!job->ctx) {
-        return;
-    }
-    for (size_t i = 0; i < job->memory.count; i++) {
-        rey_free(job->ctx, ARRAY_AT(job->memory, void *, i));
-    }
-    rey_array_free(job->ctx, &job->memory);
-    rey_yaml_free(job->ctx, job->tree);
-    *job = (Job){0};
-}
-
-const char *rey_job_path(Job *job, const char *name) {
-    if (name[0] == '/' || !strcmp(job->folder, ".")) {
-        return name;
-    }
-    size_t folder = strlen(job->folder), length = strlen(name);
-    char *path = rey_job_alloc(job, folder + length + 2, 1);
-    if (path) {
-        memcpy(path, job->folder, folder);
-        path[folder] = '/';
-        memcpy(path + folder + 1, name, length);
-    }
-    return path;
-}
-
-int rey_job_spp_at(const Job *job, int iteration) {
-    int spp = job->spp[0].spp;
-    for (int i = 0; i < job->spp_count && job->spp[i].from <= iteration; i++) {
-        spp = job->spp[i].spp;
-    }
-    return spp;
 }

@@ -29,13 +29,13 @@ typedef struct JobView {
 } JobView;
 
 typedef struct JobParameter {
-    const char *name; // may hold * for any text
+    const char *name;     // may hold * for any text
     double learning_rate; // 0 = the optimizer's
     double bounds[2];     // NaN = the parameter's own range
     Parameterisation parameterisation;
     MomentKind moment;
-    const double *start; // values, null = none
-    int start_count;     // 1 = the same for every entry
+    const double *start;    // values, null = none
+    int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none
     int line;
 } JobParameter;

@@ -21,6 +21,14 @@ static void line_real(Text *t, const char *key, double value) {
     rey_text_add(t, "\n");
 }
 
+static void line_bound(Text *t, const char *key, double value) {
+    if (isinf(value)) {
+        rey_text_add(t, "%s: %s\n", key, value < 0 ? "-.inf" : ".inf");
+    } else {
+        line_real(t, key, value);
+    }
+}
+
 static void line_integer(Text *t, const char *key, int64_t value) {
     rey_text_add(t, "%s: %lld\n", key, (long long)value);
 }
@@ -33,8 +41,8 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
         line_real(t, KEY("learning_rate"), p->learning_rate);
     }
     if (!isnan(p->bounds[0])) {
-        line_real(t, KEY("bounds.0"), p->bounds[0]);
-        line_real(t, KEY("bounds.1"), p->bounds[1]);
+        line_bound(t, KEY("bounds.0"), p->bounds[0]);
+        line_bound(t, KEY("bounds.1"), p->bounds[1]);
     }
     line_text(t, KEY("parameterisation"), rey_parameterisation_name((int)p->parameterisation));
     line_text(t, KEY("moment"), rey_moment_name((int)p->moment));

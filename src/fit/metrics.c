@@ -5,6 +5,7 @@
 #include "io/file.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -47,7 +48,7 @@ rey_result rey_metrics_open(Fit *fit) {
         }
     }
     rey_free(fit->ctx, path);
-    return result ? result : rey_tensorboard_open(fit->ctx, fit->output, &fit->board);
+    return result ? result : rey_tensorboard_open(fit->ctx, fit->output, fit->state.iteration, &fit->board);
 }
 
 static void put_values(Fit *fit, Text *t) {
@@ -101,8 +102,9 @@ rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count) {
     rey_text_number(&t, row[HISTORY_NORM]);
     rey_text_add(&t, ",\"learning_rate_factor\":");
     rey_text_number(&t, row[HISTORY_FACTOR]);
-    rey_text_add(&t, ",\"spp\":%d,\"seconds\":%.3f,\"views\":[", rey_job_spp_at(&fit->job, (int)step),
-                 row[HISTORY_SECONDS]);
+    rey_text_add(&t, ",\"spp\":%d,\"seconds\":", rey_job_spp_at(&fit->job, (int)step));
+    rey_text_number(&t, floor(1000 * row[HISTORY_SECONDS]) / 1000);
+    rey_text_add(&t, ",\"views\":[");
     for (int i = 0; i < batch_count; i++) {
         rey_text_add(&t, "%s%d", i ? "," : "", batch[i]);
     }

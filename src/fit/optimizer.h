@@ -17,13 +17,13 @@ typedef struct Unknown { // one parameter of the scene
 
 typedef struct Unknowns {
     rey_context *ctx;
-    Array items;   // Unknown
-    int *params;   // their indices, for rey_selection
-    int64_t count; // numbers in all
-    float *start, *value; // as the scene holds them
-    double *variable;     // what the optimizer moves: x, log x, or logit of x's place within the bounds
+    Array items;            // Unknown
+    int *params;            // their indices, for rey_selection
+    int64_t count;          // numbers in all
+    float *start, *value;   // as the scene holds them
+    double *variable;       // what the optimizer moves: x, log x, or logit of x's place within the bounds
     double *first, *second; // moments; SGD uses the first as its velocity
-    double *gradient;     // d loss / d value
+    double *gradient;       // d loss / d value
 } Unknowns;
 
 // Finds the job's parameters in the scene, gives the scene their start values, and clears the moments.

@@ -44,8 +44,8 @@ static rey_result put_thumbnail(Text *html, const FitRow *row, const float *valu
     for (int64_t i = 0; rgb && i < 3 * width * height; i++) {
         rgb[i] = values[i / 3 * channels];
     }
-    rey_result result = rgb ? rey_report_image(html, row->name, rgb, (int)width, (int)height, exposure)
-                            : REY_ERROR_MEMORY;
+    rey_result result =
+        rgb ? rey_report_image(html, row->name, rgb, (int)width, (int)height, exposure) : REY_ERROR_MEMORY;
     rey_free(html->ctx, rgb);
     return result;
 }
@@ -161,8 +161,9 @@ static void put_head(Fit *fit, const FitResult *out, Text *html) {
     rey_text_bytes(html, rey_report_style, strlen(rey_report_style));
     rey_text_add(html, "</style></head><body>\n<h1>Recovering ");
     rey_text_html(html, scene ? scene + 1 : fit->job.scene);
-    rey_text_add(html, " from images</h1>\n<p class=\"lead\">%lld unknown numbers in %d parameter%s, from %d view%s: "
-                       "%d iterations of %s on the %s loss in %.1f seconds%s. Job ",
+    rey_text_add(html,
+                 " from images</h1>\n<p class=\"lead\">%lld unknown numbers in %d parameter%s, from %d view%s: "
+                 "%d iterations of %s on the %s loss in %.1f seconds%s. Job ",
                  (long long)out->numbers, (int)out->rows.count, out->rows.count == 1 ? "" : "s", fit->job.view_count,
                  fit->job.view_count == 1 ? "" : "s", out->iterations,
                  fit->job.optimizer.kind == OPTIMIZER_ADAM ? "Adam" : "gradient descent with momentum",

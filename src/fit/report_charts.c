@@ -27,7 +27,8 @@ static double loss_y(Axis axis, double loss) {
     return (HIGH - BOTTOM) * (axis.high - log10(loss)) / (axis.high - axis.low);
 }
 
-// One curve of the loss, smoothed over 2 * reach + 1 bins. Estimates of a small loss can be negative: they are left out.
+// One curve of the loss, smoothed over 2 * reach + 1 bins. Estimates of a small loss can be negative: they are left
+// out.
 static void loss_curve(const Fit *fit, Axis axis, int bins, int reach, const char *style, Text *html) {
     rey_text_add(html, "<polyline class=\"%s\" points=\"", style);
     for (int i = 0; i < bins; i++) {
@@ -63,7 +64,11 @@ static void loss_axes(const Fit *fit, Axis axis, Text *html) {
     }
     for (int i = 0; i <= 4; i++) {
         rey_text_add(html, "<text x=\"%d\" y=\"%d\" text-anchor=\"%s\">%d</text>", LEFT + (WIDE - LEFT) * i / 4,
-                     HIGH - BOTTOM + 17, i == 4 ? "end" : i ? "middle" : "start", fit->state.iteration * i / 4);
+                     HIGH - BOTTOM + 17,
+                     i == 4 ? "end"
+                     : i    ? "middle"
+                            : "start",
+                     fit->state.iteration * i / 4);
     }
     rey_text_add(html, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">iteration</text>\n", LEFT + (WIDE - LEFT) / 2,
                  HIGH - 2);

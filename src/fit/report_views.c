@@ -110,9 +110,11 @@ static double relative_error(const FitView *view, const float *image) {
 
 static void comparison(Text *html, int view) {
     static const char *const names[] = {"target", "start", "result", "difference"};
-    rey_text_add(html, "<div class=\"view\"><div class=\"slide\"><img alt=\"\"><img alt=\"\"><i></i></div>"
-                       "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" aria-label=\"view %d: divide\">"
-                       "<div class=\"ends\">", view);
+    rey_text_add(html,
+                 "<div class=\"view\"><div class=\"slide\"><img alt=\"\"><img alt=\"\"><i></i></div>"
+                 "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" aria-label=\"view %d: divide\">"
+                 "<div class=\"ends\">",
+                 view);
     for (int side = 0; side < 2; side++) {
         rey_text_add(html, "<select aria-label=\"%s picture\">", side ? "right" : "left");
         for (int i = 0; i < COUNT_OF(names); i++) {
@@ -159,7 +161,8 @@ static rey_result render_all(Fit *fit, const float *values, uint32_t set, float 
     rey_result result = rey_unknowns_apply(&fit->unknowns, fit->scene, values);
     for (int v = 0; v < fit->job.view_count && !result; v++) {
         const FitView *view = &fit->views[v];
-        result = rey_fit_picture(fit, fit->scene, view, set, fit->job.report_spp, images);
+        rey_render_def def = rey_fit_finishing_def(fit, view, set, fit->job.report_spp);
+        result = rey_render(fit->scene, &def, images, NULL);
         images += (int64_t)view->width * view->height * 3;
     }
     return result;

@@ -23,7 +23,9 @@ static rey_result add_rows(Fit *fit, FitResult *result) {
         if (!row) {
             return REY_ERROR_MEMORY;
         }
-        *row = (FitRow){.count = p->count, .dims = p->dims, .shape = {p->shape[0], p->shape[1], p->shape[2]},
+        *row = (FitRow){.count = p->count,
+                        .dims = p->dims,
+                        .shape = {p->shape[0], p->shape[1], p->shape[2]},
                         .weighted = p->count > LARGEST_SMALL};
         row->name = rey_strdup(fit->ctx, p->name);
         row->start = copy_floats(fit->ctx, u->start + p->offset, p->count);
@@ -36,17 +38,13 @@ static rey_result add_rows(Fit *fit, FitResult *result) {
 }
 
 // Adds the views' |d sum(I) / d entry|, entry by entry of the row's parameter, to weights.
-static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t count, const float *ones, double *weights) {
+static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t count, const float *ones,
+                              double *weights) {
     double *gradient = rey_alloc_array(fit->ctx, (size_t)count, sizeof *gradient);
     rey_result result = gradient ? REY_OK : REY_ERROR_MEMORY;
     memset(weights, 0, (size_t)count * sizeof *weights);
     for (int v = 0; v < fit->job.view_count && !result; v++) {
-        rey_render_def def = rey_default_render_def();
-        def.sensor = fit->views[v].sensor;
-        def.spp = WEIGHT_SPP;
-        def.seed = fit->job.seed;
-        def.sampler = REY_SAMPLER_SOBOL;
-        def.sets = 1;
+        rey_render_def def = rey_fit_finishing_def(fit, &fit->views[v], 0, WEIGHT_SPP);
         result = rey_vjp(truth, &def, (rey_selection){&param, 1}, ones, gradient, NULL, NULL);
         for (int64_t i = 0; i < count && !result; i++) {
             weights[i] += gradient[i];
@@ -125,9 +123,8 @@ rey_result rey_fit_table(Fit *fit, FitResult *out) {
     rey_scene *truth = NULL;
     const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
     float *ones = rey_alloc_array(fit->ctx, (size_t)fit->largest, sizeof *ones);
-    result = path && ones
-                 ? rey_scene_load(fit->ctx, path, fit->job.defines, fit->job.define_count, &truth)
-                 : REY_ERROR_MEMORY;
+    result = path && ones ? rey_scene_load(fit->ctx, path, fit->job.defines, fit->job.define_count, &truth)
+                          : REY_ERROR_MEMORY;
     for (int64_t i = 0; ones && i < fit->largest; i++) {
         ones[i] = 1;
     }

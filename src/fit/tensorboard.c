@@ -1,6 +1,6 @@
 // tensorboard.c: record = u64 length, checksum of it, bytes, checksum of them. Event: 1 wall time (double), 2 step
-// (int64), 3 file version (string), 5 summary; summary: 1 value; value: 1 tag, 2 number (float), 4 image; image: 1
-// height, 2 width, 3 colour space (3 = RGB), 4 PNG bytes.
+// (int64), 3 file version (string), 5 summary, 7 session (1 status, 1 = start); summary: 1 value; value: 1 tag, 2
+// number (float), 4 image; image: 1 height, 2 width, 3 colour space (3 = RGB), 4 PNG bytes.
 #include "fit/tensorboard.h"
 
 #include "io/image.h"
@@ -97,7 +97,7 @@ static rey_result write_event(TensorBoard *board, Message *event) {
     return result;
 }
 
-rey_result rey_tensorboard_open(rey_context *ctx, const char *folder, TensorBoard **out) {
+rey_result rey_tensorboard_open(rey_context *ctx, const char *folder, int64_t first, TensorBoard **out) {
     *out = NULL;
     TensorBoard *board = rey_alloc(ctx, sizeof *board);
     if (!board) {
@@ -117,7 +117,17 @@ rey_result rey_tensorboard_open(rey_context *ctx, const char *folder, TensorBoar
     *out = board;
     Message event = begin_event(board);
     put_field(&event, 3, "brain.Event:2", strlen("brain.Event:2"));
-    return write_event(board, &event);
+    rey_result result = write_event(board, &event);
+    if (result) {
+        return result;
+    }
+    Message start = begin_event(board), session = {.ctx = ctx};
+    put_key(&start, 2, WIRE_VARINT);
+    put_varint(&start, (uint64_t)first);
+    put_key(&session, 1, WIRE_VARINT);
+    put_varint(&session, 1);
+    put_message(&start, 7, &session);
+    return write_event(board, &start);
 }
 
 // Puts a summary of one value into an event of this step. The value's own fields are in `value`, which is consumed.

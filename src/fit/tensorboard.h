@@ -5,8 +5,9 @@
 
 typedef struct TensorBoard TensorBoard;
 
-// Creates folder/events.out.tfevents.SECONDS.HOST. The caller closes it with rey_tensorboard_close.
-rey_result rey_tensorboard_open(rey_context *ctx, const char *folder, TensorBoard **out);
+// Creates folder/events.out.tfevents.SECONDS.HOST. Steps from `first` on in older files of the folder no longer count.
+// The caller closes *out with rey_tensorboard_close, also after a failure.
+rey_result rey_tensorboard_open(rey_context *ctx, const char *folder, int64_t first, TensorBoard **out);
 rey_result rey_tensorboard_scalar(TensorBoard *board, int64_t step, const char *tag, double value);
 // Linear RGB, shown with the sRGB curve.
 rey_result rey_tensorboard_image(TensorBoard *board, int64_t step, const char *tag, const float *rgb, int width,

@@ -66,13 +66,25 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
             rey_image_decode_srgb(&image);
         }
         int64_t count = (int64_t)image.width * image.height * image.channels;
-        if (count != unknown->count) {
+        bool picture = unknown->dims >= 2; // a picture transposed would have as many numbers
+        if (count != unknown->count ||
+            (picture && (unknown->shape[0] != image.height || unknown->shape[1] != image.width))) {
             char why[1024];
-            snprintf(why, sizeof why, "%s holds %d x %d x %d numbers, expected %lld", p->start_file, image.height,
-                     image.width, image.channels, (long long)unknown->count);
+            char shape[80] = "1";
+            for (int i = 0, used = 0; i < unknown->dims; i++) {
+                used += snprintf(shape + used, sizeof shape - (size_t)used, i ? " x %lld" : "%lld",
+                                 (long long)unknown->shape[i]);
+            }
+            snprintf(why, sizeof why, "%s holds %d x %d x %d numbers, expected %s", p->start_file, image.height,
+                     image.width, image.channels, shape);
             result = fail_at(job, p, unknown->name, why);
         } else {
             memcpy(start, image.data, (size_t)count * sizeof *start);
+        }
+        for (int64_t i = 0; i < count && !result; i++) {
+            if (!isfinite(start[i])) {
+                result = fail_at(job, p, unknown->name, "the start file holds a value that is not finite");
+            }
         }
     }
     rey_image_free(job->ctx, &image);
@@ -101,8 +113,8 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     return REY_OK;
 }
 
-static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index, Array *owners,
-                              Unknowns *u) {
+static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index,
+                              Array *owners, Unknowns *u) {
     rey_param_info info;
     rey_result result = rey_param_get_info(scene, param, &info);
     if (result) {
@@ -124,9 +136,15 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
         return REY_ERROR_MEMORY;
     }
     *owner = job_index;
-    *unknown = (Unknown){.param = param, .name = info.name, .offset = u->count, .count = info.count, .dims = info.dims,
-                         .shape = {info.shape[0], info.shape[1], info.shape[2]}, .learning_rate = p->learning_rate,
-                         .parameterisation = p->parameterisation, .shared_moment = p->moment == MOMENT_SHARED};
+    *unknown = (Unknown){.param = param,
+                         .name = info.name,
+                         .offset = u->count,
+                         .count = info.count,
+                         .dims = info.dims,
+                         .shape = {info.shape[0], info.shape[1], info.shape[2]},
+                         .learning_rate = p->learning_rate,
+                         .parameterisation = p->parameterisation,
+                         .shared_moment = p->moment == MOMENT_SHARED};
     u->count += info.count;
     return set_bounds(job, p, &info, unknown);
 }

@@ -17,9 +17,6 @@ static rey_result load_picture(Fit *fit, const JobView *job_view, const FitView 
     if (result) {
         return result;
     }
-    if (image->srgb) {
-        rey_image_decode_srgb(image);
-    }
     if (image->width != view->width || image->height != view->height) {
         char why[1024];
         snprintf(why, sizeof why, "%s is %d x %d, but sensor %d delivers %d x %d", name, image->width, image->height,
@@ -36,7 +33,7 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
         return REY_OK;
     }
     rey_image image = {0};
-    rey_result result = load_picture(fit, job_view, view, job_view->mask, &image);
+    rey_result result = load_picture(fit, job_view, view, job_view->mask, &image); // of weights: never decoded
     if (!result) {
         view->mask = rey_alloc_array(fit->ctx, (size_t)pixels, sizeof *view->mask);
         result = view->mask ? REY_OK : REY_ERROR_MEMORY;
@@ -70,6 +67,9 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
         result = load_mask(fit, job_view, view);
     }
     int64_t floats = (int64_t)view->width * view->height * 3;
+    if (!result && image.srgb) {
+        rey_image_decode_srgb(&image);
+    }
     for (int64_t i = 0; i < floats && !result; i++) {
         if (!isfinite(image.data[i]) && (!view->mask || view->mask[i / 3] > 0)) {
             char why[1024];

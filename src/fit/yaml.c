@@ -5,7 +5,7 @@
 #include <string.h>
 #include <yaml.h>
 
-enum { DEEPEST = 32 };
+enum { DEEPEST = 32, MOST_KEYS = 4096 };
 
 typedef struct Reader {
     rey_context *ctx;
@@ -94,10 +94,13 @@ static rey_result read_container(Reader *r, int depth, YamlNode *node) {
         return fail_here(r, "nested too deeply");
     }
     YamlNode **tail = &node->child;
-    for (;;) {
+    for (int count = 0;; count++) {
         rey_result result = next_event(r);
         if (result || r->event.type == end) {
             return result;
+        }
+        if (node->kind == YAML_MAP && count >= MOST_KEYS) { // each is compared with those before it
+            return fail_here(r, "too many keys");
         }
         result = read_entry(r, node, depth, tail);
         if (result) {
@@ -110,8 +113,7 @@ static rey_result read_container(Reader *r, int depth, YamlNode *node) {
 // Reads the value that the current event begins.
 static rey_result read_value(Reader *r, int depth, YamlNode **out) {
     const yaml_event_t *event = &r->event;
-    if (event->type == YAML_ALIAS_EVENT ||
-        (event->type == YAML_SCALAR_EVENT && event->data.scalar.anchor) ||
+    if (event->type == YAML_ALIAS_EVENT || (event->type == YAML_SCALAR_EVENT && event->data.scalar.anchor) ||
         (event->type == YAML_SEQUENCE_START_EVENT && event->data.sequence_start.anchor) ||
         (event->type == YAML_MAPPING_START_EVENT && event->data.mapping_start.anchor)) {
         return fail_here(r, "anchors and aliases are not supported");
@@ -304,8 +306,7 @@ rey_result rey_yaml_override(rey_context *ctx, YamlNode *root, const char *assig
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %s: expected key=value", assignment);
     }
     YamlNode *value, *node = NULL;
-    rey_result result =
-        read_text(ctx, "--set", true, (const unsigned char *)equals + 1, strlen(equals + 1), &value);
+    rey_result result = read_text(ctx, "--set", true, (const unsigned char *)equals + 1, strlen(equals + 1), &value);
     if (result) {
         return result;
     }

@@ -8,11 +8,11 @@ typedef enum YamlKind { YAML_SCALAR, YAML_LIST, YAML_MAP } YamlKind;
 typedef struct YamlNode YamlNode;
 struct YamlNode {
     YamlKind kind;
-    int line;          // from 1; 0 = set by an override
-    char *key;         // inside a map, else null
-    char *text;        // scalars
-    YamlNode *child;   // first entry of a list or map
-    YamlNode *next;    // next sibling
+    int line;        // from 1; 0 = set by an override
+    char *key;       // inside a map, else null
+    char *text;      // scalars
+    YamlNode *child; // first entry of a list or map
+    YamlNode *next;  // next sibling
 };
 
 // Reads one document; an empty one is an empty map. Anchors, aliases, double keys and depths beyond 32 are refused.

@@ -1,0 +1,49 @@
+// job_memory.c: what a job owns, its paths, and its schedule of samples.
+#include "fit/job.h"
+
+#include <string.h>
+
+void *rey_job_alloc(Job *job, size_t count, size_t item_bytes) {
+    void *memory = rey_alloc_array(job->ctx, count, item_bytes);
+    void **slot = memory ? rey_array_push(job->ctx, &job->memory, sizeof(void *), 1) : NULL;
+    if (!slot) {
+        rey_free(job->ctx, memory);
+        return NULL;
+    }
+    *slot = memory;
+    return memory;
+}
+
+void rey_job_free(Job *job) {
+    if (!job->ctx) {
+        return;
+    }
+    for (size_t i = 0; i < job->memory.count; i++) {
+        rey_free(job->ctx, ARRAY_AT(job->memory, void *, i));
+    }
+    rey_array_free(job->ctx, &job->memory);
+    rey_yaml_free(job->ctx, job->tree);
+    *job = (Job){0};
+}
+
+const char *rey_job_path(Job *job, const char *name) {
+    if (name[0] == '/' || !strcmp(job->folder, ".")) {
+        return name;
+    }
+    size_t folder = strlen(job->folder), length = strlen(name);
+    char *path = rey_job_alloc(job, folder + length + 2, 1);
+    if (path) {
+        memcpy(path, job->folder, folder);
+        path[folder] = '/';
+        memcpy(path + folder + 1, name, length);
+    }
+    return path;
+}
+
+int rey_job_spp_at(const Job *job, int iteration) {
+    int spp = job->spp[0].spp;
+    for (int i = 0; i < job->spp_count && job->spp[i].from <= iteration; i++) {
+        spp = job->spp[i].spp;
+    }
+    return spp;
+}
