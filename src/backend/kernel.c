@@ -4,23 +4,40 @@
 
 enum { MAX_FOOTPRINT = 32 }; // pixels that a filter may cover along one axis
 
+enum { FILTER_STEPS = 1024 }; // entries of the tabulated filter over its radius
+
+// The filter, tabulated over its radius: linear interpolation is exact to 1e-6 of its peak.
+typedef struct FilterTable {
+    float value[FILTER_STEPS + 2];
+    float scale; // steps per pixel
+} FilterTable;
+
+static void filter_tabulate(const SensorRecord *s, FilterTable *table) {
+    table->scale = (float)FILTER_STEPS / s->filter_radius;
+    for (int32_t i = 0; i < FILTER_STEPS + 2; i++) {
+        table->value[i] = i < FILTER_STEPS ? filter_eval(s, (float)i / table->scale) : 0;
+    }
+}
+
 // Weights of the pixels around x along one axis; returns their number.
-static int32_t film_weights(const SensorRecord *s, float x, int32_t low, int32_t high, int32_t *first,
-                            float *weights) {
+static int32_t film_weights(const SensorRecord *s, const FilterTable *table, float x, int32_t low, int32_t high,
+                            int32_t *first, float *weights) {
     int32_t begin, end;
     filter_range(s, x, &begin, &end);
     begin = begin < low ? low : begin;
     end = end > high ? high : end;
     int32_t n = end - begin < 0 ? 0 : end - begin > MAX_FOOTPRINT ? MAX_FOOTPRINT : end - begin;
     for (int32_t i = 0; i < n; i++) {
-        weights[i] = filter_eval(s, (float)(begin + i) + 0.5f - x);
+        float at = fabsf((float)(begin + i) + 0.5f - x) * table->scale;
+        int32_t k = at < FILTER_STEPS ? (int32_t)at : FILTER_STEPS;
+        weights[i] = table->value[k] + (at - (float)k) * (table->value[k + 1] - table->value[k]);
     }
     *first = begin;
     return n;
 }
 
 // Adds the chunk's radiances (or derivatives) to the tile's film.
-static void film_splat(Tracer *t, int32_t count) {
+static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     PathJob *job = t->job;
     int32_t x0 = job->x - job->border, y0 = job->y - job->border;
     int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
@@ -43,19 +60,23 @@ static void film_splat(Tracer *t, int32_t count) {
         }
         float wx[MAX_FOOTPRINT], wy[MAX_FOOTPRINT];
         int32_t first_x, first_y;
-        int32_t nx = film_weights(t->sensor, x, x0, x0 + width, &first_x, wx);
-        int32_t ny = film_weights(t->sensor, y, y0, y0 + height, &first_y, wy);
+        int32_t nx = film_weights(t->sensor, filter, x, x0, x0 + width, &first_x, wx);
+        int32_t ny = film_weights(t->sensor, filter, y, y0, y0 + height, &first_y, wy);
+        double line[MAX_FOOTPRINT * SPEC_N];
+        for (int32_t k = 0; k < nx * SPEC_N; k++) {
+            line[k] = (double)wx[k / SPEC_N] * l[k % SPEC_N];
+        }
         for (int32_t j = 0; j < ny; j++) {
             double *row = job->film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * SPEC_N;
             for (int32_t k = 0; k < nx * SPEC_N; k++) {
-                row[k] += (double)(wx[k / SPEC_N] * wy[j]) * l[k % SPEC_N];
+                row[k] += (double)wy[j] * line[k];
             }
         }
     }
 }
 
 // The adjoint of film_splat: what each slot's radiance is worth.
-static void film_splat_adj(Tracer *t, int32_t count) {
+static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) {
     const SensorRecord *s = t->sensor;
     int32_t right = s->crop_x + s->crop_width, bottom = s->crop_y + s->crop_height;
     for (int32_t i = 0; i < count; i++) {
@@ -63,8 +84,8 @@ static void film_splat_adj(Tracer *t, int32_t count) {
         int32_t first_x = t->ws.pixel[i] % (s->width + 128) - 64, first_y = t->ws.pixel[i] / (s->width + 128) - 64;
         int32_t nx = first_x >= s->crop_x && first_x < right, ny = first_y >= s->crop_y && first_y < bottom;
         if (s->filter != FILM_BOX) {
-            nx = film_weights(s, (float)t->ws.film_x[i], s->crop_x, right, &first_x, wx);
-            ny = film_weights(s, (float)t->ws.film_y[i], s->crop_y, bottom, &first_y, wy);
+            nx = film_weights(s, filter, (float)t->ws.film_x[i], s->crop_x, right, &first_x, wx);
+            ny = film_weights(s, filter, (float)t->ws.film_y[i], s->crop_y, bottom, &first_y, wy);
         }
         for (int32_t j = 0; j < ny; j++) {
             const float *row = t->job->adjoint +
@@ -81,20 +102,20 @@ static void film_splat_adj(Tracer *t, int32_t count) {
 
 // Runs samples [first, first + count). A chunk whose vertices do not fit the records is run again in halves: samples
 // are pure functions of their numbers, so that nothing depends on it.
-static void run_chunk(Tracer *t, int64_t first, int32_t count, int32_t *begin) {
+static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32_t count, int32_t *begin) {
     PathJob before = *t->job;
     camera_stage(t, first, count);
     path_forward(t, begin);
     if (t->overflow && count > LANES) {
         t->job->paths = before.paths;
         t->job->rays = before.rays;
-        run_chunk(t, first, count / 2, begin);
-        run_chunk(t, first + count / 2, count - count / 2, begin);
+        run_chunk(t, filter, first, count / 2, begin);
+        run_chunk(t, filter, first + count / 2, count - count / 2, begin);
         return;
     }
     if (t->derivative) {
         if (t->job->mode == MODE_REVERSE) {
-            film_splat_adj(t, count);
+            film_splat_adj(t, filter, count);
         }
         real *const sums[] = {t->ws.lx, t->ws.ly, t->ws.lz};
         for (int c = 0; c < COUNT_OF(sums); c++) {
@@ -103,7 +124,7 @@ static void run_chunk(Tracer *t, int64_t first, int32_t count, int32_t *begin) {
         path_backward(t);
     }
     if (t->job->mode != MODE_REVERSE) {
-        film_splat(t, count);
+        film_splat(t, filter, count);
     }
 }
 
@@ -117,11 +138,13 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     Tracer t = {.job = job, .scene = job->scene, .sensor = job->scene->sensors + job->sensor};
     size_t bytes = workspace_layout(&t.ws, job->workspace, job->mode);
     int32_t *begin = (int32_t *)((char *)job->workspace + bytes);
+    FilterTable filter;
+    filter_tabulate(t.sensor, &filter);
     t.derivative = job->mode != MODE_PRIMAL;
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     int64_t total = (int64_t)job->width * job->height * job->spp;
     for (int64_t first = 0; first < total; first += t.ws.chunk) {
         int64_t left = total - first;
-        run_chunk(&t, first, left < t.ws.chunk ? (int32_t)left : t.ws.chunk, begin);
+        run_chunk(&t, &filter, first, left < t.ws.chunk ? (int32_t)left : t.ws.chunk, begin);
     }
 }

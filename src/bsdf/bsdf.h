@@ -115,6 +115,30 @@ static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe)
     }
 }
 
+// Value and density at once: one fetch, and what the two have in common is computed once.
+static NOINLINE Spec bsdf_eval_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Float *pdf) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        *pdf = prefix##_pdf(&p, wi, wo, lobe);                                                                         \
+        return prefix##_eval(&p, wi, wo, lobe);                                                                        \
+    }
+#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
+    case BSDF_##ENUM: {                                                                                                \
+        Record p = prefix##_fetch(call);                                                                               \
+        *pdf = prefix##_pdf(call, &p, wi, wo, lobe);                                                                   \
+        return prefix##_eval(call, &p, wi, wo, lobe);                                                                  \
+    }
+#include "bsdf/kinds.inl"
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
+    default:
+        *pdf = f_set(0);
+        return spec_zero();
+    }
+}
+
 // u1 selects lobes, u2 directions. Samples of no use have density 0.
 static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, Vec2 u2) {
     switch (call->scene->bsdfs[call->node].kind) {

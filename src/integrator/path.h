@@ -340,8 +340,8 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     LightSample s = light_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
     Vec3 wo = frame_to_local(&si->sh, s.d);
     Int smooth = i_set(LOBE_SMOOTH);
-    Float scatter_pdf = bsdf_pdf(call, wi, wo, smooth);
-    Spec f = bsdf_eval(call, wi, wo, smooth);
+    Float scatter_pdf;
+    Spec f = bsdf_eval_pdf(call, wi, wo, smooth, &scatter_pdf);
     Float pdf = s.pdf * choice;
     Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(pdf, scatter_pdf));
     Float weight = mis * f_safe_rcp(pdf);
@@ -388,8 +388,8 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     Paths *next = &t->ws.paths[1 - t->current];
     BsdfSample s = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                                rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
-    Float pdf = bsdf_pdf(call, wi, s.wo, s.lobe);
-    Spec f = bsdf_eval(call, wi, s.wo, s.lobe);
+    Float pdf;
+    Spec f = bsdf_eval_pdf(call, wi, s.wo, s.lobe, &pdf);
     Float rcp = f_safe_rcp(pdf);
     Spec weight = spec_scale(f, rcp);
     Spec beta = spec_mul(v->beta, weight);
