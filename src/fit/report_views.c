@@ -68,10 +68,11 @@ rey_result rey_report_image(Text *html, const char *name, const float *rgb, int 
 // Mean difference over channels: blue where the result is darker than the target, red where it is brighter.
 static rey_result difference_image(Text *html, const FitView *view, const float *image, float *scale) {
     int64_t pixels = (int64_t)view->width * view->height;
-    float *mean = rey_alloc_array(html->ctx, (size_t)pixels * 2, sizeof *mean), *sorted = mean + pixels;
+    float *mean = rey_alloc_array(html->ctx, (size_t)pixels * 2, sizeof *mean), *sorted;
     unsigned char *rgb8 = rey_alloc_array(html->ctx, (size_t)pixels, 3);
     rey_result result = mean && rgb8 ? REY_OK : REY_ERROR_MEMORY;
     if (!result) {
+        sorted = mean + pixels;
         for (int64_t i = 0; i < pixels; i++) {
             bool counts = !view->mask || view->mask[i] > 0;
             for (int k = 0; k < 3 && counts; k++) {
