@@ -228,11 +228,11 @@ static void incomplete_gradients_are_refused(void **state) {
 static void checks_pass_on_right_gradients(void **state) {
     Fixture *f = *state;
     JsonNode *node =
-        run_json(f, 0, "check %s --param red.reflectance.value --param lamp.emitter.radiance.value --spp 256 --json");
+        run_json(f, 0, "check %s --param red.reflectance.value --param lamp.emitter.radiance.value --spp 64 --json");
     assert_true(json_value(node, "passed", 0) == 1);
     json_free(node);
     // the interior term alone is wrong where silhouettes move
-    expect(f, 1, "check %s --param camera.to_world:translate=1,0,0 --terms interior --spp 64");
+    expect(f, 1, "check %s --param camera.to_world:translate=1,0,0 --terms interior --spp 32");
     assert_non_null(strstr(f->out, "WRONG"));
 }
 
@@ -264,7 +264,7 @@ static void interruption_exits_with_130(void **state) {
     (void)state;
     char command[4096];
     snprintf(command, sizeof command,
-             "timeout --preserve-status -s INT 2 '%s' render '%s' -o slow.exr --spp 10000000 2>words.txt",
+             "timeout --preserve-status -s INT 1 '%s' render '%s' -o slow.exr --spp 100000 2>words.txt",
              REYNOLDS_COMMAND, TEST_SCENE);
     int status = system(command);
     assert_true(WIFEXITED(status));
