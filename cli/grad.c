@@ -200,7 +200,9 @@ static void print_result(const Grad *g) {
     }
     if (g->session.options->json) {
         write_json(stdout, g, NULL);
-    } else if (!g->session.options->output || strcmp(g->session.options->output, "-")) {
+    } else if (g->session.options->output && !strcmp(g->session.options->output, "-")) {
+        cli_note("value %.9g, standard error %.3g", g->value, g->standard_error); // the picture has standard output
+    } else {
         printf("value %.9g\nstandard_error %.3g\n", g->value, g->standard_error);
     }
 }

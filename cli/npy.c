@@ -1,4 +1,4 @@
-// npy.c: reader of NumPy's array files, format versions 1 to 3 [numpy.lib.format].
+// npy.c: reader of NumPy's array files, format versions 1 to 3 (described in numpy.lib.format).
 #include "npy.h"
 
 #include "base/context.h"

@@ -368,6 +368,8 @@ static bool check_required(const Options *o) {
         cli_usage_error(c, "--mode reverse needs --adjoint");
     } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {
         cli_usage_error(c, "--adjoint needs --mode reverse");
+    } else if (c == COMMAND_GRAD && o->reverse && o->output && !strcmp(o->output, "-")) {
+        cli_usage_error(c, "reverse mode writes a folder, -o - is not one");
     } else if (c == COMMAND_RENDER && !o->output && !o->json) {
         cli_usage_error(c, "-o OUT is missing");
     } else if (o->json && o->output && !strcmp(o->output, "-")) {

@@ -92,6 +92,7 @@ static void usage_errors_exit_with_two(void **state) {
                                         "grad %s",
                                         "grad %s --param x --mode up",
                                         "grad %s --param x --mode reverse",
+                                        "grad %s --param x --mode reverse --adjoint 1 -o -",
                                         "grad %s --param x --adjoint 1",
                                         "grad %s --param x --terms nothing",
                                         "grad %s --param red.reflectance.value:ad=1",
