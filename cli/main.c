@@ -37,10 +37,8 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
                        "compare gradients with correlated finite differences",
                        "\nEach P is checked by itself, in blocks of the image. Exits with 1 when a gradient is "
                        "wrong.\n" DIRECTION_NOTES},
-#if __has_include("fit/fit.h")
     [COMMAND_FIT] = {"fit", cli_fit, "JOB.yaml [--set key=value]... [--resume] [-o DIR] [options]",
                      "recover parameters from images", ""},
-#endif
     [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},
     [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
     [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
