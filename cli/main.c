@@ -65,9 +65,7 @@ static void print_help(FILE *file) {
         "Reynolds %s: physically based rendering, its derivatives, and scenes recovered from images.\n\nCommands:\n",
         rey_version());
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (command_rows[i].run) {
-            fprintf(file, "  %-10s %s\n", command_rows[i].name, command_rows[i].summary);
-        }
+        fprintf(file, "  %-10s %s\n", command_rows[i].name, command_rows[i].summary);
     }
     fprintf(file,
             "\nOptions:\n  -h, --help     print this text; 'reynolds COMMAND --help' tells more\n"
@@ -78,9 +76,6 @@ static void print_help(FILE *file) {
 
 static const char *command_name_at(void *user, int i) {
     (void)user;
-    while (i < COMMAND_COUNT && !command_rows[i].run) {
-        i++;
-    }
     return i < COMMAND_COUNT ? command_rows[i].name : NULL;
 }
 
@@ -104,7 +99,7 @@ int main(int argc, char **argv) {
     }
     const char *word = argv[1];
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (command_rows[i].run && !strcmp(word, command_rows[i].name)) {
+        if (!strcmp(word, command_rows[i].name)) {
             cli_catch_interrupts();
             return command_rows[i].run(argc - 1, argv + 1);
         }
