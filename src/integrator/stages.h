@@ -1,0 +1,179 @@
+// stages.h: the stages of a chunk that know nothing of scattering: starting paths at the camera, and tracing them.
+#pragma once
+
+#include "accel/trace.h"
+#include "integrator/state.h"
+#include "math/rng.h"
+
+#include <time.h>
+
+// Dimensions of a sample: a pure function of bounce and purpose.
+enum { PURPOSE_FILM, PURPOSE_LIGHT_CHOICE, PURPOSE_LIGHT, PURPOSE_LOBE, PURPOSE_DIRECTION, PURPOSE_ROULETTE, PURPOSES };
+
+KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)bounce * PURPOSES + purpose; }
+
+// Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
+#define DERIVATIVE_FLOOR 0.05f
+
+typedef struct Tracer {
+    PathJob *job;
+    const SceneView *scene;
+    const SensorRecord *sensor;
+    Workspace ws;
+    bool derivative;
+    real floor;
+    int32_t active, current; // paths alive, and which of ws.paths holds them
+    int32_t shadow_count;
+    int32_t record_count, batch_count;
+    bool overflow;           // the chunk's vertices did not fit the records
+} Tracer;
+
+KFN double stage_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+KFN SampleKey slot_key(const Tracer *t, Int slot) {
+    SampleKey key;
+    key.pixel = (UInt)i_gather(t->ws.pixel, slot);
+    key.sample = (UInt)i_gather(t->ws.sample, slot);
+    key.scramble = t->job->scramble;
+    key.sobol = t->job->sobol;
+    return key;
+}
+
+KFN Float real_gather(const real *base, Int index) {
+#if LANES == 1
+    return base[index];
+#else
+    return f_gather(base, index);
+#endif
+}
+
+#define LOAD_V3(a, x, y, z, i) v3(real_gather((a).x, i), real_gather((a).y, i), real_gather((a).z, i))
+
+KFN Spec spec_of(Vec3 v) {
+    Spec s;
+    s.c[0] = v.x;
+    s.c[1] = v.y;
+    s.c[2] = v.z;
+    return s;
+}
+
+// ---- camera ------------------------------------------------------------------------------------------------------
+
+// Starts `count` paths: samples `first`... of the tile, pixel by pixel, so that packets are coherent.
+static void camera_stage(Tracer *t, int64_t first, int32_t count) {
+    PathJob *job = t->job;
+    Paths *p = &t->ws.paths[0];
+    for (int32_t i = 0; i < count; i++) {
+        int64_t at = first + i;
+        int32_t pixel = (int32_t)(at / job->spp);
+        // Numbers of pixels of the whole film with room for a border, so that they do not depend on the tiles.
+        int32_t x = job->x + pixel % job->width + 64, y = job->y + pixel / job->width + 64;
+        t->ws.pixel[i] = y * (t->sensor->width + 128) + x;
+        t->ws.sample[i] = (int32_t)(at % job->spp);
+    }
+    for (int32_t i = 0; i < count; i += LANES) {
+        Int slot = i_iota() + i;
+        SampleKey key = slot_key(t, slot);
+        Vec2 jitter = rng_2d(&key, dimension(0, PURPOSE_FILM));
+        Int stride = i_set(t->sensor->width + 128);
+        Int pixel = i_load(t->ws.pixel + i);
+        Int y = pixel / stride;
+        Int x = pixel - y * stride;
+        Float film_x = f_from_i(x - 64) + jitter.x, film_y = f_from_i(y - 64) + jitter.y;
+        f_store(t->ws.film_x + i, film_x);
+        f_store(t->ws.film_y + i, film_y);
+        Ray ray = perspective_ray(t->scene, t->sensor, film_x, film_y);
+        f_store(p->ox + i, ray.o.x);
+        f_store(p->oy + i, ray.o.y);
+        f_store(p->oz + i, ray.o.z);
+        f_store(p->dx + i, ray.d.x);
+        f_store(p->dy + i, ray.d.y);
+        f_store(p->dz + i, ray.d.z);
+        f_store(p->px + i, ray.o.x);
+        f_store(p->py + i, ray.o.y);
+        f_store(p->pz + i, ray.o.z);
+        f_store(p->tmax + i, ray.tmax);
+        real *const ones[] = {p->bx, p->by, p->bz, p->eta2, p->roulette};
+        for (int k = 0; k < COUNT_OF(ones); k++) {
+            f_store(ones[k] + i, f_set(1));
+        }
+        f_store(p->pdf + i, f_set(-1));
+        i_store(p->slot + i, slot);
+        i_store(p->medium + i, i_set(t->sensor->medium));
+        real *const zeros[] = {t->ws.lx, t->ws.ly, t->ws.lz, t->ws.sx, t->ws.sy, t->ws.sz};
+        for (int k = 0; k < COUNT_OF(zeros); k++) {
+            f_store(zeros[k] + i, f_set(0));
+        }
+    }
+    t->active = count;
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    job->paths += count;
+}
+
+// ---- trace and sort ----------------------------------------------------------------------------------------------
+
+KFN Ray path_ray(const Paths *p, int32_t k) {
+    Ray ray;
+    ray.o = v3(f_load(p->ox + k), f_load(p->oy + k), f_load(p->oz + k));
+    ray.d = v3(f_load(p->dx + k), f_load(p->dy + k), f_load(p->dz + k));
+    ray.tmax = f_load(p->tmax + k);
+    return ray;
+}
+
+// Camera rays of a sensor that hides emitters go on behind every area light that they meet.
+KFN Hit trace_past_emitters(Tracer *t, Ray ray, Mask m, Hit hit) {
+    enum { MOST_LIGHTS_IN_A_ROW = 64 };
+    for (int i = 0; i < MOST_LIGHTS_IN_A_ROW; i++) {
+        Mask found = m & mi_lt(i_set(-1), hit.shape);
+        Int emitter = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), emitter);
+        Mask again = found & mi_lt(i_set(-1), emitter);
+        if (!m_any(again)) {
+            break;
+        }
+        Float step = (1.0f + f_max(f_max(f_abs(hit.p.x), f_abs(hit.p.y)), f_abs(hit.p.z))) * 9e-5f;
+        Vec3 o = v3_madd(hit.p, step, ray.d);
+        Float passed = v3_dot(v3_sub(o, ray.o), ray.d);
+        ray.o = v3_select(again, o, ray.o);
+        ray.tmax = f_select(again, ray.tmax - passed, ray.tmax);
+        Hit next = trace_closest(t->scene, &ray, again, false);
+        t->job->rays += m_count(again);
+        hit.shape = i_select(again, next.shape, hit.shape);
+        hit.prim = i_select(again, next.prim, hit.prim);
+        hit.u = f_select(again, next.u, hit.u);
+        hit.v = f_select(again, next.v, hit.v);
+        hit.p = v3_select(again, next.p, hit.p);
+    }
+    return hit;
+}
+
+static void trace_stage(Tracer *t, int32_t bounce) {
+    Workspace *ws = &t->ws;
+    const Paths *p = &ws->paths[t->current];
+    double start = stage_seconds();
+    for (int32_t k = 0; k < t->active; k += LANES) {
+        Mask m = m_first_n(t->active - k);
+        Ray ray = path_ray(p, k);
+        Hit hit = trace_closest(t->scene, &ray, m, bounce == 0);
+        if (bounce == 0 && t->scene->hide_emitters) {
+            hit = trace_past_emitters(t, ray, m, hit);
+        }
+        Mask found = mi_lt(i_set(-1), hit.shape);
+        Int group = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), group);
+        i_store(ws->hit_shape + k, hit.shape);
+        i_store(ws->hit_prim + k, hit.prim);
+        i_store(ws->hit_group + k, i_select(found, group + 1, i_set(0)));
+        f_store(ws->hit_u + k, hit.u);
+        f_store(ws->hit_v + k, hit.v);
+        f_store(ws->hit_x + k, hit.p.x);
+        f_store(ws->hit_y + k, hit.p.y);
+        f_store(ws->hit_z + k, hit.p.z);
+    }
+    t->job->rays += t->active;
+    t->job->trace_seconds += stage_seconds() - start;
+}
