@@ -1,0 +1,359 @@
+// cases.c: random scenes for the kind tests.
+#include "cases.h"
+
+#include "emitter/update.h"
+#include "shape/update.h"
+
+static const double roughness_extremes[] = {1e-3, 0.05, 0.5, 1};
+
+static double metal_value(Random *r) {
+    return uniform(r) < 0.3 ? between(r, 0.05, 1) : between(r, 1, 8);
+}
+
+static double random_value(Random *r, const ParamDesc *p) {
+    bool roughness = p->type == PARAM_ALPHA_U || p->type == PARAM_ALPHA_V ||
+                     (p->type == PARAM_REAL && p->low > 0 && p->high <= 1);
+    if (roughness) {
+        return uniform(r) < 0.5 ? roughness_extremes[below(r, 4)] : exp(between(r, log(1e-3), 0));
+    }
+    switch (p->type) {
+    case PARAM_IOR:
+    case PARAM_SMOOTH_IOR:
+        return uniform(r) < 0.3 ? between(r, 0.6, 0.95) : between(r, 1.05, 2.5);
+    case PARAM_METAL_ETA:
+    case PARAM_METAL_K:
+        return metal_value(r);
+    default: {
+        double low = (double)p->low, high = isinf(p->high) ? low + 5 : (double)p->high, x = uniform(r);
+        return x < 0.15 ? low : x < 0.3 ? high : between(r, low, high);
+    }
+    }
+}
+
+static int add_values(KindCase *c, Random *r, const ParamDesc *p, int n, int owner) {
+    int at = c->theta_count;
+    c->theta_count += n;
+    assert_true(c->theta_count <= CASE_THETA);
+    for (int i = at; i < at + n; i++) {
+        c->theta[i] = (double)(float)random_value(r, p);
+        c->low[i] = (double)p->low;
+        c->high[i] = (double)p->high;
+        c->owner[i] = owner;
+    }
+    return at;
+}
+
+static int add_to_uv(KindCase *c, Random *r) {
+    int at = c->theta_count;
+    c->theta_count += 9;
+    const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (int i = 0; i < 9; i++) {
+        c->theta[at + i] = (double)(float)(identity[i] + (i < 6 ? between(r, -0.4, 0.9) : 0));
+        c->low[at + i] = -INFINITY;
+        c->high[at + i] = INFINITY;
+        c->owner[at + i] = -1;
+    }
+    return at;
+}
+
+int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured) {
+    bool colour = p->type == PARAM_SPEC || p->type == PARAM_METAL_ETA || p->type == PARAM_METAL_K;
+    int id = c->texture_count++;
+    assert_true(c->texture_count <= CASE_TEXTURES);
+    TextureNode t = {.kind = TEXTURE_CONSTANT, .to_uv = -1, .width = 1, .height = 1, .channels = colour ? 3 : 1};
+    double sort = textured ? uniform(r) : 1;
+    if (textured && uniform(r) < 0.3) {
+        t.channels = 4 - t.channels; // colours read as numbers and the other way round
+    }
+    if (sort < 0.2) {
+        t.kind = TEXTURE_CHECKERBOARD;
+        t.to_uv = uniform(r) < 0.5 ? add_to_uv(c, r) : -1;
+        t.child[0] = case_texture(c, r, p, owner, uniform(r) < 0.5);
+        t.child[1] = case_texture(c, r, p, owner, false);
+        t.channels = 3;
+    } else if (sort < 0.85) {
+        t.kind = TEXTURE_BITMAP;
+        t.width = 1 + below(r, 4);
+        t.height = 1 + below(r, 3);
+        t.filter = uniform(r) < 0.75 ? FILTER_BILINEAR : FILTER_NEAREST;
+        t.wrap = below(r, 3);
+        t.to_uv = uniform(r) < 0.5 ? add_to_uv(c, r) : -1;
+    }
+    if (t.kind != TEXTURE_CHECKERBOARD) {
+        t.theta = add_values(c, r, p, t.width * t.height * t.channels, owner);
+    }
+    c->textures[id] = t;
+    return id;
+}
+
+int case_variants(int kind) {
+    int n = 1;
+    for (int i = 0; i < rey_bsdf_kinds[kind].config_count; i++) {
+        n *= 2; // every switch has two positions
+    }
+    return n;
+}
+
+// What a kind derives from its parameters, by the library's own update.
+static void derive_table(KindCase *c, const BsdfNode *node) {
+    float theta[CASE_THETA], tables[CASE_TABLES] = {0};
+    for (int i = 0; i < c->theta_count; i++) {
+        theta[i] = (float)c->theta[i];
+    }
+    rey_scene scene = {0};
+    scene.view.theta = theta;
+    scene.view.tables = tables;
+    scene.view.textures = c->textures;
+    scene.view.bsdfs = c->bsdfs;
+    assert_int_equal(rey_bsdf_update(&scene, (int32_t)(node - c->bsdfs)), REY_OK);
+    for (int i = 0; i < CASE_TABLES; i++) {
+        c->tables[i] = (double)tables[i];
+    }
+}
+
+static int add_bsdf(KindCase *c, Random *r, int kind, int variant, bool textured, bool root) {
+    const BsdfKind *k = rey_bsdf_kinds + kind;
+    int id = c->bsdf_count++;
+    BsdfNode *node = c->bsdfs + id;
+    *node = (BsdfNode){.kind = kind, .child = {-1, -1}, .table = -1};
+    bool derives = rey_bsdf_table_size(kind) > 0;
+    for (int i = 0; i < k->param_count; i++) {
+        const ParamDesc *p = k->params + i;
+        // Numbers behind a derived table are constants.
+        bool constant = derives && p->type != PARAM_SPEC;
+        int first = c->theta_count;
+        node->slot[i] = case_texture(c, r, p, root ? i : -1, textured && !constant);
+        if (constant) {
+            c->theta[first] = fmax(c->theta[first], p->type == PARAM_REAL ? 0.01 : 0);
+            c->coat_eta = p->type == PARAM_IOR ? first : c->coat_eta;
+            c->coat_alpha = p->type == PARAM_REAL ? first : c->coat_alpha;
+        }
+    }
+    for (int i = 0; i < k->config_count; i++) {
+        node->config[i] = variant >> i & 1;
+    }
+    if (derives) {
+        node->table = 0;
+        c->coat_base[0] = c->theta[c->coat_alpha];
+        c->coat_base[1] = c->theta[c->coat_eta];
+        derive_table(c, node);
+    }
+    return id;
+}
+
+void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
+    static const char *const nested[] = {"diffuse", "roughconductor", "roughdielectric"};
+    const BsdfKind *k = rey_bsdf_kinds + kind;
+    *c = (KindCase){.coat_eta = -1, .coat_alpha = -1};
+    c->root = add_bsdf(c, r, kind, variant, textured, true);
+    // Functions with two children scatter on one side only.
+    int children = k->fewest_children + below(r, k->most_children - k->fewest_children + 1);
+    for (int i = 0; i < children; i++) {
+        const char *name = nested[below(r, k->most_children == 2 ? 2 : 3)];
+        int child = add_bsdf(c, r, rey_bsdf_kind_find(name), below(r, 4), textured, false);
+        c->bsdfs[c->root].child[i] = child;
+    }
+}
+
+// ---- lights ------------------------------------------------------------------------------------------------------
+
+const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "point", "constant", "envmap"};
+
+static const ParamDesc radiance = {PARAM_SPEC, "radiance", 1, 0, INFINITY, "", ""};
+
+// A rotation by a random axis and angle, row-major 3 x 3 [Rodrigues].
+static void random_rotation(Random *r, double m[9]) {
+    double a[3], angle = between(r, 0, 6);
+    random_direction(r, a);
+    double s = sin(angle), t = 1 - cos(angle);
+    const double k[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            m[3 * i + j] = (i == j) * (1 - t) + t * a[i] * a[j] + s * k[3 * i + j];
+        }
+    }
+}
+
+static void add_fixed(KindCase *c, const double *values, int n) {
+    for (int i = 0; i < n; i++) {
+        c->theta[c->theta_count] = (double)(float)values[i];
+        c->owner[c->theta_count] = -1;
+        c->low[c->theta_count] = -INFINITY;
+        c->high[c->theta_count++] = INFINITY;
+    }
+}
+
+static void make_rectangle(KindCase *c, const double rotation[9], const double scale[2]) {
+    static const int32_t triangles[6] = {0, 1, 2, 2, 3, 0};
+    static const double uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+    CaseShape *s = c->shapes;
+    *s = (CaseShape){.kind = SHAPE_MESH, .flags = SHAPE_HAS_UVS, .triangle_count = 2, .positions = c->theta_count,
+                     .area_cdf = 0, .area = 4 * scale[0] * scale[1]};
+    for (int v = 0; v < 4; v++) {
+        double x = (2 * uvs[2 * v] - 1) * scale[0], y = (2 * uvs[2 * v + 1] - 1) * scale[1];
+        double p[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = rotation[3 * k] * x + rotation[3 * k + 1] * y;
+        }
+        add_fixed(c, p, 3);
+    }
+    s->uvs = c->theta_count;
+    add_fixed(c, uvs, 8);
+    memcpy(c->triangles, triangles, sizeof triangles);
+    c->tables[0] = 0.5;
+    c->tables[1] = 1;
+}
+
+static void make_sphere(KindCase *c, const double rotation[9], double radius) {
+    c->shapes[0] = (CaseShape){.kind = SHAPE_SPHERE, .area = 4 * 3.14159265358979323846 * radius * radius};
+    c->tables[3] = radius; // at the origin
+    memcpy(c->tables + 4, rotation, 9 * sizeof *rotation);
+}
+
+static void make_disk(KindCase *c, const double rotation[9], double radius) {
+    c->shapes[0] = (CaseShape){.kind = SHAPE_DISK, .area = 3.14159265358979323846 * radius * radius};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            c->tables[4 * i + j] = rotation[3 * i + j] * radius;
+            c->tables[12 + 4 * i + j] = rotation[3 * j + i] / radius;
+        }
+    }
+}
+
+void case_update_light(KindCase *c) {
+    if (c->emitter.kind != EMITTER_ENVMAP) {
+        return;
+    }
+    float theta[CASE_THETA], tables[CASE_TABLES] = {0};
+    for (int i = 0; i < c->theta_count; i++) {
+        theta[i] = (float)c->theta[i];
+    }
+    const CaseEmitter *e = &c->emitter;
+    EmitterRecord record = {.kind = e->kind, .slot = e->slot, .scale = e->scale, .to_world = e->to_world};
+    rey_scene scene = {0};
+    scene.view.theta = theta;
+    scene.view.tables = tables;
+    scene.view.textures = c->textures;
+    scene.view.emitters = &record;
+    assert_int_equal(rey_emitter_update(&scene, 0), REY_OK);
+    for (int i = 0; i < CASE_TABLES; i++) {
+        c->tables[i] = (double)tables[i];
+    }
+}
+
+static void make_envmap(KindCase *c, Random *r, const double rotation[9]) {
+    static const ParamDesc factor = {PARAM_REAL, "scale", 1, 0, INFINITY, "", ""};
+    int width = 3 + below(r, 6), height = 2 + below(r, 5);
+    c->emitter.slot = c->texture_count++;
+    c->textures[c->emitter.slot] = (TextureNode){.kind = TEXTURE_BITMAP, .width = width, .height = height,
+                                                 .channels = 3, .filter = FILTER_BILINEAR, .to_uv = -1};
+    c->textures[c->emitter.slot].theta = add_values(c, r, &radiance, 3 * width * height, 0);
+    c->emitter.scale = case_texture(c, r, &factor, 1, false);
+    c->emitter.to_world = c->theta_count;
+    for (int i = 0; i < 16; i++) {
+        double value = i % 5 == 0;
+        if (i / 4 < 3 && i % 4 < 3) {
+            value = rotation[i / 4 * 3 + i % 4];
+        }
+        add_fixed(c, &value, 1);
+    }
+    case_update_light(c);
+}
+
+void case_make_light(KindCase *c, Random *r, int light, bool textured) {
+    static const int kinds[LIGHT_COUNT] = {EMITTER_AREA,  EMITTER_AREA,     EMITTER_AREA,
+                                           EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP};
+    *c = (KindCase){.coat_eta = -1, .coat_alpha = -1, .emitter_count = 1, .shape_count = 1};
+    c->emitter = (CaseEmitter){.kind = kinds[light], .shape = light <= LIGHT_DISK ? 0 : -1, .scale = -1};
+    double rotation[9], scale[2] = {between(r, 0.3, 2), between(r, 0.3, 2)};
+    random_rotation(r, rotation);
+    if (light == LIGHT_ENVMAP) {
+        make_envmap(c, r, rotation);
+        return;
+    }
+    c->emitter.slot = case_texture(c, r, &radiance, 0, textured && c->emitter.kind == EMITTER_AREA);
+    if (light == LIGHT_RECTANGLE) {
+        make_rectangle(c, rotation, scale);
+    } else if (light == LIGHT_SPHERE) {
+        make_sphere(c, rotation, scale[0]);
+    } else if (light == LIGHT_DISK) {
+        make_disk(c, rotation, scale[0]);
+    } else {
+        const double position[3] = {0.3, -0.2, 0.5};
+        c->emitter.position = c->theta_count;
+        add_fixed(c, position, 3);
+    }
+}
+
+// ---- directions and reports --------------------------------------------------------------------------------------
+
+void random_direction(Random *r, double v[3]) {
+    double z = between(r, -1, 1), phi = between(r, 0, 6.283185307179586);
+    if (uniform(r) < 0.25) {
+        z *= 0.05;
+    }
+    double s = sqrt(1 - z * z);
+    v[0] = s * cos(phi);
+    v[1] = s * sin(phi);
+    v[2] = z;
+}
+
+void case_print(const KindCase *c, const Query *q) {
+    const BsdfNode *node = c->bsdfs + c->root;
+    const BsdfKind *k = rey_bsdf_kinds + node->kind;
+    print_error("%s", c->bsdf_count ? k->name : "light");
+    for (int i = 0; c->bsdf_count && i < k->config_count; i++) {
+        print_error(" %s=%d", k->configs[i].name, (int)node->config[i]);
+    }
+    for (int i = 0; c->bsdf_count && i < k->param_count; i++) {
+        const TextureNode *t = c->textures + node->slot[i];
+        print_error(" %s=[%d]", k->params[i].name, (int)t->kind);
+        for (int j = 0; t->kind == TEXTURE_CONSTANT && j < t->channels; j++) {
+            print_error("%g ", c->theta[t->theta + j]);
+        }
+    }
+    if (q) {
+        print_error(" wi=(%g %g %g) wo=(%g %g %g) uv=(%g %g) lobe=%d", q->wi[0], q->wi[1], q->wi[2], q->wo[0],
+                    q->wo[1], q->wo[2], q->uv[0], q->uv[1], (int)q->lobe);
+    }
+    print_error("\n");
+}
+
+// ---- statistics --------------------------------------------------------------------------------------------------
+
+// Regularised upper incomplete gamma function: series below a + 1, Lentz's continued fraction above.
+double chi_square_tail(double degrees, double value) {
+    double a = degrees / 2, x = value / 2;
+    if (x <= 0) {
+        return 1;
+    }
+    double scale = exp(-x + a * log(x) - lgamma(a));
+    if (x < a + 1) {
+        double term = 1 / a, sum = term;
+        for (int n = 1; n < 2000 && term > 1e-16 * sum; n++) {
+            term *= x / (a + n);
+            sum += term;
+        }
+        return 1 - sum * scale;
+    }
+    double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
+    for (int n = 1; n < 2000; n++) {
+        double an = -n * (n - a);
+        b += 2;
+        d = 1 / (an * d + b);
+        c = b + an / c;
+        h *= c * d;
+        if (fabs(c * d - 1) < 1e-14) {
+            break;
+        }
+    }
+    return scale * h;
+}
+
+double normal_tail(double z) {
+    return erfc(fabs(z) / sqrt(2));
+}
+
+double sidak(double level, int n) {
+    return -expm1(log1p(-level) / n);
+}

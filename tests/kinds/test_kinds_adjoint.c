@@ -1,0 +1,146 @@
+// Adjoints of every kind from the tables: against central differences in double, forward against reverse, and
+// positive density wherever a derivative is not zero.
+#include "cases.h"
+
+#include <stdlib.h>
+
+enum { CASES = 300, QUERIES = 12 };
+
+static const KindKernels *const exact = &kind_kernels_double;
+
+// df . f at one query.
+static double objective(const KindCase *c, const Query *q, const double df[3]) {
+    double f[1][3];
+    exact->eval(c, 1, q, f, NULL);
+    return df[0] * f[0][0] + df[1] * f[0][1] + df[2] * f[0][2];
+}
+
+// Difference quotient of fourth order; side -1 or 1 stays on that side of x.
+static double difference(const KindCase *c, const Query *q, const double df[3], double *x, double h, int side) {
+    static const double central[5] = {1, -8, 0, 8, -1}, one_sided[5] = {-25, 48, -36, 16, -3};
+    double start = *x, sum = 0;
+    for (int i = 0; i < 5; i++) {
+        double weight = side ? one_sided[i] * side : central[i];
+        *x = start + (side ? side * i : i - 2) * h;
+        sum += weight != 0 ? weight * objective(c, q, df) : 0;
+    }
+    *x = start;
+    return sum / (12 * h);
+}
+
+// The adjoint d matches the difference quotient for some step: large steps cross kinks, small ones drown in rounding.
+static bool matches(const KindCase *c, const Query *q, const double df[3], double *x, double d, double low,
+                    double high) {
+    int side = *x <= low ? 1 : *x >= high ? -1 : 0;
+    double size = fabs(objective(c, q, df));
+    double scale = fabs(*x) > 0.01 ? fabs(*x) : 0.01;
+    for (double h = 1e-2; h > 1e-9; h *= 0.1) {
+        double quotient = difference(c, q, df, x, h * scale, side);
+        double noise = 4e-15 * size / (h * scale);
+        if (fabs(quotient - d) <= 1e-5 * fmax(fabs(quotient), fabs(d)) + noise) {
+            return true;
+        }
+    }
+    print_error("adjoint %.9g, differences", d);
+    for (double h = 1e-3; h > 1e-9; h *= 0.1) {
+        print_error(" %.9g", difference(c, q, df, x, h * scale, side));
+    }
+    print_error(" value %g, at %g\n", size, *x);
+    return false;
+}
+
+// Half of the directions are sampled, the others anything.
+static Query random_query(const KindCase *c, Random *r) {
+    Query q = {.uv = {between(r, -1.5, 2.5), between(r, -1.5, 2.5)}};
+    random_direction(r, q.wi);
+    random_direction(r, q.wo);
+    if (uniform(r) < 0.7) {
+        Draw d = {.uv = {q.uv[0], q.uv[1]}, .u1 = uniform(r), .u2 = {uniform(r), uniform(r)}};
+        memcpy(d.wi, q.wi, sizeof d.wi);
+        exact->sample(c, 1, &d);
+        if (d.wo[2] != 0) { // useless samples are marked with 0, where values jump
+            memcpy(q.wo, d.wo, sizeof d.wo);
+            q.lobe = d.lobe;
+        }
+    }
+    return q;
+}
+
+static int check_query(KindCase *c, Random *r, double *largest) {
+    Query q = random_query(c, r);
+    Adjoint a = {.df = {between(r, -1, 1), between(r, -1, 1), between(r, -1, 1)}};
+    double gradient[CASE_THETA] = {0}, tangent[CASE_THETA], f[1][3], pdf, along = 0, size = 0;
+    exact->adj(c, 1, &q, &a, gradient, NULL);
+    bool any = false;
+    int failures = 0;
+    for (int i = 0; i < c->theta_count; i++) {
+        if (!matches(c, &q, a.df, c->theta + i, gradient[i], c->low[i], c->high[i])) {
+            print_error("parameter entry %d of slot %d: ", i, (int)c->owner[i]);
+            failures++;
+        }
+        if (c->owner[i] >= 0) {
+            largest[c->owner[i]] = fmax(largest[c->owner[i]], fabs(gradient[i]));
+        }
+        any |= gradient[i] != 0;
+        tangent[i] = between(r, -1, 1);
+        along += tangent[i] * gradient[i];
+        size += fabs(tangent[i] * gradient[i]);
+    }
+    struct { double *x, d; } others[] = {{&q.wi[0], a.dwi[0]}, {&q.wi[1], a.dwi[1]}, {&q.wi[2], a.dwi[2]},
+                                         {&q.wo[0], a.dwo[0]}, {&q.wo[1], a.dwo[1]}, {&q.wo[2], a.dwo[2]},
+                                         {&q.uv[0], a.duv[0]}, {&q.uv[1], a.duv[1]}};
+    for (int i = 0; i < COUNT_OF(others); i++) {
+        if (!matches(c, &q, a.df, others[i].x, others[i].d, -INFINITY, INFINITY)) {
+            print_error("%.1s[%d]: ", i < 3 ? "i" : i < 6 ? "o" : "uv", i < 6 ? i % 3 : i - 6);
+            failures++;
+        }
+    }
+    Adjoint forward = a;
+    exact->adj(c, 1, &q, &forward, NULL, tangent);
+    if (fabs(forward.forward - along) > 1e-12 * size) {
+        print_error("forward %.12g, reverse %.12g: ", forward.forward, along);
+        failures++;
+    }
+    exact->eval(c, 1, &q, f, &pdf);
+    if (any && pdf <= 0) {
+        print_error("a derivative without density: ");
+        failures++;
+    }
+    if (failures) {
+        case_print(c, &q);
+    }
+    return failures;
+}
+
+static void test_every_kind(void **state) {
+    UNUSED(state);
+    int failures = 0;
+    for (int kind = 0; kind < rey_bsdf_kind_count; kind++) {
+        const BsdfKind *k = rey_bsdf_kinds + kind;
+        Random r = {(uint64_t)kind * 1000 + 1};
+        double largest[MAX_SLOTS] = {0};
+        int here = 0;
+        for (int n = 0; n < CASES && here < 5; n++) {
+            KindCase c;
+            case_make(&c, &r, kind, n % case_variants(kind), n % 2 == 1);
+            c.floor = 0.05;
+            for (int i = 0; i < QUERIES && here < 5; i++) {
+                here += check_query(&c, &r, largest);
+            }
+        }
+        for (int i = 0; i < k->param_count; i++) {
+            if (largest[i] == 0) {
+                print_error("%s: the derivative with respect to %s is never different from 0\n", k->name,
+                            k->params[i].name);
+                here++;
+            }
+        }
+        failures += here;
+    }
+    assert_int_equal(failures, 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_kind)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
