@@ -82,8 +82,9 @@ KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), p->eta, &cos_t, &eta_it, &eta_ti);
     Mask reflects = m_lt(u1, roughdielectric_probability(p, f));
     Vec3 wo = v3_select(reflects, reflect(wi, m), refract(wi, m, cos_t, eta_ti));
-    // A reflected direction below the surface, or a refracted one above it, has no density there.
-    Mask right_side = reflects ^ m_le(wi.z * wo.z, f_set(0));
+    // A reflected direction below the surface, or a refracted one above it, has no density there; nor has a facet seen
+    // from its back, which sampling of all normals can give.
+    Mask right_side = (reflects ^ m_le(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0));
     wo = v3_select(right_side, wo, v3(wo.x, wo.y, f_set(0)));
     return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(reflects, f_set(1), eta_it)};
 }
