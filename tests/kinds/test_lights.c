@@ -1,0 +1,207 @@
+// Every light: samples against densities, meeting against sampling, adjoints against differences, widths against each
+// other.
+#include "sphere.h"
+
+#include "base/parallel.h"
+
+#include <stdlib.h>
+
+enum { CASES = 12, SAMPLES = 20000, QUERIES = 64 };
+
+static const KindKernels *const exact = &kind_kernels_double;
+
+typedef struct Seen {
+    const KindCase *c;
+    double ref[3];
+} Seen;
+
+static void light_density(void *user, int n, double (*d)[3], double *pdf) {
+    const Seen *x = user;
+    LightDraw draw[POINTS] = {{{0}, {0}, {0}, 0, 0, {0}, {0}, 0}};
+    assert_true(n <= POINTS);
+    for (int i = 0; i < n; i++) {
+        memcpy(draw[i].ref, x->ref, sizeof draw[i].ref);
+        memcpy(draw[i].d, d[i], sizeof draw[i].d);
+    }
+    exact->light_pdf(x->c, n, draw);
+    for (int i = 0; i < n; i++) {
+        pdf[i] = draw[i].valid ? draw[i].pdf : 0;
+    }
+}
+
+// A reference point at some distance; for spheres sometimes inside.
+static void random_reference(Random *r, int light, double ref[3]) {
+    double distance = light == LIGHT_SPHERE && uniform(r) < 0.4 ? between(r, 0, 0.28) : between(r, 2.2, 6);
+    random_direction(r, ref);
+    for (int k = 0; k < 3; k++) {
+        ref[k] *= distance;
+    }
+}
+
+static double check_sampling(const Seen *x, Random *r, int *failures) {
+    LightDraw *d = calloc(SAMPLES, sizeof *d), *met = calloc(SAMPLES, sizeof *met);
+    assert_true(d && met);
+    for (int i = 0; i < SAMPLES; i++) {
+        d[i] = (LightDraw){.u = {uniform(r), uniform(r)}};
+        memcpy(d[i].ref, x->ref, sizeof d[i].ref);
+    }
+    exact->light_sample(x->c, SAMPLES, d);
+    memcpy(met, d, SAMPLES * sizeof *d);
+    exact->light_pdf(x->c, SAMPLES, met);
+    int best = -1, counts[CELLS] = {0}, wrong = 0;
+    for (int i = 0; i < SAMPLES; i++) {
+        if (d[i].valid) {
+            best = best < 0 || d[i].pdf > d[best].pdf ? i : best;
+            // The direction meets the light where the sample says, up to what is lost at edges.
+            bool same = met[i].valid && fabs(met[i].pdf - d[i].pdf) <= 1e-4 * d[i].pdf;
+            wrong += !same;
+        }
+    }
+    if (wrong > SAMPLES / 500) {
+        print_error("%d samples meet another density\n", wrong);
+        *failures += 1;
+    }
+    double p[CELLS], tail = 1;
+    if (best >= 0) {
+        SphereGrid g = grid_make(d[best].d, 0.02, 0, light_density, (void *)(uintptr_t)x);
+        for (int i = 0; i < SAMPLES; i++) {
+            if (d[i].valid) {
+                counts[grid_cell(&g, d[i].d)]++;
+            }
+        }
+        grid_probabilities(&g, counts, SAMPLES, p);
+        tail = chi_square_test(CELLS, p, counts, SAMPLES);
+    }
+    free(d);
+    free(met);
+    return tail;
+}
+
+static void test_sampling(void **state) {
+    UNUSED(state);
+    int failures = 0;
+    double threshold = sidak(0.01, CASES * (LIGHT_COUNT - 1));
+    for (int light = 0; light < LIGHT_COUNT; light++) {
+        Random r = {(uint64_t)light * 1000 + 5};
+        for (int n = 0; n < CASES && light != LIGHT_POINT; n++) {
+            KindCase c;
+            case_make_light(&c, &r, light, true);
+            Seen x = {&c, {0}};
+            random_reference(&r, light, x.ref);
+            double p = check_sampling(&x, &r, &failures);
+            if (p < threshold) {
+                print_error("%s: p = %g, threshold %g, seen from (%g %g %g)\n", light_names[light], p, threshold,
+                            x.ref[0], x.ref[1], x.ref[2]);
+                failures++;
+            }
+        }
+    }
+    assert_int_equal(failures, 0);
+}
+
+static double objective(const KindCase *c, LightDraw *d, const double df[3]) {
+    exact->light_eval(c, 1, d);
+    return df[0] * d->radiance[0] + df[1] * d->radiance[1] + df[2] * d->radiance[2];
+}
+
+static int check_adjoint(KindCase *c, LightDraw *d, Random *r, double largest[2]) {
+    Adjoint a = {.df = {between(r, -1, 1), between(r, -1, 1), between(r, -1, 1)}}, forward = a;
+    double gradient[CASE_THETA] = {0}, tangent[CASE_THETA], along = 0, size = 1e-30;
+    exact->light_adj(c, 1, d, &a, gradient, NULL);
+    int failures = 0;
+    for (int i = 0; i < c->theta_count; i++) {
+        tangent[i] = between(r, -1, 1);
+        along += tangent[i] * gradient[i];
+        size += fabs(tangent[i] * gradient[i]);
+        if (c->owner[i] < 0) {
+            continue;
+        }
+        // Radiance is linear in each of its parameters.
+        double x = c->theta[i];
+        c->theta[i] = x + 0.25;
+        double above = objective(c, d, a.df);
+        c->theta[i] = x - 0.25;
+        double quotient = (above - objective(c, d, a.df)) / 0.5;
+        c->theta[i] = x;
+        if (fabs(quotient - gradient[i]) > 1e-9 * fabs(quotient) + 1e-10) {
+            print_error("entry %d: adjoint %.12g, difference %.12g\n", i, gradient[i], quotient);
+            failures++;
+        }
+        largest[c->owner[i]] = fmax(largest[c->owner[i]], fabs(gradient[i]));
+    }
+    exact->light_adj(c, 1, d, &forward, NULL, tangent);
+    if (fabs(forward.forward - along) > 1e-12 * size) {
+        print_error("forward %.12g, reverse %.12g\n", forward.forward, along);
+        failures++;
+    }
+    return failures;
+}
+
+static void test_adjoints(void **state) {
+    UNUSED(state);
+    int failures = 0;
+    for (int light = 0; light < LIGHT_COUNT; light++) {
+        Random r = {(uint64_t)light * 1000 + 9};
+        double largest[2] = {0};
+        for (int n = 0; n < 4 * CASES; n++) {
+            KindCase c;
+            case_make_light(&c, &r, light, n % 2 == 1);
+            for (int i = 0; i < QUERIES; i++) {
+                LightDraw d = {.u = {uniform(&r), uniform(&r)}};
+                random_reference(&r, light, d.ref);
+                exact->light_sample(&c, 1, &d);
+                failures += check_adjoint(&c, &d, &r, largest);
+            }
+        }
+        if (largest[0] == 0 || (light == LIGHT_ENVMAP && largest[1] == 0)) {
+            print_error("%s: a derivative is never different from 0\n", light_names[light]);
+            failures++;
+        }
+    }
+    assert_int_equal(failures, 0);
+}
+
+static void test_widths(void **state) {
+    UNUSED(state);
+    static const KindKernels *const widths[] = {&kind_kernels_w1, &kind_kernels_w8, &kind_kernels_w16};
+    int failures = 0, width_count = rey_widest_lanes() >= 16 ? 3 : rey_widest_lanes() >= 8 ? 2 : 1;
+    for (int light = 0; light < LIGHT_COUNT; light++) {
+        Random r = {(uint64_t)light * 1000 + 11};
+        int different = 0, n = 33;
+        for (int k = 0; k < 4 * CASES; k++) {
+            KindCase c;
+            LightDraw d[3][33];
+            case_make_light(&c, &r, light, true);
+            for (int i = 0; i < n; i++) {
+                LightDraw one = {.u = {(double)(float)uniform(&r), (double)(float)uniform(&r)}};
+                random_reference(&r, light, one.ref);
+                d[0][i] = d[1][i] = d[2][i] = one;
+            }
+            for (int w = 0; w < width_count; w++) {
+                widths[w]->light_sample(&c, n, d[w]);
+                widths[w]->light_eval(&c, n, d[w]);
+                for (int i = 0; i < n; i++) {
+                    const LightDraw *a = &d[w][i], *b = &d[0][i];
+                    bool same = a->valid == b->valid && fabs(a->pdf - b->pdf) <= 2e-4 * fabs(b->pdf) + 1e-6;
+                    for (int j = 0; j < 3; j++) {
+                        same &= fabs(a->d[j] - b->d[j]) <= 1e-5;
+                        same &= fabs(a->radiance[j] - b->radiance[j]) <= 2e-4 * fabs(b->radiance[j]) + 1e-4;
+                    }
+                    different += !same;
+                }
+            }
+        }
+        // A sample may fall into the neighbouring texel or triangle, or miss a grazing light.
+        if (different > 4 * CASES * n / 200) {
+            print_error("%s: %d samples differ\n", light_names[light], different);
+            failures++;
+        }
+    }
+    assert_int_equal(failures, 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sampling), cmocka_unit_test(test_adjoints),
+                                       cmocka_unit_test(test_widths)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
