@@ -239,6 +239,9 @@ void case_update_light(KindCase *c) {
     for (int i = 0; i < CASE_TABLES; i++) {
         c->tables[i] = (double)tables[i];
     }
+    for (int i = 0; i < 9; i++) { // the inverse rotation without its rounding
+        c->tables[i] = c->theta[e->to_world + i % 3 * 4 + i / 3];
+    }
 }
 
 static void make_envmap(KindCase *c, Random *r, const double rotation[9]) {
@@ -256,6 +259,7 @@ static void make_envmap(KindCase *c, Random *r, const double rotation[9]) {
             value = rotation[i / 4 * 3 + i % 4];
         }
         add_fixed(c, &value, 1);
+        c->theta[c->theta_count - 1] = value;
     }
     case_update_light(c);
 }

@@ -113,7 +113,7 @@ static inline void grid_probabilities(const SphereGrid *g, const int counts[CELL
         double whole = grid_quadrature(g, t0, t1, p0, p1);
         p[i] = grid_integral(g, t0, t1, p0, p1, whole, 1e-5, 8, 1);
         if (fabs(counts[i] - n * p[i]) > 2 * sqrt(n * p[i] + 1)) {
-            p[i] = grid_integral(g, t0, t1, p0, p1, whole, 1e-6, 10, 5);
+            p[i] = grid_integral(g, t0, t1, p0, p1, whole, 1e-6, 10, 4);
         }
     }
 }

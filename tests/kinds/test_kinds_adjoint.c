@@ -28,16 +28,18 @@ static double difference(const KindCase *c, const Query *q, const double df[3], 
     return sum / (12 * h);
 }
 
-// By how much values change when the directions move by a few roundings: narrow lobes amplify those.
+// By how much values change when directions and uv move by a few roundings: narrow lobes amplify those.
 static double rounding_noise(const KindCase *c, const Query *q, const double df[3], Random *r) {
     double value = objective(c, q, df), noise = 1e-14 * fabs(value);
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 12; i++) {
         Query moved = *q;
         for (int k = 0; k < 3; k++) {
             moved.wi[k] *= 1 + between(r, -1e-15, 1e-15);
             moved.wo[k] *= 1 + between(r, -1e-15, 1e-15);
         }
-        noise = fmax(noise, 8 * fabs(objective(c, &moved, df) - value));
+        moved.uv[0] += between(r, -1e-15, 1e-15);
+        moved.uv[1] += between(r, -1e-15, 1e-15);
+        noise = fmax(noise, 12 * fabs(objective(c, &moved, df) - value));
     }
     return noise;
 }
