@@ -143,7 +143,7 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     t.derivative = job->mode != MODE_PRIMAL;
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     int64_t total = (int64_t)job->width * job->height * job->spp;
-    for (int64_t first = 0; first < total; first += t.ws.chunk) {
+    for (int64_t first = 0; first < total && (!job->go_on || job->go_on(job->user)); first += t.ws.chunk) {
         int64_t left = total - first;
         run_chunk(&t, &filter, first, left < t.ws.chunk ? (int32_t)left : t.ws.chunk, begin);
     }

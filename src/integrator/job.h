@@ -21,6 +21,9 @@ typedef struct PathJob {
     const float *tangent;
     const int32_t *texture_at, *to_uv_at, *normals_at;
     bool any_normals;
+    // Asked before each chunk of paths: false ends the job early. May be null.
+    bool (*go_on)(void *user);
+    void *user;
     // Scratch memory of the worker: rey_kernel_workspace_bytes.
     void *workspace;
     size_t workspace_bytes;

@@ -6,7 +6,7 @@
 #include "render/update.h"
 
 #include <pthread.h>
-#include <stdio.h>
+#include <stdatomic.h>
 #include <string.h>
 
 // Units of a derivative that have a gradient of their own: fixed, so that sums do not depend on the threads.
@@ -33,8 +33,8 @@ typedef struct Render {
     float *adjoint;
     rey_stats stats;
     double done, total;    // progress
-    bool cancelled;
-    pthread_mutex_t lock;
+    atomic_bool cancelled;
+    pthread_mutex_t lock;   // of stats and done, and around progress
 } Render;
 
 static uint32_t hash(uint32_t x) {
@@ -128,12 +128,21 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
     return REY_OK;
 }
 
+// Tells the caller how far it is; between tiles, and between chunks of tiles that take long.
+static bool go_on(void *user) {
+    Render *r = user;
+    if (r->def.progress && pthread_mutex_trylock(&r->lock) == 0) {
+        if (!r->cancelled && !r->def.progress(r->def.user, r->done / r->total)) {
+            r->cancelled = true;
+        }
+        pthread_mutex_unlock(&r->lock);
+    }
+    return !r->cancelled;
+}
+
 // Runs one tile and books its counts; false when the caller cancelled.
 static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
-    pthread_mutex_lock(&r->lock);
-    bool cancelled = r->cancelled;
-    pthread_mutex_unlock(&r->lock);
-    if (cancelled) {
+    if (!go_on(r)) {
         return false;
     }
     Tile t = rey_film_tile(&r->plan, tile);
@@ -142,6 +151,8 @@ static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
     job->width = t.width;
     job->height = t.height;
     job->workspace = r->workspaces[worker];
+    job->go_on = go_on;
+    job->user = r;
     job->paths = job->rays = job->nonfinite = 0;
     job->trace_seconds = 0;
     double start = rey_thread_seconds();
@@ -154,11 +165,8 @@ static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
     r->stats.trace_seconds += job->trace_seconds;
     r->stats.thread_seconds += seconds;
     r->done += 1;
-    if (r->def.progress && !r->cancelled && !r->def.progress(r->def.user, r->done / r->total)) {
-        r->cancelled = true;
-    }
     pthread_mutex_unlock(&r->lock);
-    return true;
+    return !r->cancelled;
 }
 
 static void film_unit(void *argument, int64_t item, int worker) {

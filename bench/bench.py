@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+"""Reynolds against itself: rates, ratios of widths, threads and modes, start-up and memory, as medians of interleaved
+repeats in one run. All are ratios of wall time.
+
+usage: bench.py [--reynolds BINARY] [--repeats N] [--folder DIR]"""
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import time
+
+import scenes
+
+
+def run(reynolds, *arguments):
+    return json.loads(subprocess.run([reynolds, *arguments, "--json"], check=True, capture_output=True, text=True).stdout)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--reynolds", default="build/bin/reynolds")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--folder", default="build/bench")
+    options = parser.parse_args()
+    reynolds = os.path.abspath(options.reynolds)
+    print("%-10s %10s %10s %8s %8s %8s %8s %8s %8s %9s %8s" % (
+        "scene", "Mpaths/s", "Mrays/s", "embree", "w16/w1", "w8/w1", "2t/1t", "rev/pri", "fwd/pri", "start ms", "MB"))
+    for name, (path, spp) in scenes.make(options.folder).items():
+        param = "metal.alpha.value" if name != "cornell" else "white.reflectance.value"
+        out = os.path.join(options.folder, "out.exr")
+        render = ["render", path, "-o", out, "--spp", str(spp)]
+        grad = ["grad", path, "--param", param, "--spp", str(spp)]
+        commands = {"w16": render, "w8": render + ["--lanes", "8"], "w1": render + ["--lanes", "1"],
+                    "one": render + ["-t", "1"], "reverse": grad + ["--mode", "reverse", "--adjoint", "1"],
+                    "forward": grad}
+        results = {key: [] for key in commands}
+        start = []
+        for _ in range(options.repeats):
+            for key, command in commands.items():
+                results[key].append(run(reynolds, *command))
+            begin = time.time()
+            run(reynolds, "info", path)
+            start.append(time.time() - begin)
+        median = {key: statistics.median(r["seconds"] for r in rows) for key, rows in results.items()}
+        first = results["w16"][0]
+        rate = first["paths"] / median["w16"] / 1e6
+        print("%-10s %10.2f %10.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %9.0f %8.0f" % (
+            name, rate, first["rays"] / median["w16"] / 1e6,
+            statistics.median(r["trace_share"] for r in results["w16"]), median["w1"] / median["w16"],
+            median["w1"] / median["w8"], median["one"] / median["w16"], median["reverse"] / median["w16"],
+            median["forward"] / median["w16"], 1e3 * statistics.median(start), first["peak_rss_mb"]))
+
+
+if __name__ == "__main__":
+    main()
