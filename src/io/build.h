@@ -60,6 +60,8 @@ typedef struct TextureUse {
     bool real;             // a number is wanted: a plain float stays one number
     float low, high;
     const char *unit, *text;
+    int terms;             // that the derivative needs beyond `interior`
+    const char *why;
 } TextureUse;
 
 // The texture of slot `name` of a node: a child, a value, or the default (grey, when count is 1). path: of the slot.

@@ -11,7 +11,8 @@ static const char *bsdf_word(void *user, int i) {
 static TextureUse slot_use(const ParamDesc *p) {
     bool real = p->type != PARAM_SPEC && p->type != PARAM_METAL_ETA && p->type != PARAM_METAL_K;
     bool bounded = p->type == PARAM_SPEC && p->high <= 1;
-    return (TextureUse){bounded ? REY_COLOUR_REFLECTANCE : REY_COLOUR_UNBOUNDED, real, p->low, p->high, "", p->text};
+    return (TextureUse){bounded ? REY_COLOUR_REFLECTANCE : REY_COLOUR_UNBOUNDED, real, p->low, p->high, "", p->text, 0,
+                        NULL};
 }
 
 // Ratio of int_ior and ext_ior.
@@ -24,7 +25,12 @@ static rey_result ior_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, c
                             inside, outside);
     }
     double eta = inside / outside;
-    return build_constant(b, node, "int_ior", slot_use(p), &eta, 1, path, out);
+    TextureUse use = slot_use(p);
+    if (p->type == PARAM_SMOOTH_IOR) {
+        use.terms = REY_TERM_SPECULAR;
+        use.why = "the index turns the direction of the refracted ray";
+    }
+    return build_constant(b, node, "int_ior", use, &eta, 1, path, out);
 }
 
 // eta or k of a conductor: written out, or from `material`.

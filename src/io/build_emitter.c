@@ -15,7 +15,7 @@ static const char *emitter_word(void *user, int i) {
 
 static rey_result emission_slot(Builder *b, rey_xml_node *node, const char *name, const char *unit, const char *text,
                                 const char *path, int32_t *out) {
-    TextureUse use = {REY_COLOUR_EMISSION, false, 0, INFINITY, unit, text};
+    TextureUse use = {REY_COLOUR_EMISSION, false, 0, INFINITY, unit, text, 0, NULL};
     char slot[MAX_PATH_NAME];
     double one = 1;
     build_join(slot, path, name);
@@ -106,7 +106,7 @@ static rey_result build_envmap(Builder *b, rey_xml_node *node, int32_t id, const
     }
     rey_image_free(b->ctx, &image);
     TRY(result);
-    TextureUse use = {REY_COLOUR_UNBOUNDED, true, 0, INFINITY, "", "factor on the image"};
+    TextureUse use = {REY_COLOUR_UNBOUNDED, true, 0, INFINITY, "", "factor on the image", 0, NULL};
     char name[MAX_PATH_NAME];
     double one = 1, matrix[16];
     bool mis_compensation;

@@ -232,8 +232,12 @@ static rey_result build_analytic(Builder *b, rey_xml_node *node, int32_t id, con
         if (sphere && determinant(m) < 0) {
             shape->flags ^= SHAPE_FLIP_NORMALS;
         }
-        shape->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), sphere ? 13 : 24);
-        return shape->table >= 0 ? REY_OK : REY_ERROR_MEMORY;
+        // Embree reads a sphere's centre and radius from here by one load of 16 bytes, which must be aligned.
+        Array *tables = &b->scene->build.tables;
+        int32_t padding = (int32_t)(-tables->count % 4);
+        int32_t first = rey_scene_append(b->scene, tables, sizeof(float), padding + (sphere ? 13 : 24));
+        shape->table = first + padding;
+        return first >= 0 ? REY_OK : REY_ERROR_MEMORY;
     }
     return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
 }

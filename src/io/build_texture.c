@@ -29,7 +29,8 @@ static rey_result add_texture(Builder *b, int32_t kind, int64_t count, int32_t *
 
 static Param texture_param(TextureUse use, int32_t texture, int32_t theta, int64_t count) {
     return (Param){PARAM_DEFAULTS, .theta = theta, .count = (int32_t)count, .low = use.low, .high = use.high,
-                   .terms = REY_TERM_INTERIOR, .unit = use.unit, .description = use.text, .texture = texture};
+                   .terms = REY_TERM_INTERIOR | use.terms, .why = use.why, .unit = use.unit, .description = use.text,
+                   .texture = texture};
 }
 
 // Parameters are differentiable where their derivative is not 0: an open range loses infinity, and bounds of 0 stay.

@@ -136,7 +136,7 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
         return build_sensor(b, node, name);
     case REY_XML_TEXTURE:
     case REY_XML_SPECTRUM: {
-        TextureUse use = {REY_COLOUR_UNBOUNDED, false, -INFINITY, INFINITY, "", "texture"};
+        TextureUse use = {REY_COLOUR_UNBOUNDED, false, -INFINITY, INFINITY, "", "texture", 0, NULL};
         return build_texture(b, node, use, name, &unused);
     }
     case REY_XML_INTEGRATOR:
