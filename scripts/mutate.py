@@ -72,7 +72,7 @@ def mutants_of(path):
             yield number, "drop", f"{m[1]}if (0) {line.strip()}"
             continue
         m = DECLARE.match(line)
-        if m and m[2] == "Float":
+        if m and m[2] == "Float" and not re.search(r", \w+ =", m[4]):
             yield number, "flip", f"{m[1]}Float {m[3]} = -({m[4]});"
 
 
