@@ -52,7 +52,7 @@ sanitize: setup
 tsan: setup
 	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON > /dev/null
 	@$(MAKE) --no-print-directory -C build-tsan -j$(JOBS)
-	@cd build-tsan && ctest --output-on-failure -L threads
+	@cd build-tsan && TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" ctest --output-on-failure -L threads
 
 install: all
 	@cmake --install $(BUILD) --prefix $(PREFIX)

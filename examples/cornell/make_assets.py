@@ -142,16 +142,16 @@ def environment(rng):
 def values(rng, shipped):
     """Numbers of the truth and of the start, for the XML files."""
     truth = {"white": (0.725, 0.71, 0.68), "red": (0.63, 0.12, 0.1), "green": (0.16, 0.45, 0.13),
-             "radiance": (18.0, 15.0, 9.0), "alpha": 0.18}
+             "radiance": (18.0, 15.0, 9.0), "alpha": 0.3}
     start = {"white": (0.4, 0.4, 0.4), "red": (0.4, 0.4, 0.4), "green": (0.4, 0.4, 0.4),
-             "radiance": (6.0, 6.0, 6.0), "alpha": 0.5}
+             "radiance": (6.0, 6.0, 6.0), "alpha": 0.6}
     if not shipped:
         for name in ("white", "red", "green"):
             truth[name] = tuple(min(0.8, max(0.08, x * rng.uniform(0.7, 1.3))) for x in truth[name])
             start[name] = tuple(rng.uniform(0.2, 0.7) for _ in range(3))
         truth["radiance"] = tuple(x * rng.uniform(0.6, 1.5) for x in truth["radiance"])
         start["radiance"] = tuple(rng.uniform(4, 30) for _ in range(3))
-        truth["alpha"], start["alpha"] = rng.uniform(0.1, 0.3), rng.uniform(0.35, 0.6)
+        truth["alpha"], start["alpha"] = rng.uniform(0.2, 0.35), rng.uniform(0.5, 0.7)
     return truth, start
 
 
