@@ -48,6 +48,8 @@ def main():
     print("Mitsuba %s against Reynolds, %d threads" % (mi.__version__, os.cpu_count()))
     print("%-10s %-28s %12s %12s %8s" % ("scene", "what", "peer Mp/s", "ours Mp/s", "ratio"))
     for name, (path, _) in scenes.make(folder).items():
+        if name == "million":
+            continue  # its sky is a NumPy array, which the peer does not read
         scene = mi.load_file(path)
         pixels = 512 * 512
 
@@ -72,7 +74,7 @@ def main():
 
         # Reverse mode with respect to all albedos (or the roughness), and forward with respect to a roughness.
         parameters = mi.traverse(scene)
-        keys = [k for k in parameters.keys() if k.endswith("reflectance.value") and not k.startswith("light")]
+        keys = [k for k in parameters.keys() if k.endswith("reflectance.value") and k.split(".")[0] in ("white", "red", "green")]
         alpha = [k for k in parameters.keys() if k.endswith("alpha.value")]
         integrator = mi.load_dict({"type": "prb", "max_depth": 8, "rr_depth": 5})
         for what, chosen in (("reverse, albedos", keys if name == "cornell" else []), ("reverse, roughness", alpha)):
