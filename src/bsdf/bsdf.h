@@ -11,6 +11,7 @@
 #include "bsdf/roughconductor.h"
 #include "bsdf/roughdielectric.h"
 #include "bsdf/roughplastic.h"
+#include "bsdf/thindielectric.h"
 #include "bsdf/twosided.h"
 
 enum {

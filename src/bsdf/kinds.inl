@@ -5,6 +5,7 @@ BSDF_LEAF(DIFFUSE, diffuse, Diffuse, "diffuse", DIFFUSE_PARAMS, NO_CONFIG, "lamb
 BSDF_LEAF(CONDUCTOR, conductor, Conductor, "conductor", CONDUCTOR_PARAMS, NO_CONFIG, "born1999")
 BSDF_LEAF(ROUGHCONDUCTOR, roughconductor, RoughConductor, "roughconductor", ROUGHCONDUCTOR_PARAMS, MICROFACET_CONFIG, "walter2007")
 BSDF_LEAF(DIELECTRIC, dielectric, Dielectric, "dielectric", DIELECTRIC_PARAMS, NO_CONFIG, "walter2007")
+BSDF_LEAF(THINDIELECTRIC, thindielectric, ThinDielectric, "thindielectric", THINDIELECTRIC_PARAMS, NO_CONFIG, "born1999")
 BSDF_LEAF(ROUGHDIELECTRIC, roughdielectric, RoughDielectric, "roughdielectric", ROUGHDIELECTRIC_PARAMS, MICROFACET_CONFIG, "walter2007")
 BSDF_LEAF(PLASTIC, plastic, Plastic, "plastic", PLASTIC_PARAMS, PLASTIC_CONFIG, "")
 BSDF_LEAF(ROUGHPLASTIC, roughplastic, RoughPlastic, "roughplastic", ROUGHPLASTIC_PARAMS, ROUGHPLASTIC_CONFIG, "walter2007")
