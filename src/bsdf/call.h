@@ -6,7 +6,7 @@
 typedef struct BsdfCall {
     const SceneView *scene;
     int32_t node;
-    Vec2 uv;
+    TexCoord uv;
     real floor; // see KIND_RECORD
 } BsdfCall;
 

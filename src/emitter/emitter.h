@@ -11,7 +11,8 @@ typedef struct LightSample {
     Vec3 d;         // unit direction towards the light
     Float distance; // to the point; infinite lights: beyond the scene
     Float pdf;      // per solid angle; delta lights: 1
-    Vec2 uv;        // where the light's texture is read
+    Vec2 uv;        // where the light's texture is read; barycentrics where that needs the triangle (e->attributes)
+    Int prim;       // triangle of the light's mesh, else 0
     Mask valid;     // the light can be seen from there
 } LightSample;
 
@@ -69,6 +70,7 @@ KFN LightSample area_sample(const SceneView *scene, const EmitterRecord *e, Vec3
         Float cos_light = -v3_dot(s.d, si.ng);
         s.pdf = f_select(outside, f_safe_rcp(TWO_PI * one_minus_cos), r2 * f_safe_rcp(f_abs(cos_light) * shape->area));
         s.uv = si.uv;
+        s.prim = hit.prim;
         s.valid = m_gt(cos_light, f_set(0)) & m_gt(s.pdf, f_set(0));
         return s;
     }
@@ -91,7 +93,8 @@ KFN LightSample area_sample(const SceneView *scene, const EmitterRecord *e, Vec3
     s.d = v3_scale(to_light, f_safe_rcp(s.distance));
     Float cos_light = f_abs(v3_dot(s.d, si.ng));
     s.pdf = r2 * f_safe_rcp(cos_light * shape->area);
-    s.uv = si.uv;
+    s.uv = e->attributes ? (Vec2){hit.u, hit.v} : si.uv;
+    s.prim = hit.prim;
     s.valid = m_lt(v3_dot(s.d, si.sh.n), f_set(0)) & m_gt(cos_light, f_set(1e-7f)) & m_gt(r2, f_set(0));
     return s;
 }
@@ -190,6 +193,7 @@ KFN LightSample envmap_sample(const SceneView *scene, const EmitterRecord *e, Ve
     s.distance = f_set(2 * scene->bounds_radius);
     s.pdf = density * f_safe_rcp(2.0f * PI * PI * sin_theta);
     s.valid = m_gt(s.pdf, f_set(0));
+    s.prim = i_set(0);
     return s;
 }
 
@@ -216,6 +220,7 @@ KFN LightSample emitter_sample(const SceneView *scene, const EmitterRecord *e, V
         s.d = v3_scale(to_light, f_safe_rcp(s.distance));
         s.pdf = f_set(1);
         s.uv = (Vec2){f_set(0), f_set(0)};
+        s.prim = i_set(0);
         s.valid = m_gt(s.distance, f_set(0));
         return s;
     }
@@ -224,6 +229,7 @@ KFN LightSample emitter_sample(const SceneView *scene, const EmitterRecord *e, V
         s.distance = f_set(2 * scene->bounds_radius);
         s.pdf = f_set(INV_FOUR_PI);
         s.uv = (Vec2){f_set(0), f_set(0)};
+        s.prim = i_set(0);
         s.valid = m_set(true);
         return s;
     default:
@@ -231,11 +237,20 @@ KFN LightSample emitter_sample(const SceneView *scene, const EmitterRecord *e, V
     }
 }
 
+// Where the texture of a sampled light is read. hit: room for the point's triangle.
+KFN TexCoord emitter_texcoord(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Int prim, Hit *hit) {
+    if (!e->attributes) {
+        return texcoord(uv, NULL);
+    }
+    *hit = (Hit){i_set(e->shape), prim, uv.x, uv.y, v3_zero()};
+    return texcoord(mesh_interaction(scene, scene->shapes[e->shape].flags, hit).uv, hit);
+}
+
 // Radiance that arrives from a light sample (point lights: intensity over squared distance).
-KFN Spec emitter_eval(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Float distance) {
+KFN Spec emitter_eval(const SceneView *scene, const EmitterRecord *e, TexCoord uv, Float distance) {
     switch (e->kind) {
     case EMITTER_ENVMAP:
-        return envmap_eval(scene, e, uv);
+        return envmap_eval(scene, e, (Vec2){uv.x, uv.y});
     case EMITTER_POINT:
         return spec_scale(texture_eval(scene, e->slot, uv), f_safe_rcp(distance * distance));
     default:
@@ -244,11 +259,11 @@ KFN Spec emitter_eval(const SceneView *scene, const EmitterRecord *e, Vec2 uv, F
 }
 
 // Accumulates the adjoint of emitter_eval into the light's own parameters.
-KFN void emitter_adj(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Float distance, Spec dl, Sink *sink,
+KFN void emitter_adj(const SceneView *scene, const EmitterRecord *e, TexCoord uv, Float distance, Spec dl, Sink *sink,
                      Mask m) {
     switch (e->kind) {
     case EMITTER_ENVMAP:
-        envmap_adj(scene, e, uv, dl, sink, m);
+        envmap_adj(scene, e, (Vec2){uv.x, uv.y}, dl, sink, m);
         break;
     case EMITTER_POINT:
         texture_adj(scene, e->slot, uv, spec_scale(dl, f_safe_rcp(distance * distance)), NULL, sink, m);

@@ -19,8 +19,8 @@ typedef struct PathJob {
     const float *adjoint;
     double *gradient;
     const float *tangent;
-    const int32_t *texture_at, *to_uv_at, *normals_at;
-    bool any_normals;
+    const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at;
+    bool any_normals, any_attributes;
     // Asked before each chunk of paths: false ends the job early. May be null.
     bool (*go_on)(void *user);
     void *user;

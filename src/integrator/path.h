@@ -99,7 +99,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
         pdf = envmap_pdf(scene, e, uv);
     }
     Float mis = f_select(m_lt(v.pdf, f_set(0)), f_set(1), power_heuristic(v.pdf, pdf * e->weight));
-    Spec l = emitter_eval(scene, e, uv, f_set(1));
+    Spec l = emitter_eval(scene, e, texcoord(uv, NULL), f_set(1));
     slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), v.m);
     if (t->derivative) {
         int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
@@ -128,19 +128,21 @@ KFN Int emitter_choose(const SceneView *scene, Float u, Float *probability) {
 
 // Samples a light per lane: emitters are uniform in kernels, so each one present in the batch is sampled in turn.
 KFN LightSample light_sample(const SceneView *scene, Int light, Mask m, Vec3 ref, Vec2 u, Spec *radiance) {
-    LightSample s = {v3(f_set(0), f_set(0), f_set(1)), f_set(1), f_set(0), {f_set(0), f_set(0)}, m_set(false)};
+    LightSample s = {v3(f_set(0), f_set(0), f_set(1)), f_set(1), f_set(0), {f_set(0), f_set(0)}, i_set(0), m_set(false)};
     *radiance = spec_zero();
     for (Mask left = m; m_any(left);) {
         int32_t id = i_lane(light, m_first(left));
         Mask mine = left & mi_eq(light, i_set(id));
         const EmitterRecord *e = scene->emitters + id;
         LightSample one = emitter_sample(scene, e, ref, u);
-        Spec l = emitter_eval(scene, e, one.uv, one.distance);
+        Hit hit;
+        Spec l = emitter_eval(scene, e, emitter_texcoord(scene, e, one.uv, one.prim, &hit), one.distance);
         s.d = v3_select(mine, one.d, s.d);
         s.distance = f_select(mine, one.distance, s.distance);
         s.pdf = f_select(mine, one.pdf, s.pdf);
         s.uv.x = f_select(mine, one.uv.x, s.uv.x);
         s.uv.y = f_select(mine, one.uv.y, s.uv.y);
+        s.prim = i_select(mine, one.prim, s.prim);
         s.valid = s.valid | (mine & one.valid);
         *radiance = spec_select(mine, l, *radiance);
         left = left & ~mine;
@@ -193,6 +195,7 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     if (record >= 0) {
         Records *r = &t->ws.records;
         i_store(r->light + record, light);
+        i_store(r->lprim + record, s.prim);
         f_store(r->ldx + record, s.d.x);
         f_store(r->ldy + record, s.d.y);
         f_store(r->ldz + record, s.d.z);
@@ -278,7 +281,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         const EmitterRecord *e = scene->emitters + group->emitter;
         Mask lit = v.m & m_gt(wi.z, f_set(0));
         mis = f_zero_unless(lit, emission_weight(t, e, &v, &si));
-        Spec l = emitter_eval(scene, e, si.uv, f_set(1));
+        Spec l = emitter_eval(scene, e, texcoord(si.uv, &v.hit), f_set(1));
         slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), lit);
     }
     int32_t record = -1;
@@ -293,7 +296,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         return next_count;
     }
     SampleKey key = slot_key(t, v.slot);
-    BsdfCall call = {scene, group->bsdf, si.uv, t->floor};
+    BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor};
     if (scene->emitters_count > 0) {
         connect_lights(t, &v, &si, &call, wi, &key, bounce, record);
     }

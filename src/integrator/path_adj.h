@@ -45,14 +45,14 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     if (e->kind == EMITTER_ENVMAP) {
         uv = envmap_uv(t->scene, e, d);
     }
-    Spec l = spec_scale(emitter_eval(t->scene, e, uv, f_set(1)), mis);
+    Spec l = spec_scale(emitter_eval(t->scene, e, texcoord(uv, NULL), f_set(1)), mis);
     f_scatter(t->ws.sx, slot, l.c[0], m);
     f_scatter(t->ws.sy, slot, l.c[1], m);
     f_scatter(t->ws.sz, slot, l.c[2], m);
     for (int c = 0; c < drives(t); c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
-        emitter_adj(t->scene, e, uv, f_set(1), spec_zero_unless(m, dl), sink, m);
+        emitter_adj(t->scene, e, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl), sink, m);
         forward_flush(t, sink, slot, c, m);
     }
 }
@@ -60,7 +60,7 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
 // What the sweep knows of a batch of surface vertices.
 typedef struct SurfaceSweep {
     Mask m, lit, connected, scattered;
-    Int slot, light, lobe;
+    Int slot, light, light_prim, lobe;
     Spec beta, suffix, light_weight, light_value, f_light, f_scatter, emission;
     Float mis, scatter_weight, light_distance;
     Vec2 light_uv;
@@ -73,22 +73,29 @@ typedef struct SurfaceSweep {
 } SurfaceSweep;
 
 // Radiance of each lane's light sample.
-KFN Spec lights_eval(const SceneView *scene, Int light, Mask m, Vec2 uv, Float distance) {
+KFN Spec lights_eval(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim, Float distance) {
     Spec radiance = spec_zero();
     for (Mask left = m; m_any(left);) {
         int32_t id = i_lane(light, m_first(left));
         Mask mine = left & mi_eq(light, i_set(id));
-        radiance = spec_select(mine, emitter_eval(scene, scene->emitters + id, uv, distance), radiance);
+        const EmitterRecord *e = scene->emitters + id;
+        Hit hit;
+        TexCoord at = emitter_texcoord(scene, e, uv, i_select(mine, prim, i_set(0)), &hit);
+        radiance = spec_select(mine, emitter_eval(scene, e, at, distance), radiance);
         left = left & ~mine;
     }
     return radiance;
 }
 
-KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Float distance, Spec dl, Sink *sink) {
+KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim, Float distance, Spec dl,
+                    Sink *sink) {
     for (Mask left = m; m_any(left);) {
         int32_t id = i_lane(light, m_first(left));
         Mask mine = left & mi_eq(light, i_set(id));
-        emitter_adj(scene, scene->emitters + id, uv, distance, spec_zero_unless(mine, dl), sink, mine);
+        const EmitterRecord *e = scene->emitters + id;
+        Hit hit;
+        TexCoord at = emitter_texcoord(scene, e, uv, i_select(mine, prim, i_set(0)), &hit);
+        emitter_adj(scene, e, at, distance, spec_zero_unless(mine, dl), sink, mine);
         left = left & ~mine;
     }
 }
@@ -114,6 +121,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
     s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
     s.light = i_load(r->light + at);
+    s.light_prim = i_load(r->lprim + at);
     s.lobe = i_load(r->lobe + at);
     s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
     s.light_distance = f_load(r->ldist + at);
@@ -126,7 +134,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.wi = frame_to_local(&s.si.sh, back);
     s.wl = frame_to_local(&s.si.sh, s.light_d);
     s.wo = frame_to_local(&s.si.sh, s.wo_d);
-    s.call = (BsdfCall){t->scene, s.group->bsdf, s.si.uv, t->floor};
+    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor};
     s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
     return s;
 }
@@ -136,13 +144,13 @@ KFN Spec surface_primal(const Tracer *t, SurfaceSweep *s) {
     Spec l = spec_zero();
     s->lit = s->m & m_gt(s->mis, f_set(0));
     if (s->emitter) {
-        s->emission = emitter_eval(t->scene, s->emitter, s->si.uv, f_set(1));
+        s->emission = emitter_eval(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1));
         l = spec_zero_unless(s->lit, spec_scale(s->emission, s->mis));
     }
     s->f_light = s->f_scatter = s->light_value = spec_zero();
     if (m_any(s->connected)) {
         s->f_light = spec_zero_unless(s->connected, bsdf_eval(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH)));
-        s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_distance);
+        s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
         spec_acc(&l, spec_mul(spec_mul(s->f_light, s->light_value), s->light_weight));
     }
     if (m_any(s->scattered)) {
@@ -160,8 +168,8 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
     Vec3 unused = v3_zero();
     if (s->emitter) {
         // L += w_e Le
-        emitter_adj(t->scene, s->emitter, s->si.uv, f_set(1), spec_zero_unless(s->lit, spec_scale(weight, s->mis)), sink,
-                    s->lit);
+        emitter_adj(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
+                    spec_zero_unless(s->lit, spec_scale(weight, s->mis)), sink, s->lit);
     }
     if (m_any(s->connected)) {
         // L += f Le (T w_l)
@@ -169,7 +177,8 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
         Spec both = spec_mul(weight, s->light_weight);
         Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
         bsdf_adj(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
-        lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_distance, spec_mul(both, s->f_light), sink);
+        lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
+                   spec_mul(both, s->f_light), sink);
         frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
     }
     if (m_any(s->scattered)) {
@@ -194,7 +203,9 @@ static void path_backward(Tracer *t) {
                  .texture_at = job->texture_at,
                  .to_uv_at = job->to_uv_at,
                  .normals_at = job->normals_at,
+                 .attribute_at = job->attribute_at,
                  .any_normals = job->any_normals,
+                 .any_attributes = job->any_attributes,
                  .derivative = f_set(0)};
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
@@ -203,6 +214,7 @@ static void path_backward(Tracer *t) {
             continue;
         }
         SurfaceSweep s = surface_load(t, batch);
+        s.call.uv.hit = &s.hit;
         Spec l = surface_primal(t, &s);
         Mask finite = s.m & m_finite(spec_sum(l));
         for (int c = 0; c < drives(t); c++) {

@@ -28,7 +28,7 @@ enum {
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(bx) F(by) F(bz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist)     \
     F(ltx) F(lty) F(ltz) F(wox) F(woy) F(woz) F(sw)
-#define RECORD_INTS(I) I(shape) I(prim) I(slot) I(light) I(lobe)
+#define RECORD_INTS(I) I(shape) I(prim) I(slot) I(light) I(lprim) I(lobe)
 
 #define DECLARE_FLOAT(name) real *name;
 #define DECLARE_INT(name) int32_t *name;

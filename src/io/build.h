@@ -19,11 +19,25 @@ typedef struct ShapeSource {
     int32_t shape;
 } ShapeSource;
 
+// Values that a mesh brings for one of its attributes.
+typedef struct MeshAttribute {
+    char name[64]; // "vertex_NAME" or "face_NAME"
+    int32_t shape, theta, channels, param;
+    bool per_face;
+} MeshAttribute;
+
+// A texture that reads an attribute by name.
+typedef struct AttributeUse {
+    char name[64];
+    int32_t texture;
+} AttributeUse;
+
 // The source document; it lives as long as the scene, which is written back from it.
 typedef struct SceneSource {
     rey_context *ctx;
     rey_xml_document *document;
     Array textures, shapes; // of TextureSource, ShapeSource
+    Array attributes;       // of MeshAttribute
 } SceneSource;
 
 typedef struct Builder {
@@ -31,6 +45,7 @@ typedef struct Builder {
     rey_scene *scene;
     SceneSource *source;
     Array prefixes; // of Prefix: the first parameter path of each object
+    Array attribute_uses; // of AttributeUse
 } Builder;
 
 #define TRY(expression)                                                                                                \
@@ -72,6 +87,9 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
 // A constant with its parameter `path`.value (alias `path`). node and property say where it came from, may be null.
 rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, TextureUse use, const double *values,
                           int count, const char *path, int32_t *out);
+// A texture that reads a mesh's attribute; and, once all shapes and textures are known, who finds what where.
+rey_result build_attribute_texture(Builder *b, rey_xml_node *node, int32_t texture);
+rey_result build_attribute_tables(Builder *b);
 // A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.
 rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param param, int32_t *out);
 

@@ -1,6 +1,6 @@
 // build_shape.c: shapes, and the shading groups that they fall into.
 #include "io/build.h"
-#include "io/mesh.h"
+#include "io/build_attribute.h"
 #include "shape/update.h"
 
 #include <string.h>
@@ -136,6 +136,9 @@ static rey_result copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const 
         shape->flags |= SHAPE_HAS_UVS;
         TRY(vertex_param(b, path, "texcoords", "vertex_texcoords", v, 2, uvs, &shape->uvs));
         memcpy(&ARRAY_AT(scene->build.theta, float, shape->uvs), mesh->uvs, (size_t)v * 2 * sizeof(float));
+    }
+    for (int i = 0; i < mesh->attribute_count; i++) {
+        TRY(build_mesh_attribute(b, &mesh->attributes[i], id, path, v, f));
     }
     int32_t triangles = rey_scene_append(scene, &scene->build.triangles, sizeof(int32_t), 3 * f);
     shape->welded = rey_scene_append(scene, &scene->build.welded, sizeof(int32_t), v);

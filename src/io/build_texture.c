@@ -61,7 +61,7 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
 }
 
 static const char *texture_word(void *user, int i) {
-    static const char *const words[] = {"bitmap", "checkerboard", "rawconstant", "srgb", "uniform", "d65", "blackbody",
+    static const char *const words[] = {"bitmap", "checkerboard", "mesh_attribute", "rawconstant", "srgb", "uniform", "d65", "blackbody",
                                         "regular", "irregular"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
@@ -173,6 +173,25 @@ static rey_result build_checkerboard(Builder *b, rey_xml_node *node, TextureUse 
     return note_source(b, node, NULL, *out);
 }
 
+static rey_result build_attribute(Builder *b, rey_xml_node *node, const char *path, int32_t *out) {
+    float *theta;
+    char name[MAX_PATH_NAME];
+    double one = 1;
+    int32_t scale;
+    TextureUse use = {REY_COLOUR_UNBOUNDED, true, -INFINITY, INFINITY, "", "factor on the mesh's values", 0, NULL};
+    build_join(name, path, "scale");
+    TRY(build_slot(b, node, "scale", use, &one, 1, name, &scale));
+    if (ARRAY_AT(b->scene->build.textures, TextureNode, scale).kind != TEXTURE_CONSTANT) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'scale' of a mesh_attribute must be a number");
+    }
+    TRY(add_texture(b, TEXTURE_ATTRIBUTE, 0, out, &theta));
+    TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+    t->child[0] = scale;
+    t->channels = 3;
+    TRY(build_attribute_texture(b, node, *out));
+    return note_source(b, node, NULL, *out);
+}
+
 // Spectra written as objects become constants.
 static rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
     double rgb[3] = {1, 1, 1};
@@ -220,6 +239,8 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
         TRY(build_bitmap(b, node, use, path, out));
     } else if (strcmp(node->type, "checkerboard") == 0) {
         TRY(build_checkerboard(b, node, use, path, out));
+    } else if (strcmp(node->type, "mesh_attribute") == 0) {
+        TRY(build_attribute(b, node, path, out));
     } else {
         TRY(build_spectrum(b, node, use, path, out));
     }

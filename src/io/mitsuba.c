@@ -90,7 +90,7 @@ static bool is_known_plugin(const char *type) {
         "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
         "sunsky", "timed_sunsky", "cylinder", "shapegroup", "instance", "bsplinecurve", "linearcurve", "sdfgrid", "merge",
         "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
-        "batch", "mesh_attribute", "volume", "blackbody", "regular", "irregular", "ptracer", "aov", "depth", "volpath",
+        "batch", "volume", "blackbody", "regular", "irregular", "ptracer", "aov", "depth", "volpath",
         "volpathmis", "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
         "heterogeneous", "gridvolume", "constvolume"};
     for (int i = 0; i < COUNT_OF(known); i++) {
@@ -165,6 +165,7 @@ static rey_result build_scene(Builder *b) {
         TRY(build_child(b, &root->children[i], counts));
     }
     TRY(rey_xml_check_unused(b->ctx, root, NULL, NULL));
+    TRY(build_attribute_tables(b));
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);
@@ -176,6 +177,7 @@ static void source_free(void *document) {
     rey_xml_free(source->ctx, source->document);
     rey_array_free(source->ctx, &source->textures);
     rey_array_free(source->ctx, &source->shapes);
+    rey_array_free(source->ctx, &source->attributes);
     rey_free(source->ctx, source);
 }
 
@@ -199,6 +201,7 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         rey_free(ctx, ARRAY_AT(b.prefixes, Prefix, i).path);
     }
     rey_array_free(ctx, &b.prefixes);
+    rey_array_free(ctx, &b.attribute_uses);
     if (result != REY_OK) {
         rey_scene_destroy(b.scene);
         return result;

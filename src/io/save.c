@@ -111,7 +111,7 @@ static void write_constants(Writer *w, int depth, const rey_xml_node *node) {
 // Properties that constants, poses or data files stand for now.
 static bool is_replaced(const Writer *w, const rey_xml_node *node, const char *name) {
     static const char *const anywhere[] = {"to_world", "material", "ext_ior", "filename", "raw", "to_uv", "position",
-                                           "center", "radius", "shape_index", "flip_tex_coords", "fov", "fov_axis",
+                                           "center", "radius", "shape_index", "flip_tex_coords", "face_normals", "fov", "fov_axis",
                                            "focal_length", "principal_point_offset_x", "principal_point_offset_y",
                                            "alpha", "alpha_u", "alpha_v"};
     for (int i = 0; i < COUNT_OF(anywhere); i++) {
@@ -171,6 +171,25 @@ static rey_result write_picture(Writer *w, int depth, int32_t texture, const cha
     return rey_exr_write(w->ctx, path, theta(w, t->theta), t->width, t->height, t->channels, NULL);
 }
 
+// The attributes of a shape's mesh; their values stay where they are.
+static rey_result write_attributes(Writer *w, int32_t shape, rey_mesh *mesh) {
+    const Array *all = &w->source->attributes;
+    mesh->attributes = rey_alloc_array(w->ctx, all->count + 1, sizeof *mesh->attributes);
+    if (!mesh->attributes) {
+        return REY_ERROR_MEMORY;
+    }
+    for (size_t i = 0; i < all->count; i++) {
+        const MeshAttribute *a = &ARRAY_AT(*all, MeshAttribute, i);
+        if (a->shape == shape) {
+            rey_mesh_attribute *to = &mesh->attributes[mesh->attribute_count++];
+            *to = (rey_mesh_attribute){.per_face = a->per_face, .channels = a->channels,
+                                       .data = w->scene->view.theta + a->theta};
+            memcpy(to->name, a->name, sizeof to->name);
+        }
+    }
+    return REY_OK;
+}
+
 // A mesh's own vertices, which are in the world already. Flat shading is said in the XML.
 static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     const SceneView *view = &w->scene->view;
@@ -185,7 +204,12 @@ static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     mesh.normals = shape->normals >= 0 ? view->theta + shape->normals : NULL;
     mesh.uvs = shape->uvs >= 0 ? view->theta + shape->uvs : NULL;
     mesh.faces = (uint32_t *)view->triangles + 3 * (size_t)shape->triangle;
-    return rey_mesh_write_ply(w->ctx, path, &mesh);
+    rey_result result = write_attributes(w, (int32_t)(shape - view->shapes), &mesh);
+    if (result == REY_OK) {
+        result = rey_mesh_write_ply(w->ctx, path, &mesh);
+    }
+    rey_free(w->ctx, mesh.attributes);
+    return result;
 }
 
 // ---- nodes -------------------------------------------------------------------------------------------------------

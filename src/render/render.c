@@ -29,7 +29,7 @@ typedef struct Render {
     double *gradients;     // reverse: one per shard
     int64_t gradient_size;
     double *columns, *rows;
-    int32_t *offsets;      // texture_at, to_uv_at, normals_at
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at
     float *adjoint;
     rey_stats stats;
     double done, total;    // progress
@@ -262,24 +262,26 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
     return REY_OK;
 }
 
-// Where the values of each texture, to_uv and shape's normals begin in the compact vectors of the selection.
+// Where the values of each texture, to_uv, shape's normals and mesh attribute begin in the compact vectors of the selection.
 static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
     int64_t textures = view->textures_count, shapes = view->shapes_count;
     enum { PAD = 16 };
-    int64_t n = 2 * textures + shapes + PAD;
+    int64_t n = 2 * textures + shapes + view->attributes_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
     }
     memset(r->offsets, 0xff, (size_t)n * sizeof *r->offsets);
     int32_t *texture_at = r->offsets, *to_uv_at = r->offsets + textures, *normals_at = r->offsets + 2 * textures;
+    int32_t *attribute_at = normals_at + shapes;
     int64_t at = 0;
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
         int32_t *slot = p->texture >= 0   ? &texture_at[p->texture]
                         : p->to_uv >= 0   ? &to_uv_at[p->to_uv]
                         : p->normals >= 0 ? &normals_at[p->normals]
+                        : p->attribute >= 0 ? &attribute_at[p->attribute]
                                           : NULL;
         if (slot && *slot >= 0) {
             return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "%s is selected twice", p->name);
@@ -288,6 +290,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
             *slot = (int32_t)at;
         }
         r->job.any_normals |= p->normals >= 0;
+        r->job.any_attributes |= p->attribute >= 0;
         at += p->count;
         if (at > INT32_MAX / 2) {
             return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
@@ -297,6 +300,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.texture_at = texture_at;
     r->job.to_uv_at = to_uv_at;
     r->job.normals_at = normals_at;
+    r->job.attribute_at = attribute_at;
     return REY_OK;
 }
 

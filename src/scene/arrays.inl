@@ -5,6 +5,7 @@ ARRAY(BsdfNode, bsdfs, "scattering functions; adapters refer to their children b
 ARRAY(ShapeRecord, shapes, "shapes; the index is Embree's geometry id")
 ARRAY(int32_t, triangles, "render indices, three per triangle, relative to the shape's first vertex")
 ARRAY(int32_t, welded, "per render vertex, the smallest vertex of its shape at the same position")
+ARRAY(int32_t, attributes, "per attribute name and shape: where a mesh's values begin in theta (-1 = none), numbers per item")
 ARRAY(EmitterRecord, emitters, "light sources")
 ARRAY(SensorRecord, sensors, "cameras with their films")
 ARRAY(Group, groups, "shading groups: what a batch of lanes has in common")

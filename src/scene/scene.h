@@ -7,7 +7,7 @@
 
 enum { MAX_SLOTS = 8, MAX_CONFIG = 4, MAX_CHILDREN = 2 };
 
-enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD };
+enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_ATTRIBUTE };
 enum { FILTER_NEAREST, FILTER_BILINEAR };
 enum { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
 
@@ -17,7 +17,9 @@ typedef struct TextureNode {
     int32_t width, height, channels; // channels 1 or 3
     int32_t filter, wrap;
     int32_t to_uv;    // theta offset of a row-major 3 x 3 matrix, -1 = identity
-    int32_t child[2]; // checkerboard: color0, color1
+    int32_t child[2]; // checkerboard: color0, color1; mesh_attribute: scale, -1
+    int32_t attribute; // mesh_attribute: its first entry in `attributes`
+    int32_t per_face;
 } TextureNode;
 
 typedef struct BsdfNode {
@@ -55,6 +57,7 @@ typedef struct EmitterRecord {
     int32_t position;      // point: theta offset of 3 numbers
     int32_t to_world;      // envmap: theta offset of 4 x 4
     int32_t table;         // envmap: inverse rotation (9), then the distribution
+    int32_t attributes;    // area: 1 = its texture reads mesh attributes, so samples say where by barycentrics
     float weight;          // sampling weight, normalised: the probability of being chosen
 } EmitterRecord;
 
@@ -109,11 +112,12 @@ typedef struct Param {
     int32_t texture;          // texture that these are the values of, -1 = none
     int32_t to_uv;            // texture that these are the to_uv of, -1 = none
     int32_t normals;          // shape that these are the vertex normals of, -1 = none
+    int32_t attribute;        // entry of `attributes` that these are the values of, -1 = none
     int32_t geometry;         // shape whose geometry follows, -1 = none
     int32_t emitter;          // emitter whose pose this is, -1 = none
     uint32_t version;         // counts changes
 } Param;
-#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .geometry = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
+#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
 
 typedef struct Alias {
     char *name;

@@ -12,7 +12,8 @@ typedef struct Sink {
     const int32_t *texture_at; // per texture
     const int32_t *to_uv_at;   // per texture: its to_uv
     const int32_t *normals_at; // per shape: its vertex normals
-    bool any_normals;
+    const int32_t *attribute_at; // like view.attributes: every second entry
+    bool any_normals, any_attributes;
     Float derivative;          // forward: accumulates
 } Sink;
 

@@ -3,15 +3,7 @@
 // NOT differentiated: jumps of nearest-neighbour texels, checker edges and clamped borders under a moving uv.
 #pragma once
 
-#include "scene/sink.h"
-
-KFN Float theta_at(const SceneView *scene, Int index) {
-#ifdef REAL_DOUBLE
-    return (Float)scene->theta[index];
-#else
-    return f_gather(scene->theta, index);
-#endif
-}
+#include "scene/attribute.h"
 
 KFN Vec2 texture_map_uv(const SceneView *scene, const TextureNode *t, Vec2 uv) {
     if (t->to_uv < 0) {
@@ -168,7 +160,7 @@ KFN Spec luminance_adj(Float d) {
     return s;
 }
 
-static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, Vec2 uv) {
+static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CONSTANT) {
         const float *v = scene->theta + t->theta;
@@ -179,23 +171,26 @@ static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, Ve
         return s;
     }
     if (t->kind == TEXTURE_BITMAP) {
-        return bitmap_eval(scene, t, uv);
+        return bitmap_eval(scene, t, (Vec2){uv.x, uv.y});
     }
-    return spec_select(checkerboard_first(scene, t, uv), texture_eval_general(scene, t->child[0], uv),
+    if (t->kind == TEXTURE_ATTRIBUTE) {
+        return attribute_eval(scene, t, uv.hit);
+    }
+    return spec_select(checkerboard_first(scene, t, (Vec2){uv.x, uv.y}), texture_eval_general(scene, t->child[0], uv),
                        texture_eval_general(scene, t->child[1], uv));
 }
 
-static NOINLINE Float texture_eval_real_general(const SceneView *scene, int32_t id, Vec2 uv) {
+static NOINLINE Float texture_eval_real_general(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CHECKERBOARD) {
-        return f_select(checkerboard_first(scene, t, uv), texture_eval_real_general(scene, t->child[1], uv),
+        return f_select(checkerboard_first(scene, t, (Vec2){uv.x, uv.y}), texture_eval_real_general(scene, t->child[1], uv),
                         texture_eval_real_general(scene, t->child[0], uv));
     }
     Spec s = texture_eval_general(scene, id, uv);
     return t->channels == 1 ? s.c[0] : luminance(s);
 }
 
-KFN Spec texture_eval(const SceneView *scene, int32_t id, Vec2 uv) {
+KFN Spec texture_eval(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CONSTANT && t->channels == SPEC_N) {
         Spec s;
@@ -208,7 +203,7 @@ KFN Spec texture_eval(const SceneView *scene, int32_t id, Vec2 uv) {
 }
 
 // The texture as a number: the luminance of a colour.
-KFN Float texture_eval_real(const SceneView *scene, int32_t id, Vec2 uv) {
+KFN Float texture_eval_real(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CONSTANT && t->channels == 1) {
         return f_set(scene->theta[t->theta]);
@@ -219,11 +214,12 @@ KFN Float texture_eval_real(const SceneView *scene, int32_t id, Vec2 uv) {
 // Does the derivative of this texture, or of one inside it, leave through the sink?
 KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
     const TextureNode *t = scene->textures + id;
-    return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD;
+    return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD ||
+           t->kind == TEXTURE_ATTRIBUTE;
 }
 
 // Accumulates the adjoint d of texture_eval into the sink and into duv (may be null).
-static NOINLINE void texture_adj(const SceneView *scene, int32_t id, Vec2 uv, Spec d, Vec2 *duv, Sink *sink, Mask m) {
+static NOINLINE void texture_adj(const SceneView *scene, int32_t id, TexCoord uv, Spec d, Vec2 *duv, Sink *sink, Mask m) {
     const TextureNode *t = scene->textures + id;
     int32_t at = sink->texture_at[id];
     if (t->kind == TEXTURE_CONSTANT) {
@@ -235,19 +231,21 @@ static NOINLINE void texture_adj(const SceneView *scene, int32_t id, Vec2 uv, Sp
             }
         }
     } else if (t->kind == TEXTURE_BITMAP) {
-        bitmap_adj(scene, id, uv, d, duv, sink, m);
+        bitmap_adj(scene, id, (Vec2){uv.x, uv.y}, d, duv, sink, m);
+    } else if (t->kind == TEXTURE_ATTRIBUTE) {
+        attribute_adj(scene, id, uv.hit, d, sink, m);
     } else {
-        Mask first = checkerboard_first(scene, t, uv);
+        Mask first = checkerboard_first(scene, t, (Vec2){uv.x, uv.y});
         texture_adj(scene, t->child[0], uv, d, duv, sink, m & first);
         texture_adj(scene, t->child[1], uv, d, duv, sink, m & ~first);
     }
 }
 
-static NOINLINE void texture_adj_real(const SceneView *scene, int32_t id, Vec2 uv, Float d, Vec2 *duv, Sink *sink,
+static NOINLINE void texture_adj_real(const SceneView *scene, int32_t id, TexCoord uv, Float d, Vec2 *duv, Sink *sink,
                                       Mask m) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CHECKERBOARD) {
-        Mask first = checkerboard_first(scene, t, uv);
+        Mask first = checkerboard_first(scene, t, (Vec2){uv.x, uv.y});
         texture_adj_real(scene, t->child[1], uv, d, duv, sink, m & first);
         texture_adj_real(scene, t->child[0], uv, d, duv, sink, m & ~first);
     } else if (t->channels == 1) {

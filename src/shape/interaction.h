@@ -5,13 +5,6 @@
 
 #include "scene/texture.h"
 
-typedef struct Hit {
-    Int shape;   // Embree geometry id, -1 = none
-    Int prim;    // triangle within the shape
-    Float u, v;  // barycentrics of the second and third vertex; analytic shapes: unused
-    Vec3 p;      // analytic shapes: the point on the ray
-} Hit;
-
 typedef struct Interaction {
     Vec3 p;     // world position
     Vec3 ng;    // geometric normal, unit
@@ -19,10 +12,6 @@ typedef struct Interaction {
     Vec2 uv;
     Vec3 dp_du; // unnormalised tangent that the frame is built on
 } Interaction;
-
-#define SHAPE_FIELD(scene, id, field)                                                                                  \
-    i_gather((const int32_t *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                             \
-                                                   (int32_t)(offsetof(ShapeRecord, field) / 4))
 
 KFN Vec3 theta_v3(const SceneView *scene, Int at) {
     return v3(theta_at(scene, at), theta_at(scene, at + 1), theta_at(scene, at + 2));
@@ -38,20 +27,6 @@ KFN Float table_at(const SceneView *scene, Int index) {
 
 KFN Vec3 table_v3(const SceneView *scene, Int at) {
     return v3(table_at(scene, at), table_at(scene, at + 1), table_at(scene, at + 2));
-}
-
-// The three vertex numbers of a triangle, relative to the shape.
-typedef struct Corners {
-    Int i[3];
-} Corners;
-
-KFN Corners mesh_corners(const SceneView *scene, Int shape, Int prim) {
-    Int at = (SHAPE_FIELD(scene, shape, triangle) + prim) * 3;
-    Corners c;
-    for (int k = 0; k < 3; k++) {
-        c.i[k] = i_gather(scene->triangles, at + k);
-    }
-    return c;
 }
 
 // Frame with normal n and s along dp_du [Gram-Schmidt].

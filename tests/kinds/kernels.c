@@ -130,7 +130,7 @@ static void run_eval(const KindCase *c, int n, const Query *q, double (*f)[3], d
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
         Int lobe = gather_lobe(q, first, n);
-        BsdfCall call = {&view.scene, c->root, uv, (real)c->floor};
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
         Spec value = bsdf_eval(&call, wi, wo, lobe);
         Float density = pdf ? bsdf_pdf(&call, wi, wo, lobe) : f_set(0);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
@@ -155,7 +155,7 @@ static void run_sample(const KindCase *c, int n, Draw *d) {
         GATHER(u1, d[AT(lane)].u1);
         GATHER(u2.x, d[AT(lane)].u2[0]);
         GATHER(u2.y, d[AT(lane)].u2[1]);
-        BsdfCall call = {&view.scene, c->root, uv, (real)c->floor};
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
         BsdfSample s = bsdf_sample(&call, wi, u1, u2);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             Draw *to = d + first + lane;
@@ -185,7 +185,7 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
         GATHER3(wo, q[AT(lane)].wo);
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
-        BsdfCall call = {&view.scene, c->root, uv, (real)c->floor};
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
         Mask m = m_first_n(n - first);
         sink.derivative = f_set(0);
         bsdf_adj(&call, wi, wo, gather_lobe(q, first, n), spec_zero_unless(m, gather_df(a, first, n)), &sink, m, &dwi,
@@ -208,8 +208,8 @@ static void run_texture(const KindCase *c, int id, int n, const double (*at)[2],
         Vec2 uv;
         GATHER(uv.x, at[AT(lane)][0]);
         GATHER(uv.y, at[AT(lane)][1]);
-        Spec s = texture_eval(&view.scene, id, uv);
-        Float x = texture_eval_real(&view.scene, id, uv);
+        Spec s = texture_eval(&view.scene, id, texcoord(uv, NULL));
+        Float x = texture_eval_real(&view.scene, id, texcoord(uv, NULL));
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             put_spec(f[first + lane], s, lane);
             number[first + lane] = (double)f_lane(x, lane);
@@ -305,7 +305,7 @@ static void run_light_pdf(const KindCase *c, int n, LightDraw *draws) {
         Vec3 ref, d;
         GATHER3(ref, draws[AT(lane)].ref);
         GATHER3(d, draws[AT(lane)].d);
-        LightSample s = {d, f_set(1), f_set(INV_FOUR_PI), {f_set(0), f_set(0)}, m_set(true)};
+        LightSample s = {d, f_set(1), f_set(INV_FOUR_PI), {f_set(0), f_set(0)}, i_set(0), m_set(true)};
         if (e->kind == EMITTER_ENVMAP) {
             s.uv = envmap_uv(&view.scene, e, d);
             s.pdf = envmap_pdf(&view.scene, e, s.uv);
@@ -334,7 +334,7 @@ static void run_light_eval(const KindCase *c, int n, LightDraw *d) {
         GATHER(uv.x, d[AT(lane)].uv[0]);
         GATHER(uv.y, d[AT(lane)].uv[1]);
         GATHER(distance, d[AT(lane)].distance);
-        Spec l = emitter_eval(&view.scene, &view.emitter, uv, distance);
+        Spec l = emitter_eval(&view.scene, &view.emitter, texcoord(uv, NULL), distance);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             put_spec(d[first + lane].radiance, l, lane);
         }
@@ -354,7 +354,8 @@ static void run_light_adj(const KindCase *c, int n, const LightDraw *d, Adjoint 
         GATHER(distance, d[AT(lane)].distance);
         Mask m = m_first_n(n - first);
         sink.derivative = f_set(0);
-        emitter_adj(&view.scene, &view.emitter, uv, distance, spec_zero_unless(m, gather_df(a, first, n)), &sink, m);
+        emitter_adj(&view.scene, &view.emitter, texcoord(uv, NULL), distance,
+                    spec_zero_unless(m, gather_df(a, first, n)), &sink, m);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             a[first + lane].forward = (double)f_lane(sink.derivative, lane);
         }

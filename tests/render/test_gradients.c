@@ -219,8 +219,7 @@ static bool has_interior(const Room room, int param) {
 }
 
 static void test_differences(void **state) {
-    UNUSED(state);
-    Room room = room_open("materials.xml", 2, 0);
+    Room room = room_open(*state, 2, 0);
     Score score = {0};
     for (int i = 0; i < rey_param_count(room.scene); i++) {
         if (has_interior(room, i)) {
@@ -246,8 +245,7 @@ static int all_interior(Room room, int *params) {
 }
 
 static void test_reverse_is_forward(void **state) {
-    UNUSED(state);
-    Room room = room_open("materials.xml", 2, 0);
+    Room room = room_open(*state, 2, 0);
     int params[256], count = all_interior(room, params);
     rey_selection selection = {params, count};
     int64_t size = rey_selection_size(room.scene, selection);
@@ -288,6 +286,26 @@ static void test_reverse_is_forward(void **state) {
     room_close(room);
 }
 
+// A scene that is written and read again renders the same bits.
+static void test_saved_renders_the_same(void **state) {
+    static float image[2][NUMBERS];
+    char path[64], data[80], command[200];
+    snprintf(path, sizeof path, "/tmp/reynolds_saved_%ld.xml", (long)getpid());
+    snprintf(data, sizeof data, "/tmp/reynolds_saved_%ld_data", (long)getpid());
+    Room room = room_open(*state, 2, 0), again = {0};
+    rey_render_def def = def_make(SPP, 4, 1);
+    ok(room, rey_render(room.scene, &def, image[0], NULL));
+    ok(room, rey_scene_save(room.scene, path));
+    assert_int_equal(rey_context_create(NULL, &again.ctx), REY_OK);
+    ok(again, rey_scene_load(again.ctx, path, NULL, 0, &again.scene));
+    ok(again, rey_render(again.scene, &def, image[1], NULL));
+    room_close(again);
+    room_close(room);
+    snprintf(command, sizeof command, "rm -r '%s' '%s'", path, data);
+    assert_int_equal(system(command), 0);
+    assert_memory_equal(image[0], image[1], sizeof image[0]);
+}
+
 // The index of smooth glass turns rays, which no interior term covers.
 static void test_incomplete_is_refused(void **state) {
     UNUSED(state);
@@ -306,11 +324,10 @@ static void test_incomplete_is_refused(void **state) {
 }
 
 static void test_threads_change_nothing(void **state) {
-    UNUSED(state);
     static float image[3][NUMBERS];
     static double gradient[3][4096];
     for (int k = 0; k < 3; k++) {
-        Room room = room_open("materials.xml", k + 1, 0);
+        Room room = room_open(*state, k + 1, 0);
         int params[256], count = all_interior(room, params);
         rey_selection selection = {params, count};
         assert_true(rey_selection_size(room.scene, selection) <= 4096);
@@ -324,7 +341,6 @@ static void test_threads_change_nothing(void **state) {
 }
 
 static void test_widths(void **state) {
-    UNUSED(state);
     static float image[NUMBERS], first[NUMBERS];
     static const int lanes[] = {1, 8, 16};
     for (int k = 0; k < 3; k++) {
@@ -335,7 +351,7 @@ static void test_widths(void **state) {
             continue; // this machine does not run that width
         }
         rey_context_destroy(ctx);
-        Room room = room_open("materials.xml", 2, lanes[k]);
+        Room room = room_open(*state, 2, lanes[k]);
         rey_render_def def = def_make(SPP, 4, 1);
         ok(room, rey_render(room.scene, &def, k ? image : first, NULL));
         room_close(room);
@@ -434,12 +450,17 @@ static void test_difference_noise(void **state) {
     assert_true(fabs(square[1] * 2 * e * N - 1) < 0.2);
 }
 
+// One test per room: every material, every shape.
+#define ONE_ROOM(test, file) {#test " " file, test, NULL, NULL, (void *)(uintptr_t)(file)}
+#define EVERY_ROOM(test) ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml")
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_closed_sphere),        cmocka_unit_test(test_disc_irradiance),
         cmocka_unit_test(test_attached_variance),    cmocka_unit_test(test_difference_noise),
-        cmocka_unit_test(test_threads_change_nothing), cmocka_unit_test(test_widths),
-        cmocka_unit_test(test_incomplete_is_refused), cmocka_unit_test(test_reverse_is_forward),
-        cmocka_unit_test(test_differences)};
+        cmocka_unit_test(test_incomplete_is_refused), EVERY_ROOM(test_saved_renders_the_same),
+        EVERY_ROOM(test_threads_change_nothing),
+        EVERY_ROOM(test_widths),                     EVERY_ROOM(test_reverse_is_forward),
+        EVERY_ROOM(test_differences)};
     return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
 }
