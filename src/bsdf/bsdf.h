@@ -1,6 +1,7 @@
 // bsdf.h: dispatch over the scattering functions, generated from kinds.inl. The function is uniform over the lanes.
 #pragma once
 
+#include "bsdf/blendbsdf.h"
 #include "bsdf/call.h"
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
@@ -66,7 +67,7 @@ enum {
         PARAMS(SCATTER_FIELD) UNUSED(adjoint), UNUSED(node), UNUSED(slot), UNUSED(sink), UNUSED(m), UNUSED(duv);       \
     }
 #define BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference) DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
-#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, reference)                              \
+#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, child, reference)                       \
     DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
 #include "bsdf/kinds.inl"
 #undef BSDF_LEAF

@@ -1,6 +1,6 @@
 // kinds.inl: one row per scattering function.
 // BSDF_LEAF(ENUM, prefix, Record, "xml name", PARAMS, CONFIG, "reference")
-// BSDF_ADAPTER(ENUM, prefix, Record, "xml name", PARAMS, CONFIG, fewest children, most children, "reference")
+// BSDF_ADAPTER(ENUM, prefix, Record, "xml name", PARAMS, CONFIG, fewest children, most children, "name of its children", "reference")
 BSDF_LEAF(DIFFUSE, diffuse, Diffuse, "diffuse", DIFFUSE_PARAMS, NO_CONFIG, "lambert1760")
 BSDF_LEAF(CONDUCTOR, conductor, Conductor, "conductor", CONDUCTOR_PARAMS, NO_CONFIG, "born1999")
 BSDF_LEAF(ROUGHCONDUCTOR, roughconductor, RoughConductor, "roughconductor", ROUGHCONDUCTOR_PARAMS, MICROFACET_CONFIG, "walter2007")
@@ -10,5 +10,6 @@ BSDF_LEAF(ROUGHDIELECTRIC, roughdielectric, RoughDielectric, "roughdielectric", 
 BSDF_LEAF(PLASTIC, plastic, Plastic, "plastic", PLASTIC_PARAMS, PLASTIC_CONFIG, "")
 BSDF_LEAF(ROUGHPLASTIC, roughplastic, RoughPlastic, "roughplastic", ROUGHPLASTIC_PARAMS, ROUGHPLASTIC_CONFIG, "walter2007")
 BSDF_LEAF(NULL, null, Null, "null", NO_PARAMS, NO_CONFIG, "")
-BSDF_ADAPTER(TWOSIDED, twosided, Twosided, "twosided", NO_PARAMS, NO_CONFIG, 1, 2, "")
-BSDF_ADAPTER(MASK, mask, MaskBsdf, "mask", MASK_PARAMS, NO_CONFIG, 1, 1, "")
+BSDF_ADAPTER(TWOSIDED, twosided, Twosided, "twosided", NO_PARAMS, NO_CONFIG, 1, 2, "brdf", "")
+BSDF_ADAPTER(MASK, mask, MaskBsdf, "mask", MASK_PARAMS, NO_CONFIG, 1, 1, "nested_bsdf", "")
+BSDF_ADAPTER(BLENDBSDF, blendbsdf, BlendBsdf, "blendbsdf", BLENDBSDF_PARAMS, NO_CONFIG, 2, 2, "bsdf", "")

@@ -8,6 +8,15 @@
 // densities discrete probabilities.
 enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL };
 
+// Reflections and refractions of the two functions of a blend may go different ways. Their lobes carry, above the two
+// bits of the list above, one bit per blend on the way to the function that they belong to, the outermost blend lowest.
+KFN Mask lobe_is_shared(Int lobe) { return mi_eq(lobe, i_set(LOBE_SMOOTH)) | mi_eq(lobe & 3, i_set(LOBE_NULL)); }
+KFN Int lobe_from_child(Int lobe, int child) {
+    return i_select(lobe_is_shared(lobe), lobe, (lobe & 3) | ((lobe >> 2) * 2 + child) * 4);
+}
+KFN Int lobe_to_child(Int lobe) { return (lobe & 3) | (lobe >> 3) * 4; }
+KFN Mask lobe_in_child(Int lobe, int child) { return lobe_is_shared(lobe) | mi_eq(lobe >> 2 & 1, i_set(child)); }
+
 typedef struct BsdfSample {
     Vec3 wo;
     Int lobe;

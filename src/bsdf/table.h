@@ -11,6 +11,7 @@ typedef struct BsdfKind {
     const ConfigDesc *configs;
     int config_count;
     int fewest_children, most_children;
+    const char *child; // name of the children in parameter paths; numbered when there can be several
     bool adapter;
     const char *reference;
 } BsdfKind;

@@ -1,11 +1,32 @@
 // build_bsdf.c: scattering functions, driven by the table of their kinds.
 #include "io/build.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const char *bsdf_word(void *user, int i) {
     UNUSED(user);
     return i < rey_bsdf_kind_count ? rey_bsdf_kinds[i].name : NULL;
+}
+
+// Functions of the format that are left out on purpose.
+static rey_result refuse(Builder *b, const rey_xml_node *node) {
+    static const struct {
+        const char *name, *why;
+    } refused[] = {{"polarizer", "light has no polarisation here"},
+                   {"retarder", "light has no polarisation here"},
+                   {"circular", "light has no polarisation here"},
+                   {"pplastic", "light has no polarisation here; 'roughplastic' is its unpolarised form"},
+                   {"measured_polarized", "light has no polarisation here"},
+                   {"measured", "measured reflectance data is not read; 'principled' can be fitted to it"},
+                   {"hair", "there is no scattering of hair; 'roughdielectric' is the nearest kind"}};
+    for (int i = 0; i < COUNT_OF(refused); i++) {
+        if (strcmp(node->type, refused[i].name) == 0) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "bsdf '%s' is not supported: %s", node->type,
+                                refused[i].why);
+        }
+    }
+    return build_unknown(b, node, bsdf_word, NULL);
 }
 
 static TextureUse slot_use(const ParamDesc *p) {
@@ -92,6 +113,7 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
             TRY(alpha_slot(b, node, p, path, i ? bsdf->slot[i - 1] : -1, &bsdf->slot[i]));
             break;
         default:
+            TRY(strcmp(p->option, "required") == 0 ? rey_xml_require(b->ctx, node, p->name) : REY_OK);
             TRY(build_slot(b, node, p->name, slot_use(p), &value, 1, name, &bsdf->slot[i]));
         }
     }
@@ -124,7 +146,7 @@ static rey_result build_config(Builder *b, rey_xml_node *node, const ConfigDesc 
     return REY_OK;
 }
 
-// Children in document order: brdf_0 and brdf_1 of twosided, nested_bsdf where there can be only one.
+// Children in document order, numbered in their names where there can be several.
 static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind *kind, const char *path, BsdfNode *bsdf) {
     int count = rey_xml_count_children(node, REY_XML_BIT(REY_XML_BSDF));
     if (count < kind->fewest_children || count > kind->most_children) {
@@ -132,8 +154,10 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
                             kind->fewest_children, kind->most_children > kind->fewest_children ? " or 2" : "", count);
     }
     for (int i = 0; i < count; i++) {
-        char name[MAX_PATH_NAME];
-        build_join(name, path, kind->most_children == 1 ? "nested_bsdf" : i ? "brdf_1" : "brdf_0");
+        char name[MAX_PATH_NAME], child[32], number[16];
+        snprintf(number, sizeof number, "_%d", i);
+        snprintf(child, sizeof child, "%s%s", kind->child, kind->most_children > 1 ? number : "");
+        build_join(name, path, child);
         TRY(build_bsdf(b, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), i)->node, name, &bsdf->child[i]));
     }
     return REY_OK;
@@ -186,7 +210,7 @@ rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t 
     }
     int index = rey_bsdf_kind_find(node->type);
     if (index < 0) {
-        return build_unknown(b, node, bsdf_word, NULL);
+        return refuse(b, node);
     }
     const BsdfKind *kind = &rey_bsdf_kinds[index];
     BsdfNode bsdf = empty_bsdf();

@@ -26,7 +26,7 @@ typedef struct ParamDesc {
     float value;       // default
     float low, high;   // allowed range
     const char *text;  // description
-    const char *option; // type-specific: the default name of an interior index of refraction
+    const char *option; // of an index: its default material; of others: "required" where there is no default
 } ParamDesc;
 
 typedef struct ConfigDesc {

@@ -143,13 +143,18 @@ static int add_bsdf(KindCase *c, Random *r, int kind, int variant, bool textured
 
 void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
     static const char *const nested[] = {"diffuse", "roughconductor", "roughdielectric"};
+    static const char *const deltas[] = {"conductor", "dielectric", "thindielectric", "plastic"};
     const BsdfKind *k = rey_bsdf_kinds + kind;
     *c = (KindCase){.coat_eta = -1, .coat_alpha = -1};
     c->root = add_bsdf(c, r, kind, variant, textured, true);
-    // Functions with two children scatter on one side only.
+    bool sides = k->most_children > k->fewest_children; // one function per side: each scatters on one side only
     int children = k->fewest_children + below(r, k->most_children - k->fewest_children + 1);
     for (int i = 0; i < children; i++) {
-        const char *name = nested[below(r, k->most_children == 2 ? 2 : 3)];
+        // Two rough refractions of different indices have no common index, which tests of reciprocity ask for.
+        const char *name = nested[below(r, sides || i > 0 ? 2 : 3)];
+        if (!sides && uniform(r) < 0.4) {
+            name = deltas[below(r, COUNT_OF(deltas))];
+        }
         int child = add_bsdf(c, r, rey_bsdf_kind_find(name), below(r, 4), textured, false);
         c->bsdfs[c->root].child[i] = child;
     }
@@ -306,6 +311,14 @@ void case_print(const KindCase *c, const Query *q) {
     const BsdfNode *node = c->bsdfs + c->root;
     const BsdfKind *k = rey_bsdf_kinds + node->kind;
     print_error("%s", c->bsdf_count ? k->name : "light");
+    for (int i = 0; i < MAX_CHILDREN && c->bsdf_count && node->child[i] >= 0; i++) {
+        const BsdfNode *child = c->bsdfs + node->child[i];
+        print_error(" %s", rey_bsdf_kinds[child->kind].name);
+        for (int j = 0; j < rey_bsdf_kinds[child->kind].param_count; j++) {
+            const TextureNode *t = c->textures + child->slot[j];
+            print_error(" %s=[%d]%g", rey_bsdf_kinds[child->kind].params[j].name, (int)t->kind, c->theta[t->theta]);
+        }
+    }
     for (int i = 0; c->bsdf_count && i < k->config_count; i++) {
         print_error(" %s=%d", k->configs[i].name, (int)node->config[i]);
     }

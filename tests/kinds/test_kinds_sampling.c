@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-enum { CASES_PER_VARIANT = 5, SAMPLES = 20000 };
+enum { CASES_PER_VARIANT = 5, SAMPLES = 20000, DELTAS = 7 }; // lobes 1 to 7: deltas, those of a blend among them
 
 static const KindKernels *const exact = &kind_kernels_double;
 
@@ -75,7 +75,7 @@ static int collect(const Fixed *x, const Samples *s, int side, double *p, int *c
 
 // Delta lobes: their probabilities from any sample of each.
 static int collect_deltas(const Samples *s, double *p, int *counts) {
-    for (int lobe = 1; lobe <= 3; lobe++) {
+    for (int lobe = 1; lobe <= DELTAS; lobe++) {
         p[lobe - 1] = counts[lobe - 1] = 0;
         for (int i = 0; i < SAMPLES; i++) {
             if (s->draw[i].lobe == lobe && s->pdf[i] > 0) {
@@ -84,12 +84,12 @@ static int collect_deltas(const Samples *s, double *p, int *counts) {
             }
         }
     }
-    return 3;
+    return DELTAS;
 }
 
 static double check_distribution(const Fixed *x, const Samples *s) {
-    double p[2 * CELLS + 3];
-    int counts[2 * CELLS + 3], n = 0;
+    double p[2 * CELLS + DELTAS];
+    int counts[2 * CELLS + DELTAS], n = 0;
     n += collect(x, s, 1, p + n, counts + n);
     n += collect(x, s, -1, p + n, counts + n);
     n += collect_deltas(s, p + n, counts + n);
