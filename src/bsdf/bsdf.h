@@ -9,6 +9,7 @@
 #include "bsdf/mask.h"
 #include "bsdf/null.h"
 #include "bsdf/plastic.h"
+#include "bsdf/principled_adj.h"
 #include "bsdf/roughconductor.h"
 #include "bsdf/roughdielectric.h"
 #include "bsdf/roughplastic.h"
@@ -30,6 +31,8 @@ enum {
 #define FETCH_REAL texture_eval_real
 #define FETCH_IOR texture_eval_real
 #define FETCH_SMOOTH_IOR texture_eval_real
+#define FETCH_SPECULAR texture_eval_real
+#define FETCH_RATE texture_eval_real
 #define FETCH_METAL_ETA texture_eval
 #define FETCH_METAL_K texture_eval
 #define FETCH_ALPHA_U texture_eval_real
@@ -38,6 +41,8 @@ enum {
 #define SCATTER_REAL texture_adj_real
 #define SCATTER_IOR texture_adj_real
 #define SCATTER_SMOOTH_IOR texture_adj_real
+#define SCATTER_SPECULAR texture_adj_real
+#define SCATTER_RATE texture_adj_real
 #define SCATTER_METAL_ETA texture_adj
 #define SCATTER_METAL_K texture_adj
 #define SCATTER_ALPHA_U texture_adj_real

@@ -27,6 +27,8 @@ typedef struct BsdfSample {
 #define FIELD_REAL Float
 #define FIELD_IOR Float
 #define FIELD_SMOOTH_IOR Float
+#define FIELD_SPECULAR Float
+#define FIELD_RATE Float
 #define FIELD_METAL_ETA Spec
 #define FIELD_METAL_K Spec
 #define FIELD_ALPHA_U Float

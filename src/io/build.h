@@ -90,6 +90,8 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
 // A texture that reads a mesh's attribute; and, once all shapes and textures are known, who finds what where.
 rey_result build_attribute_texture(Builder *b, rey_xml_node *node, int32_t texture);
 rey_result build_attribute_tables(Builder *b);
+// A constant number that is no parameter.
+rey_result build_number(Builder *b, float value, int32_t *out);
 // A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.
 rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param param, int32_t *out);
 

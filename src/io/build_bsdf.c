@@ -71,6 +71,35 @@ static rey_result metal_slot(Builder *b, rey_xml_node *node, const ParamDesc *p,
     return build_slot(b, node, p->name, slot_use(p), p->type == PARAM_METAL_ETA ? eta : k, 3, path, out);
 }
 
+// `specular`, or `eta` in its place.
+static rey_result specular_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t *out) {
+    double value = (double)p->value;
+    char name[MAX_PATH_NAME];
+    TextureUse use = slot_use(p);
+    bool eta = rey_xml_has(node, "eta");
+    if (eta && rey_xml_has(node, p->name)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'eta' or '%s' may be given, not both", p->name);
+    }
+    if (eta) {
+        use.low = 1e-3f;
+        use.high = INFINITY;
+        use.text = "relative index of refraction, interior over exterior";
+    }
+    build_join(name, path, eta ? "eta" : p->name);
+    return build_slot(b, node, eta ? "eta" : p->name, use, &value, 1, name, out);
+}
+
+// A number that steers sampling: a constant, but no parameter, as no picture depends on it.
+static rey_result rate_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, int32_t *out) {
+    double value;
+    TRY(rey_xml_get_float(b->ctx, node, p->name, (double)p->value, &value));
+    if (!(value >= (double)p->low && value <= 1e6)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "%s is %g, expected a number in [%g, 1e6]", p->name, value,
+                            (double)p->low);
+    }
+    return build_number(b, (float)value, out);
+}
+
 // alpha_u or alpha_v; a single alpha serves both.
 static rey_result alpha_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t first,
                              int32_t *out) {
@@ -104,6 +133,12 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
         case PARAM_SMOOTH_IOR:
             TRY(ior_slot(b, node, p, name, &bsdf->slot[i]));
             break;
+        case PARAM_SPECULAR:
+            TRY(specular_slot(b, node, p, path, &bsdf->slot[i]));
+            break;
+        case PARAM_RATE:
+            TRY(rate_slot(b, node, p, &bsdf->slot[i]));
+            break;
         case PARAM_METAL_ETA:
         case PARAM_METAL_K:
             TRY(metal_slot(b, node, p, name, &bsdf->slot[i]));
@@ -120,11 +155,22 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
     return REY_OK;
 }
 
+// Is the property or texture there, and not the number 0?
+static bool is_given(const rey_xml_node *node, const char *name) {
+    const rey_xml_property *p = rey_xml_find(node, name);
+    bool zero = p && (p->kind == REY_XML_FLOAT_VALUE || p->kind == REY_XML_INTEGER_VALUE) && p->number == 0;
+    return rey_xml_has(node, name) && !zero;
+}
+
 // Position of the property's word in "a|b|c"; booleans are "false|true".
 static rey_result build_config(Builder *b, rey_xml_node *node, const ConfigDesc *c, int32_t *out) {
     char words[128];
     const char *list[8];
     int count = 0, choice = c->value;
+    if (strncmp(c->choices, "given ", 6) == 0) {
+        *out = is_given(node, c->choices + 6);
+        return REY_OK;
+    }
     if (strcmp(c->choices, "false|true") == 0) {
         bool on;
         TRY(rey_xml_get_bool(b->ctx, node, c->name, c->value != 0, &on));

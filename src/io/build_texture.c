@@ -60,6 +60,13 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
     return note_source(b, node, property, *out);
 }
 
+rey_result build_number(Builder *b, float value, int32_t *out) {
+    float *theta;
+    TRY(add_texture(b, TEXTURE_CONSTANT, 1, out, &theta));
+    theta[0] = value;
+    return REY_OK;
+}
+
 static const char *texture_word(void *user, int i) {
     static const char *const words[] = {"bitmap", "checkerboard", "mesh_attribute", "rawconstant", "srgb", "uniform", "d65", "blackbody",
                                         "regular", "irregular"};

@@ -14,6 +14,8 @@ typedef enum ParamType {
     PARAM_REAL,      // number texture
     PARAM_IOR,       // number: int_ior / ext_ior, or the ratio
     PARAM_SMOOTH_IOR, // the same; it turns directions of delta lobes, so its derivative needs the specular term
+    PARAM_SPECULAR,  // number texture: the reflectance at normal incidence over 0.08, or `eta`
+    PARAM_RATE,      // number: steers sampling only, no parameter
     PARAM_METAL_ETA, // colour: eta, or from `material`
     PARAM_METAL_K,   // colour: k, or from `material`
     PARAM_ALPHA_U,   // number: alpha or alpha_u
@@ -32,6 +34,6 @@ typedef struct ParamDesc {
 typedef struct ConfigDesc {
     const char *name;
     int value;           // default
-    const char *choices; // "false|true" or "beckmann|ggx": the value is the position
+    const char *choices; // "false|true" or "beckmann|ggx": the value is the position; "given NAME": is NAME there, not 0?
     const char *text;
 } ConfigDesc;

@@ -20,6 +20,10 @@ static double random_value(Random *r, const ParamDesc *p) {
     case PARAM_IOR:
     case PARAM_SMOOTH_IOR:
         return uniform(r) < 0.3 ? between(r, 0.6, 0.95) : between(r, 1.05, 2.5);
+    case PARAM_SPECULAR: // as eta and as specular alike; 1, or 0 as specular, is no interface
+        return uniform(r) < 0.3 ? between(r, 0.6, 0.95) : between(r, 1.05, 2.5);
+    case PARAM_RATE:
+        return between(r, 0.2, 3);
     case PARAM_METAL_ETA:
     case PARAM_METAL_K:
         return metal_value(r);
@@ -119,11 +123,12 @@ static int add_bsdf(KindCase *c, Random *r, int kind, int variant, bool textured
     bool derives = rey_bsdf_table_size(kind) > 0;
     for (int i = 0; i < k->param_count; i++) {
         const ParamDesc *p = k->params + i;
-        // Numbers behind a derived table are constants.
-        bool constant = derives && p->type != PARAM_SPEC;
+        // Numbers behind a derived table and those that steer sampling are constants; of many slots a few are textured.
+        bool constant = (derives && p->type != PARAM_SPEC) || p->type == PARAM_RATE ||
+                        (k->param_count > 8 && uniform(r) < 0.6);
         int first = c->theta_count;
         node->slot[i] = case_texture(c, r, p, root ? i : -1, textured && !constant);
-        if (constant) {
+        if (derives && constant) {
             c->theta[first] = fmax(c->theta[first], p->type == PARAM_REAL ? 0.01 : 0);
             c->coat_eta = p->type == PARAM_IOR ? first : c->coat_eta;
             c->coat_alpha = p->type == PARAM_REAL ? first : c->coat_alpha;

@@ -4,7 +4,7 @@
 
 #include "scene/scene.h"
 
-enum { CASE_THETA = 768, CASE_TEXTURES = 40, CASE_BSDFS = 4, CASE_SHAPES = 2, CASE_TABLES = 1024 };
+enum { CASE_THETA = 768, CASE_TEXTURES = 48, CASE_BSDFS = 4, CASE_SHAPES = 2, CASE_TABLES = 1024 };
 
 // No float in here: the double build reads the same bytes.
 typedef struct CaseEmitter {

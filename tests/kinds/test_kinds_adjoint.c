@@ -44,6 +44,19 @@ static double rounding_noise(const KindCase *c, const Query *q, const double df[
     return noise;
 }
 
+// At the end of a range the derivative may be infinite (a root, a jump): quotients grow as the step shrinks.
+static bool diverges(const KindCase *c, const Query *q, const double df[3], double *x, double scale, int side) {
+    double last = 0;
+    for (double h = 1e-3; h > 1e-9; h *= 0.1) {
+        double quotient = fabs(difference(c, q, df, x, h * scale, side));
+        if (!(quotient > 2 * last)) {
+            return false;
+        }
+        last = quotient;
+    }
+    return true;
+}
+
 // The adjoint d matches the difference quotient for some step: large steps cross kinks, small ones drown in rounding.
 static bool matches(const KindCase *c, const Query *q, const double df[3], double *x, double d, double low,
                     double high, double rounding) {
@@ -55,6 +68,9 @@ static bool matches(const KindCase *c, const Query *q, const double df[3], doubl
         if (fabs(quotient - d) <= 1e-5 * fmax(fabs(quotient), fabs(d)) + noise) {
             return true;
         }
+    }
+    if (side && isfinite(d) && diverges(c, q, df, x, scale, side)) {
+        return true;
     }
     print_error("adjoint %.9g, differences", d);
     for (double h = 1e-3; h > 1e-9; h *= 0.1) {
@@ -145,7 +161,7 @@ static void test_every_kind(void **state) {
             }
         }
         for (int i = 0; i < k->param_count; i++) {
-            if (largest[i] == 0) {
+            if (largest[i] == 0 && k->params[i].type != PARAM_RATE) {
                 print_error("%s: the derivative with respect to %s is never different from 0\n", k->name,
                             k->params[i].name);
                 here++;

@@ -96,8 +96,13 @@ static double check_distribution(const Fixed *x, const Samples *s) {
     return chi_square_test(n, p, counts, SAMPLES);
 }
 
+// These send back more than they receive where sheen, clearcoat or tints are on, by their definition.
+static bool gains_energy(int kind) {
+    return strncmp(rey_bsdf_kinds[kind].name, "principled", 10) == 0;
+}
+
 // Weights are finite, and their mean, with the compression of radiance undone, is at most 1.
-static int check_weights(const Samples *s) {
+static int check_weights(const Samples *s, bool bounded) {
     double mean[3] = {0}, square[3] = {0};
     int failures = 0;
     for (int i = 0; i < SAMPLES; i++) {
@@ -112,7 +117,7 @@ static int check_weights(const Samples *s) {
     }
     for (int k = 0; k < 3; k++) {
         double error = sqrt(fmax(square[k] - mean[k] * mean[k], 0) / SAMPLES);
-        if (mean[k] > 1.004 + 4.5 * error) {
+        if (bounded && mean[k] > 1.004 + 4.5 * error) {
             print_error("energy %g +- %g: ", mean[k], error);
             failures++;
         }
@@ -184,7 +189,7 @@ static void test_every_kind(void **state) {
             random_direction(&r, x.wi);
             draw_samples(&x, &r, s);
             double p = check_distribution(&x, s);
-            int here = check_weights(s) + check_support(&x, &r) + check_reciprocity(&x, s);
+            int here = check_weights(s, !gains_energy(kind)) + check_support(&x, &r) + check_reciprocity(&x, s);
             if (p < threshold) {
                 print_error("chi-square: p = %g, threshold %g: ", p, threshold);
                 here++;

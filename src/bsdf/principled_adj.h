@@ -1,0 +1,139 @@
+// principled_adj.h: the adjoint of principled_eval, lobe by lobe.
+#pragma once
+
+#include "bsdf/principled.h"
+
+// Adjoints of what the lobes share.
+typedef struct PrincipledBack {
+    Float a, b, e, eta, fresnel, brdf, bsdf;
+    Float dg; // of D Gi Go
+    Vec3 m;
+} PrincipledBack;
+
+KFN void principled_reflection_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Float dg, Spec df,
+                                   Principled *dp, PrincipledBack *back, Vec3 *dwi) {
+    Float k = f_safe_rcp(4.0f * f_abs(wi.z));
+    // f = colour D G k, k = 1 / (4 |cos_i|)
+    Spec dcolour = spec_zero_unless(t->reflects, spec_scale(df, dg * k));
+    Float dvalue = f_zero_unless(t->reflects, spec_dot(df, principled_reflection(p, t)));
+    back->dg = back->dg + dvalue * k;
+    dwi->z = dwi->z - dvalue * dg * k * f_safe_rcp(wi.z);
+    // colour = bsdf F from the back
+    Float dback = f_zero_unless(~t->front, spec_sum(dcolour));
+    back->fresnel = back->fresnel + dback * t->bsdf;
+    back->bsdf = back->bsdf + dback * t->fresnel;
+    // colour = principled_reflectance(...) from the front; without a main lobe, only the index has an effect
+    PrincipledReflectanceAdj d = {spec_zero(), f_set(0), f_set(0), f_set(0), f_set(0), f_set(0)};
+    principled_reflectance_adj(p->base_color, p->metallic, p->spec_tint, t->fresnel, t->a, t->eta,
+                               spec_zero_unless(t->front, dcolour), &d);
+    Mask on = ~principled_degenerate(p);
+    spec_acc(&dp->base_color, spec_zero_unless(on, d.base));
+    dp->metallic = dp->metallic + f_zero_unless(on, d.metallic);
+    dp->spec_tint = dp->spec_tint + f_zero_unless(on, d.tinted);
+    back->fresnel = back->fresnel + d.exact;
+    back->a = back->a + f_zero_unless(on, d.cosine);
+    back->eta = back->eta + d.eta;
+}
+
+// d sqrt(x) / dx, kept finite where x is 0.
+KFN Float principled_root_slope(Float x) { return 0.5f / f_sqrt(f_max(x, f_set(1e-4f))); }
+
+KFN void principled_refraction_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Float dg, Spec df,
+                                   Principled *dp, PrincipledBack *back, Vec3 *dwi) {
+    df = spec_zero_unless(~t->reflects, df);
+    Float jacobian = principled_refraction(t, wi), k = dg * jacobian, f1 = 1.0f - t->fresnel;
+    // f = sqrt(base) bsdf (1 - F) D G jacobian
+    for (int c = 0; c < SPEC_N; c++) {
+        dp->base_color.c[c] = dp->base_color.c[c] + df.c[c] * t->bsdf * f1 * k * principled_root_slope(p->base_color.c[c]);
+    }
+    Float dvalue = spec_dot(df, principled_root(p->base_color)), dk = dvalue * t->bsdf * f1;
+    back->bsdf = back->bsdf + dvalue * f1 * k;
+    back->fresnel = back->fresnel - dvalue * t->bsdf * k;
+    back->dg = back->dg + dk * jacobian;
+    // jacobian = |a b| / (|cos_i| q^2), q = a + e b
+    Float g = dk * k, rcp_q = f_safe_rcp(t->q);
+    dwi->z = dwi->z - g * f_safe_rcp(wi.z);
+    back->a = back->a + g * (f_safe_rcp(t->a) - 2.0f * rcp_q);
+    back->b = back->b + g * (f_safe_rcp(t->b) - 2.0f * t->e * rcp_q);
+    back->e = back->e - 2.0f * g * t->b * rcp_q;
+}
+
+KFN void principled_coat_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Vec3 wo, Float df, Principled *dp,
+                             PrincipledBack *back, Vec3 *dwi, Vec3 *dwo) {
+    df = f_zero_unless(principled_visible(t, wi, wo), df);
+    Float s = 0.04f + 0.96f * principled_fall(t->a, t->eta), d = clearcoat_D(t->m, clearcoat_alpha(p->clearcoat_gloss));
+    Float gi = clearcoat_G1(wi.z), go = clearcoat_G1(wo.z), co = f_abs(wo.z), dvalue = 0.25f * df * p->clearcoat;
+    // f = clearcoat / 4 s D Gi Go |cos_o|
+    dp->clearcoat = dp->clearcoat + 0.25f * df * s * d * gi * go * co;
+    principled_fall_adj(t->a, t->eta, 0.96f * dvalue * d * gi * go * co, &back->a, &back->eta);
+    clearcoat_D_adj(t->m, p->clearcoat_gloss, dvalue * s * gi * go * co, &back->m, &dp->clearcoat_gloss);
+    clearcoat_G1_adj(wi.z, dvalue * s * d * go * co, &dwi->z);
+    clearcoat_G1_adj(wo.z, dvalue * s * d * gi * co, &dwo->z);
+    dwo->z = dwo->z + f_sign(wo.z) * dvalue * s * d * gi * go;
+}
+
+KFN void principled_base_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Vec3 wo, Spec df, Principled *dp,
+                             PrincipledBack *back, Vec3 *dwi, Vec3 *dwo) {
+    Float ci = f_abs(wi.z), co = f_abs(wo.z), dci = f_set(0), dco = f_set(0);
+    PrincipledDiffuse d = principled_diffuse(ci, co, t->b, p->roughness);
+    Float shape = f_lerp(d.smooth, d.flat, p->flatness) * INV_PI;
+    // f = base brdf / pi |cos_o| blend
+    spec_acc(&dp->base_color, spec_scale(df, t->brdf * co * shape));
+    Float dvalue = spec_dot(df, p->base_color), dblend = dvalue * t->brdf * co * INV_PI;
+    back->brdf = back->brdf + dvalue * co * shape;
+    dco = dco + dvalue * t->brdf * shape;
+    dp->flatness = dp->flatness + dblend * (d.flat - d.smooth);
+    principled_diffuse_adj(&d, ci, co, t->b, p->roughness, p->flatness, dblend, &dci, &dco, &back->b, &dp->roughness);
+    // f += sheen (1 - metallic) w(|b|) colour |cos_o|, colour = 1 + (tint - 1) sheen_tint
+    Spec tint = principled_tint(p->base_color);
+    Float w = schlick_weight(f_abs(t->b)), fm = 1.0f - p->metallic, k = p->sheen * fm * w * co;
+    Float dsheen = spec_dot(df, principled_towards(tint, p->sheen_tint)), db = f_set(0);
+    dp->sheen_tint = dp->sheen_tint + k * (spec_dot(df, tint) - spec_sum(df));
+    principled_tint_adj(p->base_color, spec_scale(df, k * p->sheen_tint), &dp->base_color);
+    dp->sheen = dp->sheen + dsheen * fm * w * co;
+    dp->metallic = dp->metallic - dsheen * p->sheen * w * co;
+    schlick_weight_adj(f_abs(t->b), dsheen * p->sheen * fm * co, &db);
+    back->b = back->b + f_sign(t->b) * db;
+    dco = dco + dsheen * p->sheen * fm * w;
+    // ci = |wi.z|, co = |wo.z|
+    dwi->z = dwi->z + f_sign(wi.z) * dci;
+    dwo->z = dwo->z + f_sign(wo.z) * dco;
+}
+
+KFN void principled_adj(const Principled *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Principled *dp, Vec3 *dwi, Vec3 *dwo) {
+    PrincipledTerms t = principled_terms(p, wi, wo, lobe);
+    Float d = microfacet_D(&t.mf, t.m), gi = smith_G1(&t.mf, wi, t.m), go = smith_G1(&t.mf, wo, t.m), dg = d * gi * go;
+    df = spec_zero_unless(t.counts, df);
+    PrincipledBack back = {.m = v3_zero()};
+    principled_reflection_adj(p, &t, wi, dg, df, dp, &back, dwi);
+    principled_refraction_adj(p, &t, wi, dg, df, dp, &back, dwi);
+    Spec upper = spec_zero_unless(principled_upper(&t), df);
+    if (m_any(principled_upper(&t))) {
+        principled_base_adj(p, &t, wi, wo, upper, dp, &back, dwi, dwo);
+        principled_coat_adj(p, &t, wi, wo, spec_sum(upper), dp, &back, dwi, dwo);
+    }
+    // brdf = (1 - metallic) (1 - spec_trans), bsdf = (1 - metallic) spec_trans
+    dp->metallic = dp->metallic - back.brdf * (1.0f - p->spec_trans) - back.bsdf * p->spec_trans;
+    dp->spec_trans = dp->spec_trans + (1.0f - p->metallic) * (back.bsdf - back.brdf);
+    // D Gi Go
+    Float du = f_set(0), dv = f_set(0);
+    microfacet_D_adj(&t.mf, t.m, back.dg * gi * go, &du, &dv, &back.m);
+    smith_G1_adj(&t.mf, wi, t.m, back.dg * d * go, &du, &dv, dwi);
+    smith_G1_adj(&t.mf, wo, t.m, back.dg * d * gi, &du, &dv, dwo);
+    principled_facets_adj(p->roughness, p->anisotropic, du, dv, &dp->roughness, &dp->anisotropic);
+    // F(a, eta), a = wi . m, b = wo . m
+    Float da = f_set(0);
+    fresnel_dielectric_adj(t.a, t.eta, back.fresnel, f_set(0), &da, &back.eta);
+    back.a = back.a + f_zero_unless(~principled_degenerate(p), da);
+    v3_acc(dwi, v3_scale(t.m, back.a));
+    v3_acc(dwo, v3_scale(t.m, back.b));
+    v3_acc(&back.m, v3_madd(v3_scale(wi, back.a), back.b, wo));
+    // m = turn normalize(h), h = wi + wo or wi + e wo
+    Vec3 dh = v3_zero();
+    v3_normalize_adj(t.h, v3_scale(back.m, t.turn), &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, v3_scale(dh, f_select(t.reflects, f_set(1), t.e)));
+    Float de = back.e + f_zero_unless(~t.reflects, v3_dot(dh, wo));
+    // e = eta, or 1 / eta from the back
+    principled_eta_adj(p, back.eta + f_select(t.front, de, -de * t.e * t.e), &dp->specular);
+}
