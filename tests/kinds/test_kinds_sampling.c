@@ -207,7 +207,44 @@ static void test_every_kind(void **state) {
     assert_int_equal(failures, 0);
 }
 
+static void set_param(KindCase *c, const char *name, double value) {
+    const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
+    for (int i = 0; i < c->theta_count; i++) {
+        if (c->owner[i] >= 0 && strcmp(k->params[c->owner[i]].name, name) == 0) {
+            c->theta[i] = value;
+        }
+    }
+}
+
+// The principled surface keeps energy where it is metal, and where it is clear glass without tint, sheen and coat.
+static void test_principled_energy(void **state) {
+    UNUSED(state);
+    int failures = 0;
+    Random r = {11};
+    Samples *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    for (int n = 0; n < 12; n++) {
+        KindCase c;
+        case_make(&c, &r, rey_bsdf_kind_find("principled"), n % 4, false);
+        set_param(&c, "clearcoat", 0);
+        set_param(&c, "spec_tint", 0);
+        set_param(&c, "sheen", 0);
+        set_param(&c, "metallic", n < 6);
+        set_param(&c, "spec_trans", n >= 6);
+        Fixed x = {&c, {0}, {0, 0}};
+        random_direction(&r, x.wi);
+        draw_samples(&x, &r, s);
+        int here = check_weights(s, true);
+        if (here) {
+            case_print(&c, s->query);
+        }
+        failures += here;
+    }
+    free(s);
+    assert_int_equal(failures, 0);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_kind)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_kind), cmocka_unit_test(test_principled_energy)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,7 +71,8 @@ static Room room_open(const char *file, int threads, int lanes) {
     def.lanes = lanes;
     Room room;
     assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    if (rey_scene_load(room.ctx, path, defines, strcmp(file, "materials.xml") ? 0 : 2, &room.scene) != REY_OK) {
+    bool pictures = strcmp(file, "materials.xml") == 0 || strcmp(file, "principled.xml") == 0;
+    if (rey_scene_load(room.ctx, path, defines, pictures ? 2 : 0, &room.scene) != REY_OK) {
         fail_msg("%s", rey_error(room.ctx));
     }
     return room;
@@ -452,7 +453,8 @@ static void test_difference_noise(void **state) {
 
 // One test per room: every material, every shape.
 #define ONE_ROOM(test, file) {#test " " file, test, NULL, NULL, (void *)(uintptr_t)(file)}
-#define EVERY_ROOM(test) ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml")
+#define EVERY_ROOM(test)                                                                                               \
+    ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml"), ONE_ROOM(test, "principled.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
