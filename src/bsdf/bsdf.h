@@ -10,6 +10,7 @@
 #include "bsdf/null.h"
 #include "bsdf/plastic.h"
 #include "bsdf/principled_adj.h"
+#include "bsdf/principledthin.h"
 #include "bsdf/roughconductor.h"
 #include "bsdf/roughdielectric.h"
 #include "bsdf/roughplastic.h"

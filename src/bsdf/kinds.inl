@@ -10,6 +10,7 @@ BSDF_LEAF(ROUGHDIELECTRIC, roughdielectric, RoughDielectric, "roughdielectric", 
 BSDF_LEAF(PLASTIC, plastic, Plastic, "plastic", PLASTIC_PARAMS, PLASTIC_CONFIG, "")
 BSDF_LEAF(ROUGHPLASTIC, roughplastic, RoughPlastic, "roughplastic", ROUGHPLASTIC_PARAMS, ROUGHPLASTIC_CONFIG, "walter2007")
 BSDF_LEAF(PRINCIPLED, principled, Principled, "principled", PRINCIPLED_PARAMS, PRINCIPLED_CONFIG, "burley2015")
+BSDF_LEAF(PRINCIPLEDTHIN, principledthin, PrincipledThin, "principledthin", PRINCIPLEDTHIN_PARAMS, NO_CONFIG, "burley2015")
 BSDF_LEAF(NULL, null, Null, "null", NO_PARAMS, NO_CONFIG, "")
 BSDF_ADAPTER(TWOSIDED, twosided, Twosided, "twosided", NO_PARAMS, NO_CONFIG, 1, 2, "brdf", "")
 BSDF_ADAPTER(MASK, mask, MaskBsdf, "mask", MASK_PARAMS, NO_CONFIG, 1, 1, "nested_bsdf", "")

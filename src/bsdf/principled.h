@@ -126,16 +126,9 @@ KFN Float principled_coat(const Principled *p, const PrincipledTerms *t, Vec3 wi
     return f_zero_unless(principled_upper(t) & principled_visible(t, wi, wo), 0.25f * p->clearcoat * value);
 }
 
-// Diffuse reflection and sheen.
-KFN Spec principled_base(const Principled *p, const PrincipledTerms *t, Vec3 wi, Vec3 wo) {
-    Float ci = f_abs(wi.z), co = f_abs(wo.z);
-    PrincipledDiffuse d = principled_diffuse(ci, co, t->b, p->roughness);
-    Spec f = spec_scale(p->base_color, t->brdf * INV_PI * co * f_lerp(d.smooth, d.flat, p->flatness));
-    if (m_any(m_ne(p->sheen, f_set(0)))) {
-        Spec colour = principled_towards(principled_tint(p->base_color), p->sheen_tint);
-        f = spec_madd(f, p->sheen * (1.0f - p->metallic) * schlick_weight(f_abs(t->b)) * co, colour);
-    }
-    return spec_zero_unless(principled_upper(t), f);
+KFN PrincipledMatte principled_matte_of(const Principled *p, const PrincipledTerms *t) {
+    return (PrincipledMatte){p->base_color, p->roughness, p->flatness,       p->sheen,
+                             p->sheen_tint, t->brdf,      1.0f - p->metallic};
 }
 
 KFN Spec principled_eval(const Principled *p, Vec3 wi, Vec3 wo, Int lobe) {
@@ -148,7 +141,8 @@ KFN Spec principled_eval(const Principled *p, Vec3 wi, Vec3 wo, Int lobe) {
         f = spec_madd(f, f_zero_unless(refracts, s), principled_root(p->base_color));
     }
     if (m_any(principled_upper(&t))) {
-        spec_acc(&f, principled_base(p, &t, wi, wo));
+        PrincipledMatte matte = principled_matte_of(p, &t);
+        spec_acc(&f, spec_zero_unless(principled_upper(&t), principled_matte(&matte, f_abs(wi.z), f_abs(wo.z), t.b)));
         if (m_any(m_ne(p->clearcoat, f_set(0)))) {
             spec_acc(&f, spec_set(principled_coat(p, &t, wi, wo)));
         }

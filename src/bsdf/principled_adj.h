@@ -74,27 +74,17 @@ KFN void principled_coat_adj(const Principled *p, const PrincipledTerms *t, Vec3
 
 KFN void principled_base_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Vec3 wo, Spec df, Principled *dp,
                              PrincipledBack *back, Vec3 *dwi, Vec3 *dwo) {
-    Float ci = f_abs(wi.z), co = f_abs(wo.z), dci = f_set(0), dco = f_set(0);
-    PrincipledDiffuse d = principled_diffuse(ci, co, t->b, p->roughness);
-    Float shape = f_lerp(d.smooth, d.flat, p->flatness) * INV_PI;
-    // f = base brdf / pi |cos_o| blend
-    spec_acc(&dp->base_color, spec_scale(df, t->brdf * co * shape));
-    Float dvalue = spec_dot(df, p->base_color), dblend = dvalue * t->brdf * co * INV_PI;
-    back->brdf = back->brdf + dvalue * co * shape;
-    dco = dco + dvalue * t->brdf * shape;
-    dp->flatness = dp->flatness + dblend * (d.flat - d.smooth);
-    principled_diffuse_adj(&d, ci, co, t->b, p->roughness, p->flatness, dblend, &dci, &dco, &back->b, &dp->roughness);
-    // f += sheen (1 - metallic) w(|b|) colour |cos_o|, colour = 1 + (tint - 1) sheen_tint
-    Spec tint = principled_tint(p->base_color);
-    Float w = schlick_weight(f_abs(t->b)), fm = 1.0f - p->metallic, k = p->sheen * fm * w * co;
-    Float dsheen = spec_dot(df, principled_towards(tint, p->sheen_tint)), db = f_set(0);
-    dp->sheen_tint = dp->sheen_tint + k * (spec_dot(df, tint) - spec_sum(df));
-    principled_tint_adj(p->base_color, spec_scale(df, k * p->sheen_tint), &dp->base_color);
-    dp->sheen = dp->sheen + dsheen * fm * w * co;
-    dp->metallic = dp->metallic - dsheen * p->sheen * w * co;
-    schlick_weight_adj(f_abs(t->b), dsheen * p->sheen * fm * co, &db);
-    back->b = back->b + f_sign(t->b) * db;
-    dco = dco + dsheen * p->sheen * fm * w;
+    Float dci = f_set(0), dco = f_set(0);
+    PrincipledMatte matte = principled_matte_of(p, t), d = {.base = spec_zero()};
+    principled_matte_adj(&matte, f_abs(wi.z), f_abs(wo.z), t->b, df, &d, &dci, &dco, &back->b);
+    spec_acc(&dp->base_color, d.base);
+    dp->roughness = dp->roughness + d.roughness;
+    dp->flatness = dp->flatness + d.flatness;
+    dp->sheen = dp->sheen + d.sheen;
+    dp->sheen_tint = dp->sheen_tint + d.tinted;
+    // diffuse = brdf, gleam = 1 - metallic
+    back->brdf = back->brdf + d.diffuse;
+    dp->metallic = dp->metallic - d.gleam;
     // ci = |wi.z|, co = |wo.z|
     dwi->z = dwi->z + f_sign(wi.z) * dci;
     dwo->z = dwo->z + f_sign(wo.z) * dco;

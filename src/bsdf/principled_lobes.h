@@ -153,6 +153,48 @@ KFN void principled_diffuse_adj(const PrincipledDiffuse *d, Float ci, Float co, 
     *dco = *dco + dsum;
 }
 
+// Diffuse reflection and sheen together, without the weights of the lobes that they share the surface with:
+// |cos_o| (diffuse base / pi blend + gleam sheen w(cd) (1 + (tint - 1) tinted)). Also the record of its adjoint.
+typedef struct PrincipledMatte {
+    Spec base;
+    Float roughness, flatness, sheen, tinted;
+    Float diffuse, gleam; // weights
+} PrincipledMatte;
+
+KFN Spec principled_matte(const PrincipledMatte *p, Float ci, Float co, Float cd) {
+    PrincipledDiffuse d = principled_diffuse(ci, co, cd, p->roughness);
+    Spec f = spec_scale(p->base, p->diffuse * INV_PI * co * f_lerp(d.smooth, d.flat, p->flatness));
+    if (m_any(m_ne(p->sheen, f_set(0)))) {
+        Spec colour = principled_towards(principled_tint(p->base), p->tinted);
+        f = spec_madd(f, p->sheen * p->gleam * schlick_weight(f_abs(cd)) * co, colour);
+    }
+    return f;
+}
+
+KFN void principled_matte_adj(const PrincipledMatte *p, Float ci, Float co, Float cd, Spec df, PrincipledMatte *dp,
+                              Float *dci, Float *dco, Float *dcd) {
+    PrincipledDiffuse d = principled_diffuse(ci, co, cd, p->roughness);
+    Float shape = f_lerp(d.smooth, d.flat, p->flatness) * INV_PI;
+    // f = base diffuse / pi |cos_o| blend
+    spec_acc(&dp->base, spec_scale(df, p->diffuse * co * shape));
+    Float dvalue = spec_dot(df, p->base), dblend = dvalue * p->diffuse * co * INV_PI;
+    dp->diffuse = dp->diffuse + dvalue * co * shape;
+    *dco = *dco + dvalue * p->diffuse * shape;
+    dp->flatness = dp->flatness + dblend * (d.flat - d.smooth);
+    principled_diffuse_adj(&d, ci, co, cd, p->roughness, p->flatness, dblend, dci, dco, dcd, &dp->roughness);
+    // f += sheen gleam w(|cd|) colour |cos_o|, colour = 1 + (tint - 1) tinted
+    Spec tint = principled_tint(p->base);
+    Float w = schlick_weight(f_abs(cd)), k = p->sheen * p->gleam * w * co, dsheen, dabs = f_set(0);
+    dsheen = spec_dot(df, principled_towards(tint, p->tinted));
+    dp->tinted = dp->tinted + k * (spec_dot(df, tint) - spec_sum(df));
+    principled_tint_adj(p->base, spec_scale(df, k * p->tinted), &dp->base);
+    dp->sheen = dp->sheen + dsheen * p->gleam * w * co;
+    dp->gleam = dp->gleam + dsheen * p->sheen * w * co;
+    *dco = *dco + dsheen * p->sheen * p->gleam * w;
+    schlick_weight_adj(f_abs(cd), dsheen * p->sheen * p->gleam * co, &dabs);
+    *dcd = *dcd + f_sign(cd) * dabs;
+}
+
 // ---- clearcoat ---------------------------------------------------------------------------------------------------
 
 #define CLEARCOAT_MASKING_ALPHA 0.25f

@@ -85,7 +85,7 @@ rey_result build_pose(Builder *b, const double matrix[16], const char *path, Par
 // Plugins of the format that are known and do not exist here yet.
 static bool is_known_plugin(const char *type) {
     static const char *const known[] = {
-        "thindielectric", "principledthin", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
+        "thindielectric", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
         "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
         "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
         "sunsky", "timed_sunsky", "cylinder", "shapegroup", "instance", "bsplinecurve", "linearcurve", "sdfgrid", "merge",

@@ -127,8 +127,8 @@ static int check_values(const KindCase *c, Random *r, int width_count) {
             if (first == 4) { // the terms of dwi are of the size of f / cos_i, and may cancel
                 scale = fmax(scale, (fabs(exactly[i][0]) + fabs(exactly[i][1]) + fabs(exactly[i][2])) / fabs(q[i].wi[2]));
             }
-            if (first == 10) { // slopes between equal texels are 0 but for their rounding
-                free_play += 1e-12 * sums[i];
+            if (first == 10) { // equal texels, and the channels of a grey tint, cancel but for their rounding
+                free_play += 1e-12 * sums[i] + 1e-5 * (fabs(exactly[i][0]) + fabs(exactly[i][1]) + fabs(exactly[i][2]));
             }
             if (first == 12) {
                 scale = sums[i];
