@@ -10,6 +10,7 @@
 // clearcoat and spec_tint are on, or a rough white base lies under the dielectric reflection.
 #pragma once
 
+#include "bsdf/critical.h"
 #include "bsdf/principled_lobes.h"
 
 #define PRINCIPLED_PARAMS(P)                                                                                           \
@@ -185,7 +186,8 @@ KFN Float principled_pdf(const Principled *p, Vec3 wi, Vec3 wo, Int lobe) {
     PrincipledTerms t = principled_terms(p, wi, wo, lobe);
     PrincipledChoice c = principled_choice(p, wi);
     Float share = principled_share(p, t.front, t.fresnel);
-    Float facets = microfacet_pdf(&t.mf, v3_scale(wi, f_sign(wi.z)), t.m), by_reflection = f_safe_rcp(4.0f * f_abs(t.b));
+    Float facets = interface_pdf(&t.mf, v3_scale(wi, f_sign(wi.z)), t.m, t.e, p->floor);
+    Float by_reflection = f_safe_rcp(4.0f * f_abs(t.b));
     Float by_refraction = f_abs(t.b) * t.e * t.e * f_safe_rcp(t.q * t.q);
     Float pdf = c.lobes[PRINCIPLED_MAIN] * facets *
                 f_select(t.reflects, share * by_reflection, (1.0f - share) * by_refraction);
@@ -202,19 +204,20 @@ KFN BsdfSample principled_sample(const Principled *p, Vec3 wi, Float u1, Vec2 u2
     PrincipledChoice c = principled_choice(p, wi);
     Mask front = m_gt(wi.z, f_set(0));
     Microfacet mf = principled_facets(p->roughness, p->anisotropic);
-    Vec3 m = microfacet_sample(&mf, v3_scale(wi, f_sign(wi.z)), u2.x, u2.y);
-    Float cos_t, eta_it, eta_ti, eta = principled_eta(p);
-    Float fresnel = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);
-    // [0, main): the main lobe, reflection first; then the clearcoat; then diffuse
+    // [0, main): the main lobe, with a random number of its own; then the clearcoat; then diffuse
     Float main = c.lobes[PRINCIPLED_MAIN], coat = main + c.lobes[PRINCIPLED_COAT];
-    Mask refracts = m_lt(u1, main) & m_ge(u1, main * principled_share(p, front, fresnel));
+    Float inner = f_min(u1 * f_safe_rcp(main), f_set(0.99999994f)), eta = principled_eta(p);
+    Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), f_select(front, eta, 1.0f / eta), p->floor, &inner, u2);
+    Float cos_t, eta_it, eta_ti, fresnel = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);
+    Mask refracts = m_lt(u1, main) & m_ge(inner, principled_share(p, front, fresnel));
     Mask coated = m_ge(u1, main) & m_lt(u1, coat), diffuse = m_ge(u1, coat) & m_ge(u1, main);
     if (m_any(coated)) {
         m = v3_select(coated, clearcoat_sample(clearcoat_alpha(p->clearcoat_gloss), u2), m);
     }
     Vec3 wo = v3_select(refracts, refract(wi, m, cos_t, eta_ti), reflect(wi, m));
     // Directions on the wrong side, or from facets that are seen from their back, have no density.
-    Mask good = (refracts ^ m_gt(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0)) & c.any;
+    Mask good = (refracts ^ m_gt(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0)) & m_gt(m.z, f_set(0)) &
+                c.any;
     wo = v3_select(diffuse, warp_cosine_hemisphere(u2), wo);
     wo = v3_select(good | (diffuse & c.any), wo, v3(wo.x, wo.y, f_set(0)));
     return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(refracts, eta_it, f_set(1))};

@@ -3,6 +3,7 @@
 // reflection F D G / (4 |cos_i|), refraction (1 - F) D G |a b| / (|cos_i| (a + e b)^2), radiance compression included.
 #pragma once
 
+#include "bsdf/critical.h"
 #include "bsdf/roughconductor.h"
 
 #define ROUGHDIELECTRIC_PARAMS(P)                                                                                      \
@@ -73,18 +74,20 @@ KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lo
     // Facets seen from their back cannot have been sampled.
     Mask visible = m_gt(t.a * wi.z, f_set(0)) & m_gt(t.b * wo.z, f_set(0));
     return f_zero_unless(t.counts & visible,
-                         microfacet_pdf(&mf, up, t.m) * f_select(t.reflects, reflected, refracted));
+                         interface_pdf(&mf, up, t.m, t.e, p->floor) * f_select(t.reflects, reflected, refracted));
 }
 
 KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u1, Vec2 u2) {
     Microfacet mf = roughdielectric_facets(p);
-    Vec3 m = microfacet_sample(&mf, v3_scale(wi, f_sign(wi.z)), u2.x, u2.y);
+    Float e = f_select(m_gt(wi.z, f_set(0)), p->eta, 1.0f / p->eta);
+    Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), e, p->floor, &u1, u2);
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), p->eta, &cos_t, &eta_it, &eta_ti);
     Mask reflects = m_lt(u1, roughdielectric_probability(p, f));
     Vec3 wo = v3_select(reflects, reflect(wi, m), refract(wi, m, cos_t, eta_ti));
     // A reflected direction below the surface, or a refracted one above it, has no density there; nor has a facet seen
     // from its back, which sampling of all normals can give.
-    Mask right_side = (reflects ^ m_le(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0));
+    Mask right_side = (reflects ^ m_le(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0)) &
+                      m_gt(m.z, f_set(0));
     wo = v3_select(right_side, wo, v3(wo.x, wo.y, f_set(0)));
     return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(reflects, f_set(1), eta_it)};
 }

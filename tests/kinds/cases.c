@@ -165,6 +165,15 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
     }
 }
 
+void case_set(KindCase *c, const char *name, double value) {
+    const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
+    for (int i = 0; i < c->theta_count; i++) {
+        if (c->owner[i] >= 0 && strcmp(k->params[c->owner[i]].name, name) == 0) {
+            c->theta[i] = value;
+        }
+    }
+}
+
 // ---- lights ------------------------------------------------------------------------------------------------------
 
 const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "point", "constant", "envmap"};

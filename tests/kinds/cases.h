@@ -39,6 +39,8 @@ void case_make_light(KindCase *c, Random *r, int light, bool textured);
 void case_update_light(KindCase *c);
 // Appends a texture with values in the range of a parameter row; returns its number.
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured);
+// Sets all values of a parameter of the root; names that it does not have are passed over.
+void case_set(KindCase *c, const char *name, double value);
 // Describes a failing case on standard error.
 void case_print(const KindCase *c, const Query *q);
 

@@ -209,15 +209,6 @@ static void test_every_kind(void **state) {
     assert_int_equal(failures, 0);
 }
 
-static void set_param(KindCase *c, const char *name, double value) {
-    const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
-    for (int i = 0; i < c->theta_count; i++) {
-        if (c->owner[i] >= 0 && strcmp(k->params[c->owner[i]].name, name) == 0) {
-            c->theta[i] = value;
-        }
-    }
-}
-
 // The principled surface keeps energy where it is metal, and where it is clear glass without tint, sheen and coat; the
 // sheet where all is transmitted diffusely.
 static void test_principled_energy(void **state) {
@@ -230,12 +221,12 @@ static void test_principled_energy(void **state) {
         KindCase c;
         int kind = rey_bsdf_kind_find(n < 12 ? "principled" : "principledthin");
         case_make(&c, &r, kind, n % case_variants(kind), false);
-        set_param(&c, "clearcoat", 0);
-        set_param(&c, "spec_tint", 0);
-        set_param(&c, "sheen", 0);
-        set_param(&c, "metallic", n < 6);
-        set_param(&c, "spec_trans", n >= 6 && n < 12);
-        set_param(&c, "diff_trans", 2);
+        case_set(&c, "clearcoat", 0);
+        case_set(&c, "spec_tint", 0);
+        case_set(&c, "sheen", 0);
+        case_set(&c, "metallic", n < 6);
+        case_set(&c, "spec_trans", n >= 6 && n < 12);
+        case_set(&c, "diff_trans", 2);
         Fixed x = {&c, {0}, {0, 0}};
         random_direction(&r, x.wi);
         draw_samples(&x, &r, s);

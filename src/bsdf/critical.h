@@ -1,0 +1,48 @@
+// critical.h: normals of rough interfaces for derivatives. Seen from the denser side, Fresnel's formula depends on the
+// index through the refracted cosine c = sqrt(a^2 - a_c^2) / e, a = wi.m, which vanishes at the critical angle: there
+// dF/d(index) grows like 1/c, and normals of a smooth density give its estimate an infinite variance, as the integral
+// of (1/c)^2 c dc diverges. A part of the normals is therefore drawn with c uniform in [0, 1] and the azimuth about wi
+// uniform, which has the density a / (2 pi e^2 c): the derivative over the density stays bounded.
+#pragma once
+
+#include "math/microfacet.h"
+
+// Share of such normals: none for pictures (floor = 0), and none where the other side's index ratio e is at least 1.
+KFN Float critical_share(Float e, real floor) { return f_zero_unless(m_lt(e, f_set(1)), f_set(floor)); }
+
+KFN Float critical_pdf(Vec3 wi, Vec3 m, Float e) {
+    Float a = v3_dot(wi, m), c2e2 = a * a - (1.0f - e) * (1.0f + e);
+    // The smallest c is that of rounding.
+    Float ce = f_max(f_safe_sqrt(c2e2), f_set(1e-6f));
+    return f_zero_unless(m_gt(c2e2, f_set(0)) & m_gt(a, f_set(0)), INV_TWO_PI * a / (e * ce));
+}
+
+KFN Vec3 critical_sample(Vec3 wi, Float e, Vec2 u) {
+    Float a = f_min(f_safe_sqrt((1.0f - e) * (1.0f + e) + f_sqr(e * u.x)), f_set(1));
+    Float sine, cosine, r = f_safe_sqrt((1.0f - a) * (1.0f + a));
+    f_sincos(TWO_PI * u.y, &sine, &cosine);
+    Frame frame = frame_from_normal(wi);
+    return frame_to_world(&frame, v3(r * cosine, r * sine, a));
+}
+
+// Density of interface_sample; wi is on the upper side, e the index of the other side over that of wi's side.
+KFN Float interface_pdf(const Microfacet *mf, Vec3 wi, Vec3 m, Float e, real floor) {
+    Float pdf = microfacet_pdf(mf, wi, m);
+    if (floor > 0) {
+        Float share = critical_share(e, floor);
+        pdf = f_lerp(pdf, critical_pdf(wi, m, e), share);
+    }
+    return pdf;
+}
+
+// A microfacet normal; *u1 decides how, and is uniform again afterwards. Normals below the surface have no density.
+KFN Vec3 interface_sample(const Microfacet *mf, Vec3 wi, Float e, real floor, Float *u1, Vec2 u2) {
+    Vec3 m = microfacet_sample(mf, wi, u2.x, u2.y);
+    if (floor > 0) {
+        Float share = critical_share(e, floor);
+        Mask critical = m_lt(*u1, share);
+        m = v3_select(critical, critical_sample(wi, f_min(e, f_set(1)), u2), m);
+        *u1 = f_min(f_select(critical, *u1 * f_safe_rcp(share), (*u1 - share) / (1.0f - share)), f_set(0.99999994f));
+    }
+    return m;
+}

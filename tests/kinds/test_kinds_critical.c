@@ -1,0 +1,105 @@
+// The derivative of rough interfaces with respect to the index has a finite variance at the critical angle: the second
+// moment of its estimate, the integral of (df/d eta)^2 / pdf over reflected directions from inside, is cut into decades
+// of the refracted cosine c. Sampling as for pictures adds the same amount in every decade down to 0, without end;
+// sampling as for derivatives adds less and less.
+#include "cases.h"
+
+enum { DECADES = 5, STEPS = 24, AZIMUTHS = 24 };
+
+static const KindKernels *const exact = &kind_kernels_double;
+
+static const double pi = 3.14159265358979323846;
+
+// The entry of theta that holds the index.
+static int index_entry(const KindCase *c) {
+    const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
+    for (int i = 0; i < c->theta_count; i++) {
+        ParamType type = c->owner[i] >= 0 ? k->params[c->owner[i]].type : PARAM_SPEC;
+        if (type == PARAM_IOR || type == PARAM_SPECULAR) {
+            return i;
+        }
+    }
+    fail_msg("%s has no index", k->name);
+    return -1;
+}
+
+// (df/d eta)^2 / pdf d omega / (dc d phi) at the mirror direction about a normal with refracted cosine c.
+static double moment_at(const KindCase *k, int entry, double eta, double sine, double c, double phi, double floor) {
+    double e = 1 / eta, a = sqrt((1 - e) * (1 + e) + e * e * c * c), r = sqrt(1 - a * a);
+    double cosine = sqrt(1 - sine * sine), up[3] = {sine, 0, cosine}, side[3] = {cosine, 0, -sine}, m[3];
+    Query q = {{-sine, 0, -cosine}, {0}, {0, 0}, 0};
+    for (int i = 0; i < 3; i++) {
+        m[i] = a * up[i] + r * (cos(phi) * side[i] + (i == 1 ? sin(phi) : 0));
+    }
+    for (int i = 0; i < 3; i++) {
+        q.wo[i] = -(2 * a * m[i] - up[i]);
+    }
+    if (m[2] <= 0 || q.wo[2] >= 0) {
+        return 0;
+    }
+    KindCase copy = *k;
+    copy.floor = floor;
+    Adjoint adjoint = {.df = {1, 1, 1}};
+    double gradient[CASE_THETA] = {0}, f[1][3], pdf;
+    exact->adj(&copy, 1, &q, &adjoint, gradient, NULL);
+    exact->eval(&copy, 1, &q, f, &pdf);
+    double d = gradient[entry];
+    assert_true(d == 0 || pdf > 0);
+    // d omega = 4 a d omega_m, d omega_m = da d phi, da = e^2 c / a dc
+    return d == 0 ? 0 : d * d / pdf * 4 * e * e * c;
+}
+
+// The second moment's part from c in [10^-(k + 1), 10^-k] for each k.
+static void moments(const KindCase *k, double eta, double sine, double floor, double *decades) {
+    int entry = index_entry(k);
+    for (int decade = 0; decade < DECADES; decade++) {
+        decades[decade] = 0;
+        for (int i = 0; i < STEPS; i++) {
+            double c = pow(10, -decade - (i + 0.5) / STEPS), dc = c * log(10) / STEPS;
+            for (int j = 0; j < AZIMUTHS; j++) {
+                double phi = 2 * pi * (j + 0.5) / AZIMUTHS;
+                decades[decade] += moment_at(k, entry, eta, sine, c, phi, floor) * dc * 2 * pi / AZIMUTHS;
+            }
+        }
+    }
+}
+
+static void check(const char *name, int variant, const char *roughness) {
+    const double eta = 1.5;
+    Random r = {3};
+    KindCase c;
+    case_make(&c, &r, rey_bsdf_kind_find(name), variant, false);
+    case_set(&c, roughness, 0.4);
+    case_set(&c, "alpha_v", 0.3);
+    case_set(&c, "spec_trans", 1);
+    case_set(&c, "metallic", 0);
+    case_set(&c, "eta", eta);
+    case_set(&c, "specular", eta);
+    for (int i = 0; i < 3; i++) { // wi before, at and beyond the critical angle
+        double plain[DECADES], guarded[DECADES];
+        moments(&c, eta, (0.8 + 0.2 * i) / eta, 0, plain);
+        moments(&c, eta, (0.8 + 0.2 * i) / eta, 0.05, guarded);
+        print_message("%s %d: decades %.3g %.3g %.3g %.3g %.3g, guarded %.3g %.3g %.3g %.3g %.3g\n", name, variant, plain[0],
+                      plain[1], plain[2], plain[3], plain[4], guarded[0], guarded[1], guarded[2], guarded[3], guarded[4]);
+        assert_true(plain[4] > 0.9 * plain[3] && plain[3] > 0);
+        assert_true(guarded[4] < 0.2 * guarded[3] && guarded[3] < 0.3 * guarded[2]);
+        assert_true(guarded[4] > 0);
+    }
+}
+
+static void test_rough_dielectric(void **state) {
+    UNUSED(state);
+    for (int variant = 0; variant < 4; variant++) {
+        check("roughdielectric", variant, "alpha_u");
+    }
+}
+
+static void test_principled(void **state) {
+    UNUSED(state);
+    check("principled", 1, "roughness"); // the index is given itself
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rough_dielectric), cmocka_unit_test(test_principled)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
