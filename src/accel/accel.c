@@ -2,6 +2,8 @@
 // few big walls around dense meshes and is the form wanted for meshes that change.
 #include "accel/accel.h"
 
+#include "shape/shape.h"
+
 #include <embree3/rtcore.h>
 #include <stdio.h>
 #include <string.h>
@@ -29,53 +31,41 @@ static rey_result check_device(rey_scene *scene) {
 enum { RAY_ORG = 0, RAY_TNEAR = 3, RAY_DIR = 4, RAY_TFAR = 8, RAY_FIELDS = 12 };
 enum { HIT_U = 3, HIT_V = 4, HIT_PRIM = 5, HIT_GEOM = 6, HIT_INST = 7 };
 
-// ---- disks: user geometry ----------------------------------------------------------------------------------------
+// ---- surfaces that Embree does not know --------------------------------------------------------------------------
 
-static void disk_bounds(const struct RTCBoundsFunctionArguments *args) {
-    const float *t = args->geometryUserPtr; // rows of to_world
+// A kind's own intersection: distance between near and far of a ray given in the shape's space, negative for none.
+typedef float meet_fn(const float *table, const double o[3], const double d[3], float near, float far);
+typedef void bounds_fn(const float *table, float low[3], float high[3]);
+
+static inline void user_bounds(const struct RTCBoundsFunctionArguments *args, bounds_fn *bounds) {
     float low[3], high[3];
+    bounds(args->geometryUserPtr, low, high);
     for (int k = 0; k < 3; k++) {
-        float reach = sqrtf(t[4 * k] * t[4 * k] + t[4 * k + 1] * t[4 * k + 1]);
-        float pad = 1e-6f * (1 + fabsf(t[4 * k + 3]) + reach);
-        low[k] = t[4 * k + 3] - reach - pad;
-        high[k] = t[4 * k + 3] + reach + pad;
+        float pad = 1e-6f * (1 + fmaxf(fabsf(low[k]), fabsf(high[k])));
+        low[k] -= pad;
+        high[k] += pad;
     }
     *args->bounds_o = (struct RTCBounds){low[0], low[1], low[2], 0, high[0], high[1], high[2], 0};
 }
 
-// Distance at which the ray meets the disk, negative when it does not.
-static float disk_distance(const float *table, const float o[3], const float d[3]) {
-    const float *inverse = table + 12;
-    float lo[3], ld[3];
-    for (int k = 0; k < 3; k++) {
-        lo[k] = inverse[4 * k] * o[0] + inverse[4 * k + 1] * o[1] + inverse[4 * k + 2] * o[2] + inverse[4 * k + 3];
-        ld[k] = inverse[4 * k] * d[0] + inverse[4 * k + 1] * d[1] + inverse[4 * k + 2] * d[2];
-    }
-    if (ld[2] == 0) {
-        return -1;
-    }
-    float t = -lo[2] / ld[2];
-    float x = lo[0] + t * ld[0], y = lo[1] + t * ld[1];
-    return x * x + y * y <= 1 ? t : -1;
-}
-
-// Distance at which ray i of a packet of n meets the disk within its range, negative when it does not.
-static float disk_hit(const float *table, const float *rays, unsigned n, unsigned i) {
+// Distance at which ray i of a packet of n meets the surface within its range, negative when it does not.
+static inline float user_hit(const float *table, const float *rays, unsigned n, unsigned i, meet_fn *meet) {
     float o[3], d[3];
+    double local_o[3], local_d[3];
     for (unsigned k = 0; k < 3; k++) {
         o[k] = rays[(RAY_ORG + k) * n + i];
         d[k] = rays[(RAY_DIR + k) * n + i];
     }
-    float t = disk_distance(table, o, d);
-    return t > rays[RAY_TNEAR * n + i] && t < rays[RAY_TFAR * n + i] ? t : -1;
+    pose_ray(table, o, d, local_o, local_d);
+    return meet(table, local_o, local_d, rays[RAY_TNEAR * n + i], rays[RAY_TFAR * n + i]);
 }
 
-static void disk_intersect(const struct RTCIntersectFunctionNArguments *args) {
+static inline void user_intersect(const struct RTCIntersectFunctionNArguments *args, meet_fn *meet) {
     unsigned n = args->N;
     float *rays = (float *)args->rayhit, *hits = rays + RAY_FIELDS * n;
     unsigned *ids = (unsigned *)hits;
     for (unsigned i = 0; i < n; i++) {
-        float t = args->valid[i] == -1 ? disk_hit(args->geometryUserPtr, rays, n, i) : -1;
+        float t = args->valid[i] == -1 ? user_hit(args->geometryUserPtr, rays, n, i, meet) : -1;
         if (t >= 0) {
             rays[RAY_TFAR * n + i] = t;
             hits[HIT_U * n + i] = hits[HIT_V * n + i] = 0;
@@ -86,19 +76,47 @@ static void disk_intersect(const struct RTCIntersectFunctionNArguments *args) {
     }
 }
 
-static void disk_occluded(const struct RTCOccludedFunctionNArguments *args) {
+static inline void user_occluded(const struct RTCOccludedFunctionNArguments *args, meet_fn *meet) {
     unsigned n = args->N;
     float *rays = (float *)args->ray;
     for (unsigned i = 0; i < n; i++) {
-        if (args->valid[i] == -1 && disk_hit(args->geometryUserPtr, rays, n, i) >= 0) {
+        if (args->valid[i] == -1 && user_hit(args->geometryUserPtr, rays, n, i, meet) >= 0) {
             rays[RAY_TFAR * n + i] = -INFINITY;
         }
     }
 }
 
+// ---- geometries, one form per column of kinds.inl: set_FORM(prefix) fills one in ---------------------------------
+
+#define DEFINE_SPHERE_POINT(prefix)                                                                                    \
+    static void prefix##_set(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {                  \
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, view->tables,               \
+                                   (size_t)shape->table * sizeof(float), 4 * sizeof(float), 1);                        \
+    }
+#define DEFINE_USER(prefix)                                                                                            \
+    static void prefix##_bounds_of(const struct RTCBoundsFunctionArguments *args) { user_bounds(args, prefix##_bounds); } \
+    static void prefix##_intersect(const struct RTCIntersectFunctionNArguments *args) {                                \
+        user_intersect(args, prefix##_meet);                                                                           \
+    }                                                                                                                  \
+    static void prefix##_occluded(const struct RTCOccludedFunctionNArguments *args) {                                  \
+        user_occluded(args, prefix##_meet);                                                                            \
+    }                                                                                                                  \
+    static void prefix##_set(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {                  \
+        rtcSetGeometryUserPrimitiveCount(geometry, 1);                                                                 \
+        rtcSetGeometryUserData(geometry, view->tables + shape->table);                                                 \
+        rtcSetGeometryBoundsFunction(geometry, prefix##_bounds_of, NULL);                                              \
+        rtcSetGeometryIntersectFunction(geometry, prefix##_intersect);                                                 \
+        rtcSetGeometryOccludedFunction(geometry, prefix##_occluded);                                                   \
+    }
+#define SHAPE_MESH_KIND(ENUM, prefix)
+#define SHAPE_POSED(ENUM, prefix, form, ...) DEFINE_##form(prefix)
+#include "shape/kinds.inl"
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED
+
 // ---- shapes ------------------------------------------------------------------------------------------------------
 
-static void set_mesh(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {
+static void mesh_set(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {
     // theta and triangles have room behind their ends for Embree's 16-byte loads.
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, view->theta,
                                (size_t)shape->positions * sizeof(float), 3 * sizeof(float), (size_t)shape->vertex_count);
@@ -107,29 +125,31 @@ static void set_mesh(const SceneView *view, const ShapeRecord *shape, RTCGeometr
                                (size_t)shape->triangle_count);
 }
 
+typedef struct GeometryForm {
+    enum RTCGeometryType type;
+    void (*set)(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry);
+} GeometryForm;
+
+static const GeometryForm *geometry_form(int32_t kind) {
+    static const GeometryForm forms[] = {
+#define SHAPE_MESH_KIND(ENUM, prefix) {RTC_GEOMETRY_TYPE_TRIANGLE, prefix##_set},
+#define SHAPE_POSED(ENUM, prefix, form, ...) {RTC_GEOMETRY_TYPE_##form, prefix##_set},
+#include "shape/kinds.inl"
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED
+    };
+    return &forms[kind];
+}
+
 static rey_result add_shape(rey_scene *scene, int32_t id) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
-    enum RTCGeometryType type = shape->kind == SHAPE_MESH     ? RTC_GEOMETRY_TYPE_TRIANGLE
-                                : shape->kind == SHAPE_SPHERE ? RTC_GEOMETRY_TYPE_SPHERE_POINT
-                                                              : RTC_GEOMETRY_TYPE_USER;
-    RTCGeometry geometry = rtcNewGeometry(scene->embree_device, type);
+    RTCGeometry geometry = rtcNewGeometry(scene->embree_device, geometry_form(shape->kind)->type);
     if (!geometry) {
         return check_device(scene);
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
-    if (shape->kind == SHAPE_MESH) {
-        set_mesh(view, shape, geometry);
-    } else if (shape->kind == SHAPE_SPHERE) {
-        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, view->tables,
-                                   (size_t)shape->table * sizeof(float), 4 * sizeof(float), 1);
-    } else {
-        rtcSetGeometryUserPrimitiveCount(geometry, 1);
-        rtcSetGeometryUserData(geometry, view->tables + shape->table);
-        rtcSetGeometryBoundsFunction(geometry, disk_bounds, NULL);
-        rtcSetGeometryIntersectFunction(geometry, disk_intersect);
-        rtcSetGeometryOccludedFunction(geometry, disk_occluded);
-    }
+    geometry_form(shape->kind)->set(view, shape, geometry);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(view->embree, geometry, (unsigned)id);
     rtcReleaseGeometry(geometry);

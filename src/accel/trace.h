@@ -3,7 +3,7 @@
 #pragma once
 
 #include "sensor/perspective.h"
-#include "shape/interaction.h"
+#include "shape/shape.h"
 
 #include <embree3/rtcore.h>
 

@@ -3,22 +3,7 @@
 // Every cell has positive mass, because a derivative may be non-zero where the value is 0.
 #pragma once
 
-#include "shape/interaction.h"
-
-// Position in [0, n) of u in n cumulative values starting at `at` (per lane), and the fraction inside the cell.
-KFN Int cdf_search(const SceneView *scene, Int at, int32_t n, Float u, Float *fraction, Float *mass) {
-    Int low = i_set(0), high = i_set(n - 1);
-    for (int32_t left = n; left > 1; left = (left + 1) / 2) {
-        Int middle = (low + high) >> 1;
-        Mask right = m_le(table_at(scene, at + middle), u) & mi_lt(low, high);
-        low = i_select(right, middle + 1, low);
-        high = i_select(right, high, i_max(middle, low));
-    }
-    Float before = f_select(mi_lt(i_set(0), low), table_at(scene, at + i_max(low - 1, i_set(0))), f_set(0));
-    *mass = table_at(scene, at + low) - before;
-    *fraction = f_clamp((u - before) * f_safe_rcp(*mass), f_set(0), f_set(0.99999994f));
-    return low;
-}
+#include "scene/tables.h"
 
 // Samples uv; density is per unit square.
 KFN Vec2 grid_sample(const SceneView *scene, int32_t table, int32_t width, int32_t height, Vec2 u, Float *density) {

@@ -4,7 +4,7 @@
 
 #include "emitter/distribution.h"
 #include "math/warp.h"
-#include "shape/interaction.h"
+#include "shape/shape.h"
 
 // A point on a light as seen from a reference point.
 typedef struct LightSample {
@@ -20,101 +20,26 @@ KFN bool emitter_is_delta(const EmitterRecord *e) { return e->kind == EMITTER_PO
 
 // ---- area --------------------------------------------------------------------------------------------------------
 
-// Uniform over the area of a mesh: triangle by binary search in the cumulative areas, then uniform inside it.
-KFN Hit mesh_sample(const SceneView *scene, const ShapeRecord *shape, int32_t id, Vec2 u) {
-    Float mass;
-    Int prim = cdf_search(scene, i_set(shape->area_cdf), shape->triangle_count, u.x, &u.x, &mass);
-    Hit hit;
-    hit.shape = i_set(id);
-    hit.prim = prim;
-    Float root = f_sqrt(1.0f - u.x);
-    hit.u = 1.0f - root;
-    hit.v = u.y * root;
-    hit.p = v3_zero();
-    return hit;
-}
-
 KFN LightSample area_sample(const SceneView *scene, const EmitterRecord *e, Vec3 ref, Vec2 u) {
     const ShapeRecord *shape = scene->shapes + e->shape;
     LightSample s;
-    Hit hit;
-    if (shape->kind == SHAPE_SPHERE) {
-        // Uniform in the cone of directions that the sphere subtends, from outside; uniform over the area, from inside.
-        const float *t = scene->tables + shape->table;
-        Vec3 centre = v3(f_set(t[0]), f_set(t[1]), f_set(t[2]));
-        Vec3 to_centre = v3_sub(centre, ref);
-        real radius = (real)t[3];
-        Float d2 = v3_dot(to_centre, to_centre), distance = f_sqrt(d2);
-        Mask outside = m_gt(distance, f_set(radius * 1.0001f));
-        Float sin2_max = f_min(radius * radius / f_max(d2, f_set(1e-30f)), f_set(1));
-        Float one_minus_cos = sin2_max / (1.0f + f_safe_sqrt(1.0f - sin2_max));
-        Float drop = u.x * one_minus_cos; // 1 - cos of the sampled angle
-        Float cos_theta = 1.0f - drop, sin2 = drop * (2.0f - drop);
-        Float sine, cosine;
-        f_sincos(TWO_PI * u.y, &sine, &cosine);
-        Frame frame = frame_from_normal(v3_select(outside, v3_scale(to_centre, f_safe_rcp(distance)), v3(f_set(0), f_set(0), f_set(1))));
-        Float sin_theta = f_safe_sqrt(sin2);
-        Vec3 cone = frame_to_world(&frame, v3(sin_theta * cosine, sin_theta * sine, cos_theta));
-        Float t_hit = distance * cos_theta - f_safe_sqrt(radius * radius - d2 * sin2);
-        Vec3 outside_point = v3_madd(ref, t_hit, cone);
-        Vec3 inside_point = v3_madd(centre, f_set(radius), warp_uniform_sphere(u));
-        hit.p = v3_select(outside, outside_point, inside_point);
-        hit.shape = i_set(e->shape);
-        hit.prim = i_set(0);
-        hit.u = hit.v = f_set(0);
-        Interaction si = sphere_interaction(scene, shape->flags, &hit);
-        Vec3 to_light = v3_sub(si.p, ref);
-        Float r2 = v3_dot(to_light, to_light);
-        s.distance = f_sqrt(r2);
-        s.d = v3_scale(to_light, f_safe_rcp(s.distance));
-        Float cos_light = -v3_dot(s.d, si.ng);
-        s.pdf = f_select(outside, f_safe_rcp(TWO_PI * one_minus_cos), r2 * f_safe_rcp(f_abs(cos_light) * shape->area));
-        s.uv = si.uv;
-        s.prim = hit.prim;
-        s.valid = m_gt(cos_light, f_set(0)) & m_gt(s.pdf, f_set(0));
-        return s;
-    }
-    Interaction si;
-    if (shape->kind == SHAPE_DISK) {
-        Vec2 q = warp_uniform_disk(u);
-        const float *t = scene->tables + shape->table;
-        hit.shape = i_set(e->shape);
-        hit.prim = i_set(0);
-        hit.u = hit.v = f_set(0);
-        hit.p = v3(q.x * t[0] + q.y * t[1] + t[3], q.x * t[4] + q.y * t[5] + t[7], q.x * t[8] + q.y * t[9] + t[11]);
-        si = disk_interaction(scene, shape->flags, &hit);
-    } else {
-        hit = mesh_sample(scene, shape, e->shape, u);
-        si = mesh_interaction(scene, shape->flags, &hit);
-    }
+    Hit hit = shape_sample(scene, e->shape, ref, u);
+    Interaction si = shape_interaction(scene, shape->kind, shape->flags, &hit);
     Vec3 to_light = v3_sub(si.p, ref);
     Float r2 = v3_dot(to_light, to_light);
     s.distance = f_sqrt(r2);
     s.d = v3_scale(to_light, f_safe_rcp(s.distance));
-    Float cos_light = f_abs(v3_dot(s.d, si.ng));
-    s.pdf = r2 * f_safe_rcp(cos_light * shape->area);
+    s.pdf = shape_pdf(scene, e->shape, ref, s.d, &si);
     s.uv = e->attributes ? (Vec2){hit.u, hit.v} : si.uv;
     s.prim = hit.prim;
-    s.valid = m_lt(v3_dot(s.d, si.sh.n), f_set(0)) & m_gt(cos_light, f_set(1e-7f)) & m_gt(r2, f_set(0));
+    s.valid = m_lt(v3_dot(s.d, si.sh.n), f_set(0)) & m_gt(f_abs(v3_dot(s.d, si.ng)), f_set(1e-7f)) &
+              m_gt(r2, f_set(0)) & m_gt(s.pdf, f_set(0));
     return s;
 }
 
 // Density with which area_sample picks the direction d from ref to the point si of the light's shape.
 KFN Float area_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 ref, Vec3 d, const Interaction *si) {
-    const ShapeRecord *shape = scene->shapes + e->shape;
-    Vec3 to_light = v3_sub(si->p, ref);
-    Float r2 = v3_dot(to_light, to_light);
-    Float pdf = r2 * f_safe_rcp(f_abs(v3_dot(d, si->ng)) * shape->area);
-    if (shape->kind == SHAPE_SPHERE) {
-        const float *t = scene->tables + shape->table;
-        Vec3 to_centre = v3_sub(v3(f_set(t[0]), f_set(t[1]), f_set(t[2])), ref);
-        Float d2 = v3_dot(to_centre, to_centre);
-        Mask outside = m_gt(f_sqrt(d2), f_set(t[3] * 1.0001f));
-        Float sin2_max = f_min((real)t[3] * (real)t[3] / f_max(d2, f_set(1e-30f)), f_set(1));
-        Float one_minus_cos = sin2_max / (1.0f + f_safe_sqrt(1.0f - sin2_max));
-        pdf = f_select(outside, f_safe_rcp(TWO_PI * one_minus_cos), pdf);
-    }
-    return pdf;
+    return shape_pdf(scene, e->shape, ref, d, si);
 }
 
 // ---- environment -------------------------------------------------------------------------------------------------

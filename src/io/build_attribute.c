@@ -1,6 +1,8 @@
 // build_attribute.c: attributes of meshes, the textures that read them, and the table that brings them together.
 #include "io/build_attribute.h"
 
+#include "shape/shape.h"
+
 #include <string.h>
 
 rey_result build_mesh_attribute(Builder *b, const rey_mesh_attribute *attribute, int32_t id, const char *path,

@@ -1,6 +1,7 @@
 // build_shape.c: shapes, and the shading groups that they fall into.
 #include "io/build.h"
 #include "io/build_attribute.h"
+#include "shape/shape.h"
 #include "shape/update.h"
 
 #include <string.h>
@@ -11,7 +12,7 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "obj", "ply", "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
@@ -199,50 +200,89 @@ static rey_result build_posed_mesh(Builder *b, bool cube, int32_t id, const char
     return REY_OK;
 }
 
-// Sphere: centre and radius become part of the pose.
-static rey_result sphere_pose(Builder *b, rey_xml_node *node, double m[16]) {
-    double centre[3] = {0, 0, 0}, radius;
-    TRY(rey_xml_get_vec3(b->ctx, node, "center", centre, centre));
-    TRY(rey_xml_get_float(b->ctx, node, "radius", 1, &radius));
-    if (!(radius > 0)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the radius is %g, expected a positive number", radius);
-    }
-    for (int k = 0; k < 3; k++) {
-        m[4 * k + 3] += m[4 * k] * centre[0] + m[4 * k + 1] * centre[1] + m[4 * k + 2] * centre[2];
-    }
-    for (int k = 0; k < 3; k++) {
-        for (int c = 0; c < 3; c++) {
-            m[4 * k + c] *= radius;
+// A plugin of one surface that follows to_world, from shape/kinds.inl.
+typedef struct PosedParam {
+    bool point; // three numbers, else one positive number
+    const char *name;
+    double value[3];
+} PosedParam;
+
+typedef struct PosedPlugin {
+    const char *name;
+    int32_t kind, table;
+    bool (*fold)(const double *values, double m[16]);
+    PosedParam params[4];
+} PosedPlugin;
+
+static const PosedPlugin *posed_plugin(const char *name) {
+    static const PosedPlugin plugins[] = {
+        {NULL, 0, 0, NULL, {{0}}},
+#define FORM_POINT true
+#define FORM_LENGTH false
+#define POSED_PARAM(form, field, x, y, z, text) {FORM_##form, #field, {x, y, z}},
+#define SHAPE_MESH_KIND(ENUM, prefix)
+#define SHAPE_POSED(ENUM, prefix, form, plugin, PARAMS)                                                                \
+    {plugin, SHAPE_##ENUM, ENUM##_TABLE, prefix##_fold, {PARAMS(POSED_PARAM){false, NULL, {0}}}},
+#include "shape/kinds.inl"
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED
+    };
+    for (int i = 1; i < COUNT_OF(plugins); i++) {
+        if (strcmp(plugins[i].name, name) == 0) {
+            return &plugins[i];
         }
+    }
+    return NULL;
+}
+
+// The plugin's own parameters become part of the pose.
+static rey_result posed_fold(Builder *b, rey_xml_node *node, const PosedPlugin *plugin, double m[16]) {
+    double values[12];
+    int n = 0;
+    for (const PosedParam *p = plugin->params; p->name; p++) {
+        if (p->point) {
+            TRY(rey_xml_get_vec3(b->ctx, node, p->name, p->value, values + n));
+            n += 3;
+            continue;
+        }
+        TRY(rey_xml_get_float(b->ctx, node, p->name, p->value[0], &values[n]));
+        if (!(values[n] > 0)) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the %s is %g, expected a positive number", p->name,
+                                values[n]);
+        }
+        n++;
+    }
+    if (!plugin->fold(values, m)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the %s has no extent", node->type);
     }
     return REY_OK;
 }
 
-static rey_result build_analytic(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
+static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
     double m[16];
-    bool sphere = strcmp(node->type, "sphere") == 0, disk = strcmp(node->type, "disk") == 0;
+    const PosedPlugin *plugin = posed_plugin(node->type);
     TRY(rey_xml_get_transform(b->ctx, node, "to_world", m));
-    if (sphere) {
-        TRY(sphere_pose(b, node, m));
+    if (plugin) {
+        TRY(posed_fold(b, node, plugin, m));
     }
     if (determinant(m) == 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
     }
     Param pose = {PARAM_DEFAULTS, .terms = GEOMETRY_TERMS, .why = moving_why, .geometry = id};
     TRY(build_pose(b, m, path, pose, &shape->to_world));
-    if (sphere || disk) {
-        shape->kind = sphere ? SHAPE_SPHERE : SHAPE_DISK;
-        if (sphere && determinant(m) < 0) {
-            shape->flags ^= SHAPE_FLIP_NORMALS;
-        }
-        // Embree reads a sphere's centre and radius from here by one load of 16 bytes, which must be aligned.
-        Array *tables = &b->scene->build.tables;
-        int32_t padding = (int32_t)(-tables->count % 4);
-        int32_t first = rey_scene_append(b->scene, tables, sizeof(float), padding + (sphere ? 13 : 24));
-        shape->table = first + padding;
-        return first >= 0 ? REY_OK : REY_ERROR_MEMORY;
+    if (!plugin) {
+        return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
     }
-    return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
+    shape->kind = plugin->kind;
+    if (plugin->kind == SHAPE_SPHERE && determinant(m) < 0) {
+        shape->flags ^= SHAPE_FLIP_NORMALS;
+    }
+    // Embree reads a sphere's centre and radius from here by one load of 16 bytes, which must be aligned.
+    Array *tables = &b->scene->build.tables;
+    int32_t padding = (int32_t)(-tables->count % 4);
+    int32_t first = rey_scene_append(b->scene, tables, sizeof(float), padding + plugin->table);
+    shape->table = first + padding;
+    return first >= 0 ? REY_OK : REY_ERROR_MEMORY;
 }
 
 static rey_result assign_group(Builder *b, ShapeRecord *shape) {
@@ -309,9 +349,8 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     shape.flags = flip ? SHAPE_FLIP_NORMALS : 0;
     if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
         TRY(build_mesh(b, node, id, path, &shape));
-    } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 ||
-               strcmp(node->type, "sphere") == 0 || strcmp(node->type, "disk") == 0) {
-        TRY(build_analytic(b, node, id, path, &shape));
+    } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {
+        TRY(build_posed(b, node, id, path, &shape));
     } else {
         return build_unknown(b, node, shape_word, NULL);
     }

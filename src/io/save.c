@@ -111,7 +111,7 @@ static void write_constants(Writer *w, int depth, const rey_xml_node *node) {
 // Properties that constants, poses or data files stand for now.
 static bool is_replaced(const Writer *w, const rey_xml_node *node, const char *name) {
     static const char *const anywhere[] = {"to_world", "material", "ext_ior", "filename", "raw", "to_uv", "position",
-                                           "center", "radius", "shape_index", "flip_tex_coords", "face_normals", "fov", "fov_axis",
+                                           "center", "radius", "p0", "p1", "shape_index", "flip_tex_coords", "face_normals", "fov", "fov_axis",
                                            "focal_length", "principal_point_offset_x", "principal_point_offset_y",
                                            "alpha", "alpha_u", "alpha_v"};
     for (int i = 0; i < COUNT_OF(anywhere); i++) {

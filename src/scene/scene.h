@@ -30,20 +30,18 @@ typedef struct BsdfNode {
     int32_t table;               // first derived value in `tables`, -1 = none
 } BsdfNode;
 
-// Analytic kinds hit through their own geometry; rectangle and cube are meshes whose vertices follow to_world.
-enum { SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK };
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4 };
 // Host only: the vertex normals were computed from the positions and follow them.
 enum { SHAPE_SMOOTH_NORMALS = 8 };
 
 typedef struct ShapeRecord {
-    int32_t kind, flags, group, bsdf, emitter;
+    int32_t kind, flags, group, bsdf, emitter; // kind: shape/kinds.inl
     int32_t interior, exterior;              // media, -1 = vacuum
     int32_t triangle, triangle_count;        // in `triangles`, counted in triangles
     int32_t vertex_count, welded;            // welded: first entry in `welded`
     int32_t positions, normals, uvs;         // theta offsets, -1 = none
     int32_t to_world;                        // theta offset of a row-major 4 x 4 matrix, -1 = vertices are in the world
-    int32_t table;                           // sphere: centre, radius, then frame; disk: 12 of to_world, 12 of its inverse
+    int32_t table;                           // what the kind derives from to_world
     int32_t area_cdf;                        // tables offset: triangle_count cumulative areas (mesh emitters), -1 = none
     float area;                              // surface area [scene units^2]
 } ShapeRecord;

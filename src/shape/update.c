@@ -2,31 +2,9 @@
 #include "shape/update.h"
 
 #include "shape/normals.h"
+#include "shape/shape.h"
 
 #include <string.h>
-
-double rey_affine_determinant(const float m[16]) {
-    double a = m[0], b = m[1], c = m[2], d = m[4], e = m[5], f = m[6], g = m[8], h = m[9], i = m[10];
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
-}
-
-bool rey_affine_inverse(const float m[16], double r[12]) {
-    double det = rey_affine_determinant(m);
-    if (!(fabs(det) > 1e-300)) {
-        return false;
-    }
-    double s = 1 / det;
-    double a = m[0], b = m[1], c = m[2], d = m[4], e = m[5], f = m[6], g = m[8], h = m[9], i = m[10];
-    double n[9] = {e * i - f * h, c * h - b * i, b * f - c * e, f * g - d * i, a * i - c * g,
-                   c * d - a * f, d * h - e * g, b * g - a * h, a * e - b * d};
-    for (int row = 0; row < 3; row++) {
-        for (int col = 0; col < 3; col++) {
-            r[row * 4 + col] = n[row * 3 + col] * s;
-        }
-        r[row * 4 + 3] = -(r[row * 4] * m[3] + r[row * 4 + 1] * m[7] + r[row * 4 + 2] * m[11]);
-    }
-    return true;
-}
 
 void rey_rectangle_mesh(float vertices[RECTANGLE_VERTICES][8], int32_t triangles[RECTANGLE_TRIANGLES][3]) {
     for (int i = 0; i < 4; i++) {
@@ -99,43 +77,6 @@ static rey_result mesh_follow(rey_scene *scene, const ShapeRecord *shape) {
     return REY_OK;
 }
 
-// Sphere: centre, radius, rows of the inverse rotation.
-static rey_result sphere_follow(rey_scene *scene, ShapeRecord *shape) {
-    const float *m = scene->view.theta + shape->to_world;
-    float *t = scene->view.tables + shape->table;
-    double inverse[12];
-    if (!rey_affine_inverse(m, inverse)) {
-        return rey_fail(scene->ctx, REY_ERROR_SCENE, "a sphere's to_world cannot be inverted");
-    }
-    double radius = sqrt((double)m[0] * m[0] + (double)m[4] * m[4] + (double)m[8] * m[8]);
-    for (int k = 0; k < 3; k++) {
-        t[k] = m[4 * k + 3];
-        for (int c = 0; c < 3; c++) {
-            t[4 + 3 * k + c] = (float)(inverse[4 * k + c] * radius);
-        }
-    }
-    t[3] = (float)radius;
-    shape->area = (float)(4 * 3.14159265358979323846 * radius * radius);
-    return REY_OK;
-}
-
-static rey_result disk_follow(rey_scene *scene, ShapeRecord *shape) {
-    const float *m = scene->view.theta + shape->to_world;
-    float *t = scene->view.tables + shape->table;
-    double inverse[12];
-    if (!rey_affine_inverse(m, inverse)) {
-        return rey_fail(scene->ctx, REY_ERROR_SCENE, "a disk's to_world cannot be inverted");
-    }
-    for (int k = 0; k < 12; k++) {
-        t[k] = m[k];
-        t[12 + k] = (float)inverse[k];
-    }
-    double x[3] = {m[0], m[4], m[8]}, y[3] = {m[1], m[5], m[9]};
-    double n[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
-    shape->area = (float)(3.14159265358979323846 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]));
-    return REY_OK;
-}
-
 static double triangle_area(const SceneView *view, const ShapeRecord *shape, int32_t triangle) {
     const int32_t *t = view->triangles + 3 * (shape->triangle + triangle);
     const float *p = view->theta + shape->positions;
@@ -176,14 +117,31 @@ static rey_result smooth_normals(rey_scene *scene, const ShapeRecord *shape) {
     return REY_OK;
 }
 
+// What a shape of one surface derives from its pose.
+static rey_result posed_follow(rey_scene *scene, ShapeRecord *shape) {
+    const float *m = scene->view.theta + shape->to_world;
+    float *t = scene->view.tables + shape->table;
+    bool regular = true;
+    switch (shape->kind) {
+#define SHAPE_MESH_KIND(ENUM, prefix)
+#define SHAPE_POSED(ENUM, prefix, ...)                                                                                 \
+    case SHAPE_##ENUM:                                                                                                 \
+        regular = prefix##_follow(m, t, &shape->area);                                                                 \
+        break;
+#include "shape/kinds.inl"
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED
+    default:
+        break;
+    }
+    return regular ? REY_OK : rey_fail(scene->ctx, REY_ERROR_SCENE, "a shape's to_world cannot be inverted");
+}
+
 rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     ShapeRecord *shape = scene->view.shapes + id;
     rey_result result = REY_OK;
-    if (shape->kind == SHAPE_SPHERE) {
-        return sphere_follow(scene, shape);
-    }
-    if (shape->kind == SHAPE_DISK) {
-        return disk_follow(scene, shape);
+    if (shape->kind != SHAPE_MESH) {
+        return posed_follow(scene, shape);
     }
     if (shape->to_world >= 0 && (scene->dirty_shapes[id] & SHAPE_DIRTY_POSE)) {
         result = mesh_follow(scene, shape);

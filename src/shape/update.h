@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene/scene.h"
+#include "shape/affine.h"
 
 // Brings a shape's derived data up to date: vertices of rectangles and cubes, tables of spheres and disks, area and
 // cumulative triangle areas of mesh emitters.
@@ -11,7 +12,3 @@ rey_result rey_shape_update(rey_scene *scene, int32_t shape);
 enum { RECTANGLE_VERTICES = 4, RECTANGLE_TRIANGLES = 2, CUBE_VERTICES = 24, CUBE_TRIANGLES = 12 };
 void rey_rectangle_mesh(float vertices[RECTANGLE_VERTICES][8], int32_t triangles[RECTANGLE_TRIANGLES][3]);
 void rey_cube_mesh(float vertices[CUBE_VERTICES][8], int32_t triangles[CUBE_TRIANGLES][3]);
-
-// Inverse of a row-major affine 4 x 4; false when singular.
-bool rey_affine_inverse(const float m[16], double inverse[12]);
-double rey_affine_determinant(const float m[16]);

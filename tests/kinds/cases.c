@@ -3,6 +3,7 @@
 
 #include "emitter/update.h"
 #include "shape/update.h"
+#include "shape/shape.h"
 
 static const double roughness_extremes[] = {1e-3, 0.05, 0.5, 1};
 
@@ -176,7 +177,7 @@ void case_set(KindCase *c, const char *name, double value) {
 
 // ---- lights ------------------------------------------------------------------------------------------------------
 
-const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "point", "constant", "envmap"};
+const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "cylinder", "point", "constant", "envmap"};
 
 static const ParamDesc radiance = {PARAM_SPEC, "radiance", 1, 0, INFINITY, "", ""};
 
@@ -239,6 +240,18 @@ static void make_disk(KindCase *c, const double rotation[9], double radius) {
     }
 }
 
+// An elliptic one, so that its points are not uniform over the area.
+static void make_cylinder(KindCase *c, const double rotation[9], const double scale[2]) {
+    const double s[3] = {0.5 * scale[0], 0.3 * scale[0], 0.5 * scale[1]};
+    c->shapes[0] = (CaseShape){.kind = SHAPE_CYLINDER, .area = 1};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            c->tables[4 * i + j] = rotation[3 * i + j] * s[j];
+            c->tables[12 + 4 * i + j] = rotation[3 * j + i] / s[i];
+        }
+    }
+}
+
 void case_update_light(KindCase *c) {
     if (c->emitter.kind != EMITTER_ENVMAP) {
         return;
@@ -284,10 +297,10 @@ static void make_envmap(KindCase *c, Random *r, const double rotation[9]) {
 }
 
 void case_make_light(KindCase *c, Random *r, int light, bool textured) {
-    static const int kinds[LIGHT_COUNT] = {EMITTER_AREA,  EMITTER_AREA,     EMITTER_AREA,
+    static const int kinds[LIGHT_COUNT] = {EMITTER_AREA,  EMITTER_AREA,     EMITTER_AREA, EMITTER_AREA,
                                            EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP};
     *c = (KindCase){.coat_eta = -1, .coat_alpha = -1, .emitter_count = 1, .shape_count = 1};
-    c->emitter = (CaseEmitter){.kind = kinds[light], .shape = light <= LIGHT_DISK ? 0 : -1, .scale = -1};
+    c->emitter = (CaseEmitter){.kind = kinds[light], .shape = light <= LIGHT_CYLINDER ? 0 : -1, .scale = -1};
     double rotation[9], scale[2] = {between(r, 0.3, 2), between(r, 0.3, 2)};
     random_rotation(r, rotation);
     if (light == LIGHT_ENVMAP) {
@@ -301,6 +314,8 @@ void case_make_light(KindCase *c, Random *r, int light, bool textured) {
         make_sphere(c, rotation, scale[0]);
     } else if (light == LIGHT_DISK) {
         make_disk(c, rotation, scale[0]);
+    } else if (light == LIGHT_CYLINDER) {
+        make_cylinder(c, rotation, scale);
     } else {
         const double position[3] = {0.3, -0.2, 0.5};
         c->emitter.position = c->theta_count;

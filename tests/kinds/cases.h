@@ -32,7 +32,7 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured);
 // Number of combinations of a kind's switches.
 int case_variants(int kind);
 // Scenes with one light: every kind of light, and of shape for area lights.
-enum { LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_DISK, LIGHT_POINT, LIGHT_CONSTANT, LIGHT_ENVMAP, LIGHT_COUNT };
+enum { LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_DISK, LIGHT_CYLINDER, LIGHT_POINT, LIGHT_CONSTANT, LIGHT_ENVMAP, LIGHT_COUNT };
 extern const char *const light_names[LIGHT_COUNT];
 void case_make_light(KindCase *c, Random *r, int light, bool textured);
 // Brings derived tables up to date with theta (environment maps).

@@ -288,6 +288,19 @@ static Mask meet_shape(const SceneView *scene, int32_t id, Vec3 o, Vec3 d, Hit *
         hit->p = v3_madd(o, distance, d);
         return m_gt(q, f_set(0)) & m_gt(distance, f_set(0));
     }
+    if (shape->kind == SHAPE_CYLINDER) {
+        real at[LANES];
+        for (int lane = 0; lane < LANES; lane++) {
+            float from[3] = {(float)f_lane(o.x, lane), (float)f_lane(o.y, lane), (float)f_lane(o.z, lane)};
+            float along[3] = {(float)f_lane(d.x, lane), (float)f_lane(d.y, lane), (float)f_lane(d.z, lane)};
+            double local_o[3], local_d[3];
+            pose_ray(t, from, along, local_o, local_d);
+            at[lane] = (real)cylinder_meet(t, local_o, local_d, 0, INFINITY);
+        }
+        Float distance = f_load(at);
+        hit->p = v3_madd(o, distance, d);
+        return m_gt(distance, f_set(0));
+    }
     const float *r = t + 12; // rows of the inverse
     Float oz = r[8] * o.x + r[9] * o.y + r[10] * o.z + r[11], dz = r[8] * d.x + r[9] * d.y + r[10] * d.z;
     Float distance = -oz * f_safe_rcp(dz);

@@ -1,0 +1,8 @@
+// affine.h: affine matrices, row-major 4 x 4.
+#pragma once
+
+#include <stdbool.h>
+
+// Inverse of a row-major affine 4 x 4; false when singular.
+bool rey_affine_inverse(const float m[16], double inverse[12]);
+double rey_affine_determinant(const float m[16]);

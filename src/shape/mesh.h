@@ -1,0 +1,100 @@
+// mesh.h: triangle meshes: interaction with its adjoint in the vertex normals, and uniform sampling of their area.
+// Points are rebuilt from barycentrics, A + (u e1 + v e2), which is the most precise form in float.
+#pragma once
+
+#include "shape/interaction.h"
+
+KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+    Interaction si;
+    Corners c = mesh_corners(scene, hit->shape, hit->prim);
+    Int positions = SHAPE_FIELD(scene, hit->shape, positions);
+    Vec3 a = theta_v3(scene, positions + c.i[0] * 3);
+    Vec3 e1 = v3_sub(theta_v3(scene, positions + c.i[1] * 3), a);
+    Vec3 e2 = v3_sub(theta_v3(scene, positions + c.i[2] * 3), a);
+    Float w = 1.0f - hit->u - hit->v;
+    si.p = v3_add(a, v3_add(v3_scale(e1, hit->u), v3_scale(e2, hit->v)));
+    si.ng = v3_normalize(v3_cross(e1, e2));
+    si.uv = (Vec2){hit->u, hit->v};
+    si.dp_du = e1;
+    if (flags & SHAPE_HAS_UVS) {
+        Int uvs = SHAPE_FIELD(scene, hit->shape, uvs);
+        Float u[3], v[3];
+        for (int k = 0; k < 3; k++) {
+            u[k] = theta_at(scene, uvs + c.i[k] * 2);
+            v[k] = theta_at(scene, uvs + c.i[k] * 2 + 1);
+        }
+        si.uv.x = w * u[0] + hit->u * u[1] + hit->v * u[2];
+        si.uv.y = w * v[0] + hit->u * v[1] + hit->v * v[2];
+        // [e1 e2] = [dp_du dp_dv] J, solved for dp_du
+        Float du1 = u[1] - u[0], du2 = u[2] - u[0], dv1 = v[1] - v[0], dv2 = v[2] - v[0];
+        Float det = du1 * dv2 - dv1 * du2;
+        Mask usable = m_gt(f_abs(det), f_set(1e-20f));
+        Float r = 1.0f / f_select(usable, det, f_set(1));
+        Vec3 t = v3_scale(v3_madd(v3_scale(e1, dv2), -dv1, e2), r);
+        si.dp_du = v3_select(usable, t, e1);
+    }
+    Vec3 n = si.ng;
+    if (flags & SHAPE_HAS_NORMALS) {
+        Int normals = SHAPE_FIELD(scene, hit->shape, normals);
+        Vec3 sum = v3_scale(theta_v3(scene, normals + c.i[0] * 3), w);
+        sum = v3_madd(sum, hit->u, theta_v3(scene, normals + c.i[1] * 3));
+        sum = v3_madd(sum, hit->v, theta_v3(scene, normals + c.i[2] * 3));
+        n = v3_normalize(sum);
+        n = v3_select(m_gt(v3_dot(n, n), f_set(0.5f)), n, si.ng);
+    }
+    if (flags & SHAPE_FLIP_NORMALS) {
+        n = v3_neg(n);
+        si.ng = v3_neg(si.ng);
+    }
+    si.sh = frame_from_tangent(n, si.dp_du);
+    return si;
+}
+
+// Accumulates the adjoint df of the shading frame into the vertex normals of the mesh.
+KFN void mesh_interaction_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                              const Frame *df, Sink *sink, Mask m) {
+    if (!(flags & SHAPE_HAS_NORMALS)) {
+        return;
+    }
+    Corners c = mesh_corners(scene, hit->shape, hit->prim);
+    Int normals = SHAPE_FIELD(scene, hit->shape, normals);
+    Float w[3] = {1.0f - hit->u - hit->v, hit->u, hit->v};
+    Vec3 dn = v3_zero(), dsum = v3_zero(), sum = v3_zero();
+    frame_from_tangent_adj(&si->sh, si->dp_du, df, &dn);
+    // n = +- normalize(sum), sum = sum_k w_k n_k
+    if (flags & SHAPE_FLIP_NORMALS) {
+        dn = v3_neg(dn);
+    }
+    for (int k = 0; k < 3; k++) {
+        sum = v3_madd(sum, w[k], theta_v3(scene, normals + c.i[k] * 3));
+    }
+    v3_normalize_adj(sum, dn, &dsum);
+    Int begin = i_gather(sink->normals_at, hit->shape);
+    m = m & mi_lt(i_set(-1), begin);
+    begin = i_max(begin, i_set(0));
+    for (int k = 0; k < 3; k++) {
+        Int at = i_select(m, begin + c.i[k] * 3, i_set(0));
+        sink_add(sink, at, w[k] * dsum.x, m);
+        sink_add(sink, at + 1, w[k] * dsum.y, m);
+        sink_add(sink, at + 2, w[k] * dsum.z, m);
+    }
+}
+
+// Uniform over the area: triangle by binary search in the cumulative areas, then uniform inside it.
+KFN Hit mesh_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
+    const ShapeRecord *shape = scene->shapes + id;
+    UNUSED(ref);
+    Float mass;
+    Hit hit;
+    hit.shape = i_set(id);
+    hit.prim = cdf_search(scene, i_set(shape->area_cdf), shape->triangle_count, u.x, &u.x, &mass);
+    Float root = f_sqrt(1.0f - u.x);
+    hit.u = 1.0f - root;
+    hit.v = u.y * root;
+    hit.p = v3_zero();
+    return hit;
+}
+
+KFN Float mesh_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
+    return area_density(ref, d, si, f_set(scene->shapes[id].area));
+}

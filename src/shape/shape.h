@@ -1,0 +1,62 @@
+// shape.h: dispatch over the kinds of surface, generated from kinds.inl. Kind and flags are uniform over the lanes: they
+// are part of the shading group.
+#pragma once
+
+#include "shape/cylinder.h"
+#include "shape/disk.h"
+#include "shape/mesh.h"
+#include "shape/sphere.h"
+
+// Parameters of a plugin that are folded into its pose: P(form, name, x, y, z, description), form POINT (three numbers)
+// or LENGTH (one positive number).
+#define NO_SHAPE_PARAMS(P)
+
+enum {
+#define SHAPE_MESH_KIND(ENUM, prefix) SHAPE_##ENUM,
+#define SHAPE_POSED(ENUM, prefix, ...) SHAPE_##ENUM,
+#include "shape/kinds.inl"
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED
+    SHAPE_KIND_COUNT
+};
+
+#define SHAPE_MESH_KIND SHAPE_CASE
+#define SHAPE_POSED SHAPE_CASE
+
+KFN Interaction shape_interaction(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit) {
+    switch (kind) {
+#define SHAPE_CASE(ENUM, prefix, ...)                                                                                  \
+    case SHAPE_##ENUM:                                                                                                 \
+        return prefix##_interaction(scene, flags, hit);
+    default:
+#include "shape/kinds.inl"
+#undef SHAPE_CASE
+    }
+}
+
+// A point of shape `id` to connect ref with.
+KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
+    switch (scene->shapes[id].kind) {
+#define SHAPE_CASE(ENUM, prefix, ...)                                                                                  \
+    case SHAPE_##ENUM:                                                                                                 \
+        return prefix##_sample(scene, id, ref, u);
+    default:
+#include "shape/kinds.inl"
+#undef SHAPE_CASE
+    }
+}
+
+// Density per solid angle with which shape_sample finds the point si along d.
+KFN Float shape_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
+    switch (scene->shapes[id].kind) {
+#define SHAPE_CASE(ENUM, prefix, ...)                                                                                  \
+    case SHAPE_##ENUM:                                                                                                 \
+        return prefix##_pdf(scene, id, ref, d, si);
+    default:
+#include "shape/kinds.inl"
+#undef SHAPE_CASE
+    }
+}
+
+#undef SHAPE_MESH_KIND
+#undef SHAPE_POSED

@@ -1,0 +1,101 @@
+// sphere.h: spheres. Table: centre, radius, then the inverse rotation (rows). uv = (phi / 2 pi, theta / pi).
+#pragma once
+
+#include "math/warp.h"
+#include "shape/pose.h"
+
+enum { SPHERE_TABLE = 13 };
+#define SPHERE_PARAMS(P)                                                                                               \
+    P(POINT, center, 0, 0, 0, "centre")                                                                                \
+    P(LENGTH, radius, 1, 0, 0, "radius")
+
+// Centre and radius become part of the pose. v: the parameters' numbers in order.
+static inline bool sphere_fold(const double *v, double m[16]) {
+    pose_translate(m, v);
+    pose_scale(m, v[3], v[3], v[3]);
+    return true;
+}
+
+static inline bool sphere_follow(const float m[16], float *t, float *area) {
+    double inverse[12];
+    if (!rey_affine_inverse(m, inverse)) {
+        return false;
+    }
+    double radius = sqrt((double)m[0] * m[0] + (double)m[4] * m[4] + (double)m[8] * m[8]);
+    for (int k = 0; k < 3; k++) {
+        t[k] = m[4 * k + 3];
+        for (int c = 0; c < 3; c++) {
+            t[4 + 3 * k + c] = (float)(inverse[4 * k + c] * radius);
+        }
+    }
+    t[3] = (float)radius;
+    *area = (float)(4 * 3.14159265358979323846 * radius * radius);
+    return true;
+}
+
+KFN Interaction sphere_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+    Interaction si;
+    Int at = SHAPE_FIELD(scene, hit->shape, table);
+    Vec3 centre = table_v3(scene, at);
+    Float radius = table_at(scene, at + 3);
+    si.ng = v3_normalize(v3_sub(hit->p, centre));
+    si.p = v3_madd(centre, radius, si.ng);
+    Vec3 local = v3(v3_dot(table_v3(scene, at + 4), si.ng), v3_dot(table_v3(scene, at + 7), si.ng),
+                    v3_dot(table_v3(scene, at + 10), si.ng));
+    Float phi = f_atan2(local.y, local.x);
+    phi = f_select(m_lt(phi, f_set(0)), phi + TWO_PI, phi);
+    si.uv = (Vec2){phi * INV_TWO_PI, f_acos(local.z) * INV_PI};
+    // dp_du = 2 pi (-y, x, 0) in the sphere's frame, back to the world through the transposed rotation
+    Vec3 x = table_v3(scene, at + 4), y = table_v3(scene, at + 7);
+    si.dp_du = v3_scale(v3_madd(v3_scale(x, -local.y), local.x, y), TWO_PI * radius);
+    if (flags & SHAPE_FLIP_NORMALS) {
+        si.ng = v3_neg(si.ng);
+    }
+    si.sh = frame_from_tangent(si.ng, si.dp_du);
+    return si;
+}
+
+// The cone of directions that a sphere subtends from a point outside.
+typedef struct SphereCone {
+    Vec3 to_centre;
+    Float d2, distance, one_minus_cos;
+    Mask outside;
+} SphereCone;
+
+KFN SphereCone sphere_cone(const SceneView *scene, int32_t id, Vec3 ref) {
+    const float *t = scene->tables + scene->shapes[id].table;
+    real radius = (real)t[3];
+    SphereCone c;
+    c.to_centre = v3_sub(v3(f_set(t[0]), f_set(t[1]), f_set(t[2])), ref);
+    c.d2 = v3_dot(c.to_centre, c.to_centre);
+    c.distance = f_sqrt(c.d2);
+    c.outside = m_gt(c.distance, f_set(radius * 1.0001f));
+    Float sin2_max = f_min(radius * radius / f_max(c.d2, f_set(1e-30f)), f_set(1));
+    c.one_minus_cos = sin2_max / (1.0f + f_safe_sqrt(1.0f - sin2_max));
+    return c;
+}
+
+// Uniform in that cone, from outside; uniform over the area, from inside.
+KFN Hit sphere_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
+    const float *t = scene->tables + scene->shapes[id].table;
+    Vec3 centre = v3(f_set(t[0]), f_set(t[1]), f_set(t[2]));
+    real radius = (real)t[3];
+    SphereCone c = sphere_cone(scene, id, ref);
+    Float drop = u.x * c.one_minus_cos; // 1 - cos of the sampled angle
+    Float cos_theta = 1.0f - drop, sin2 = drop * (2.0f - drop), sine, cosine;
+    f_sincos(TWO_PI * u.y, &sine, &cosine);
+    Vec3 axis = v3_scale(c.to_centre, f_safe_rcp(c.distance));
+    Frame frame = frame_from_normal(v3_select(c.outside, axis, v3(f_set(0), f_set(0), f_set(1))));
+    Float sin_theta = f_safe_sqrt(sin2);
+    Vec3 direction = frame_to_world(&frame, v3(sin_theta * cosine, sin_theta * sine, cos_theta));
+    Float t_hit = c.distance * cos_theta - f_safe_sqrt(radius * radius - c.d2 * sin2);
+    Vec3 outside_point = v3_madd(ref, t_hit, direction);
+    Vec3 inside_point = v3_madd(centre, f_set(radius), warp_uniform_sphere(u));
+    return hit_at(id, v3_select(c.outside, outside_point, inside_point));
+}
+
+KFN Float sphere_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
+    SphereCone c = sphere_cone(scene, id, ref);
+    Float inside = area_density(ref, d, si, f_set(scene->shapes[id].area));
+    return f_select(c.outside, f_safe_rcp(TWO_PI * c.one_minus_cos), inside);
+}
