@@ -9,6 +9,7 @@
 // spec_tint are on.
 #pragma once
 
+#include "bsdf/critical.h"
 #include "bsdf/principled_lobes.h"
 
 #define PRINCIPLEDTHIN_PARAMS(P)                                                                                       \
@@ -106,7 +107,7 @@ KFN Float principledthin_pdf(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe
     Float pdf = f_select(t.reflects, lobes[THIN_MATTE], lobes[THIN_THROUGH]) * f_abs(t.wo.z) * INV_PI;
     if (m_any(m_gt(clear, f_set(0)))) {
         // wi and the mirrored wo make the same angle with m.
-        Float facets = microfacet_pdf(&t.mf, t.wi, t.m) * f_safe_rcp(4.0f * v3_dot(v3_sub(t.h, t.wi), t.m));
+        Float facets = interface_pdf(&t.mf, t.wi, t.m, p->eta, p->floor) * f_safe_rcp(4.0f * v3_dot(v3_sub(t.h, t.wi), t.m));
         pdf = pdf + f_zero_unless(t.visible, clear * facets);
     }
     return f_zero_unless(t.counts, pdf);
@@ -118,9 +119,11 @@ KFN BsdfSample principledthin_sample(const PrincipledThin *p, Vec3 wi, Float u1,
     Float first = lobes[THIN_REFLECTION], second = first + lobes[THIN_TRANSMISSION], third = second + lobes[THIN_MATTE];
     Mask reflected = m_lt(u1, first), clear = m_lt(u1, second), matte = m_lt(u1, third);
     Microfacet mf = principled_facets(p->roughness * principledthin_scale(reflected, p->eta), p->anisotropic);
-    Vec3 up = v3_scale(wi, side), m = microfacet_sample(&mf, up, u2.x, u2.y), wo = reflect(up, m);
+    // A random number of its own for the chosen one of the first two lobes.
+    Float inner = f_select(reflected, u1 * f_safe_rcp(first), (u1 - first) * f_safe_rcp(lobes[THIN_TRANSMISSION]));
+    Vec3 up = v3_scale(wi, side), m = interface_sample(&mf, up, p->eta, p->floor, &inner, u2), wo = reflect(up, m);
     // Directions on the wrong side, or that see the facet from the wrong side, have no density.
-    Mask good = m_gt(wo.z, f_set(0)) & m_gt(v3_dot(up, m), f_set(0));
+    Mask good = m_gt(wo.z, f_set(0)) & m_gt(v3_dot(up, m), f_set(0)) & m_gt(m.z, f_set(0));
     wo.z = f_select(reflected, wo.z, -wo.z);
     good = good & (reflected | m_lt(v3_dot(wo, m), f_set(0)));
     wo.z = f_zero_unless(good, wo.z);

@@ -3,6 +3,7 @@
 // From the front side only.
 #pragma once
 
+#include "bsdf/critical.h"
 #include "bsdf/plastic.h"
 #include "math/microfacet.h"
 
@@ -80,14 +81,15 @@ KFN Float roughplastic_pdf(const RoughPlastic *p, Vec3 wi, Vec3 wo, Int lobe) {
     Microfacet mf = roughplastic_facets(p);
     Vec3 m = v3_normalize(v3_add(wi, wo));
     Float q = roughplastic_probability(p, wi);
-    Float coat = microfacet_pdf(&mf, wi, m) * f_safe_rcp(4.0f * v3_dot(wo, m));
+    Float coat = interface_pdf(&mf, wi, m, p->eta, p->floor) * f_safe_rcp(4.0f * v3_dot(wo, m));
     return f_zero_unless(roughplastic_counts(wi, wo, lobe), q * coat + (1.0f - q) * wo.z * INV_PI);
 }
 
 KFN BsdfSample roughplastic_sample(const RoughPlastic *p, Vec3 wi, Float u1, Vec2 u2) {
     Microfacet mf = roughplastic_facets(p);
-    Mask coat = m_lt(u1, roughplastic_probability(p, wi));
-    Vec3 wo = v3_select(coat, reflect(wi, microfacet_sample(&mf, wi, u2.x, u2.y)), warp_cosine_hemisphere(u2));
+    Float q = roughplastic_probability(p, wi), inner = u1 * f_safe_rcp(q);
+    Vec3 m = interface_sample(&mf, wi, p->eta, p->floor, &inner, u2);
+    Vec3 wo = v3_select(m_lt(u1, q), reflect(wi, m), warp_cosine_hemisphere(u2));
     return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_set(1)};
 }
 

@@ -15,7 +15,8 @@ static int index_entry(const KindCase *c) {
     const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
     for (int i = 0; i < c->theta_count; i++) {
         ParamType type = c->owner[i] >= 0 ? k->params[c->owner[i]].type : PARAM_SPEC;
-        if (type == PARAM_IOR || type == PARAM_SPECULAR) {
+        bool named = c->owner[i] >= 0 && strcmp(k->params[c->owner[i]].name, "eta") == 0;
+        if (named || type == PARAM_IOR || type == PARAM_SPECULAR) {
             return i;
         }
     }
@@ -24,17 +25,18 @@ static int index_entry(const KindCase *c) {
 }
 
 // (df/d eta)^2 / pdf d omega / (dc d phi) at the mirror direction about a normal with refracted cosine c.
+// From inside where eta > 1, from outside where eta < 1.
 static double moment_at(const KindCase *k, int entry, double eta, double sine, double c, double phi, double floor) {
-    double e = 1 / eta, a = sqrt((1 - e) * (1 + e) + e * e * c * c), r = sqrt(1 - a * a);
+    double e = fmin(eta, 1 / eta), out = eta < 1 ? 1 : -1, a = sqrt((1 - e) * (1 + e) + e * e * c * c), r = sqrt(1 - a * a);
     double cosine = sqrt(1 - sine * sine), up[3] = {sine, 0, cosine}, side[3] = {cosine, 0, -sine}, m[3];
-    Query q = {{-sine, 0, -cosine}, {0}, {0, 0}, 0};
+    Query q = {{out * sine, 0, out * cosine}, {0}, {0, 0}, 0};
     for (int i = 0; i < 3; i++) {
         m[i] = a * up[i] + r * (cos(phi) * side[i] + (i == 1 ? sin(phi) : 0));
     }
     for (int i = 0; i < 3; i++) {
-        q.wo[i] = -(2 * a * m[i] - up[i]);
+        q.wo[i] = out * (2 * a * m[i] - up[i]);
     }
-    if (m[2] <= 0 || q.wo[2] >= 0) {
+    if (m[2] <= 0 || out * q.wo[2] <= 0) {
         return 0;
     }
     KindCase copy = *k;
@@ -64,8 +66,7 @@ static void moments(const KindCase *k, double eta, double sine, double floor, do
     }
 }
 
-static void check(const char *name, int variant, const char *roughness) {
-    const double eta = 1.5;
+static void check(const char *name, int variant, const char *roughness, double eta) {
     Random r = {3};
     KindCase c;
     case_make(&c, &r, rey_bsdf_kind_find(name), variant, false);
@@ -77,10 +78,8 @@ static void check(const char *name, int variant, const char *roughness) {
     case_set(&c, "specular", eta);
     for (int i = 0; i < 3; i++) { // wi before, at and beyond the critical angle
         double plain[DECADES], guarded[DECADES];
-        moments(&c, eta, (0.8 + 0.2 * i) / eta, 0, plain);
-        moments(&c, eta, (0.8 + 0.2 * i) / eta, 0.05, guarded);
-        print_message("%s %d: decades %.3g %.3g %.3g %.3g %.3g, guarded %.3g %.3g %.3g %.3g %.3g\n", name, variant, plain[0],
-                      plain[1], plain[2], plain[3], plain[4], guarded[0], guarded[1], guarded[2], guarded[3], guarded[4]);
+        moments(&c, eta, (0.8 + 0.2 * i) * fmin(eta, 1 / eta), 0, plain);
+        moments(&c, eta, (0.8 + 0.2 * i) * fmin(eta, 1 / eta), 0.05, guarded);
         assert_true(plain[4] > 0.9 * plain[3] && plain[3] > 0);
         assert_true(guarded[4] < 0.2 * guarded[3] && guarded[3] < 0.3 * guarded[2]);
         assert_true(guarded[4] > 0);
@@ -90,16 +89,25 @@ static void check(const char *name, int variant, const char *roughness) {
 static void test_rough_dielectric(void **state) {
     UNUSED(state);
     for (int variant = 0; variant < 4; variant++) {
-        check("roughdielectric", variant, "alpha_u");
+        check("roughdielectric", variant, "alpha_u", 1.5);
+        check("roughdielectric", variant, "alpha_u", 0.7);
     }
 }
 
 static void test_principled(void **state) {
     UNUSED(state);
-    check("principled", 1, "roughness"); // the index is given itself
+    check("principled", 1, "roughness", 1.5); // the index is given itself
+    check("principled", 1, "roughness", 0.7);
+    check("principledthin", 0, "roughness", 0.7);
+}
+
+static void test_rough_plastic(void **state) {
+    UNUSED(state);
+    check("roughplastic", 1, "alpha", 0.7);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rough_dielectric), cmocka_unit_test(test_principled)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rough_dielectric), cmocka_unit_test(test_principled),
+                                       cmocka_unit_test(test_rough_plastic)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
