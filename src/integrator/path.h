@@ -178,14 +178,17 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     Mask m = v->m & s.valid & useful & m_gt(weight, f_set(0));
     Shadows *q = &t->ws.shadows;
     int32_t at = t->shadow_count;
-    Vec3 o = interaction_offset(si, s.d);
+    // The shadow ray starts off the surface and aims at the same point, or it would pass or meet the light itself.
+    Vec3 o = interaction_offset(si, s.d), to_light = v3_sub(v3_madd(si->p, s.distance, s.d), o);
+    Float length = f_sqrt(v3_dot(to_light, to_light));
+    Vec3 d = v3_scale(to_light, f_safe_rcp(length));
     f_compress(q->ox + at, o.x, m);
     f_compress(q->oy + at, o.y, m);
     f_compress(q->oz + at, o.z, m);
-    f_compress(q->dx + at, s.d.x, m);
-    f_compress(q->dy + at, s.d.y, m);
-    f_compress(q->dz + at, s.d.z, m);
-    f_compress(q->tmax + at, s.distance * (1.0f - 9e-4f), m);
+    f_compress(q->dx + at, d.x, m);
+    f_compress(q->dy + at, d.y, m);
+    f_compress(q->dz + at, d.z, m);
+    f_compress(q->tmax + at, length * (1.0f - 9e-4f), m);
     f_compress(q->lx + at, l.c[0], m);
     f_compress(q->ly + at, l.c[1], m);
     f_compress(q->lz + at, l.c[2], m);
