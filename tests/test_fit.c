@@ -178,7 +178,7 @@ static void test_optimizers_find_minimum(void **state) {
         for (int p = 0; p < PARAMETERISATION_COUNT; p++) {
             Unknown item = {.count = 1, .low = 0.01, .high = 1, .parameterisation = (Parameterisation)p};
             float start = 0.8f, value = 0;
-            double variable = 0, first = 0, second = 0, gradient = 0;
+            double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
             Unknowns u = {.items = {&item, 1, 1},
                           .count = 1,
                           .start = &start,
@@ -186,6 +186,7 @@ static void test_optimizers_find_minimum(void **state) {
                           .variable = &variable,
                           .first = &first,
                           .second = &second,
+                          .average = &average,
                           .gradient = &gradient};
             JobOptimizer o = {.kind = (OptimizerKind)kind,
                               .learning_rate = kind == OPTIMIZER_ADAM ? 0.05 : 0.1,
@@ -207,6 +208,32 @@ static void test_optimizers_find_minimum(void **state) {
             assert_true(value >= 0.01f && value <= 0.0101f);
         }
     }
+}
+
+// Steps that jump about 0.3 by +-0.1 average out, and the start at 0.8 is forgotten.
+static void test_average(void **state) {
+    UNUSED(state);
+    Unknown item = {.count = 1, .low = 0, .high = 1};
+    float start = 0.8f, value = 0;
+    double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
+    Unknowns u = {.items = {&item, 1, 1},
+                  .count = 1,
+                  .start = &start,
+                  .value = &value,
+                  .variable = &variable,
+                  .first = &first,
+                  .second = &second,
+                  .average = &average,
+                  .gradient = &gradient};
+    JobOptimizer o = {.kind = OPTIMIZER_SGD, .learning_rate = 1, .average = 4, .schedule = {.length = 1}};
+    rey_unknowns_begin(&u);
+    for (int i = 0; i < 100; i++) {
+        gradient = (double)value - (i % 2 ? 0.2 : 0.4);
+        rey_optimizer_step(&o, &u, i);
+    }
+    assert_float_equal((double)value, 0.2, 1e-5);
+    rey_unknowns_take_average(&u);
+    assert_float_equal((double)value, 0.3, 0.004);
 }
 
 static void test_tensorboard_checksum(void **state) {
@@ -361,6 +388,7 @@ int main(void) {
         cmocka_unit_test(test_loss_crosses_halves),
         cmocka_unit_test(test_optimizers_find_minimum),
         cmocka_unit_test(test_tensorboard_checksum),
+        cmocka_unit_test(test_average),
         cmocka_unit_test(test_fit_recovers),
         cmocka_unit_test(test_fit_resumes),
         cmocka_unit_test(test_damaged_checkpoint),

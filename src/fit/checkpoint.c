@@ -1,5 +1,5 @@
 // checkpoint.c: little-endian binary: magic, counts, resolved job, history, start and value as floats, variables and
-// moments as doubles, and a 64-bit FNV-1a hash of everything before it.
+// moments and averages as doubles, and a 64-bit FNV-1a hash of everything before it.
 #include "fit/checkpoint.h"
 
 #include "fit/job.h"
@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '1'};
+static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '2'};
 
 typedef struct CheckpointHeader {
     char magic[8];
@@ -30,7 +30,7 @@ typedef struct Part {
     void *data;
     size_t bytes;
 } Part;
-enum { PART_COUNT = 5 };
+enum { PART_COUNT = 6 };
 static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     size_t n = (size_t)u->count;
     parts[0] = (Part){u->start, n * sizeof(float)};
@@ -38,6 +38,7 @@ static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     parts[2] = (Part){u->variable, n * sizeof(double)};
     parts[3] = (Part){u->first, n * sizeof(double)};
     parts[4] = (Part){u->second, n * sizeof(double)};
+    parts[5] = (Part){u->average, n * sizeof(double)};
 }
 
 static void append(unsigned char *bytes, size_t *at, const void *data, size_t size) {
@@ -88,7 +89,7 @@ static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     if (h->job_bytes > most || h->numbers > most || h->rows > most || h->width > 1 << 20) {
         return false;
     }
-    uint64_t per_number = 2 * sizeof(float) + 3 * sizeof(double);
+    uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);
     uint64_t expected =
         sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number + sizeof(uint64_t);
     return expected == size;

@@ -379,7 +379,14 @@ static rey_result finish(Fit *fit, FitResult *out) {
     int window = fit->state.iteration < LOSS_WINDOW ? fit->state.iteration : LOSS_WINDOW;
     out->loss = mean_loss(&fit->state, fit->state.iteration, window);
     out->output = rey_strdup(fit->ctx, fit->output);
-    rey_result result = out->output ? save_scene(fit, out) : REY_ERROR_MEMORY;
+    rey_result result = out->output ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && fit->job.optimizer.average > 0 && fit->state.iteration > 0) {
+        rey_unknowns_take_average(&fit->unknowns);
+        result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
+    }
+    if (!result) {
+        result = save_scene(fit, out);
+    }
     if (!result) {
         result = rey_fit_table(fit, out);
     }

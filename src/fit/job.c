@@ -289,6 +289,7 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
         {.key = "beta2", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, beta2), .high = 0.99999999},
         {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, epsilon), .low = 1e-30, .high = 1e6},
         {.key = "momentum", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, momentum), .high = 0.999999},
+        {.key = "average", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, average), .high = 1e6},
         {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
         {0},
     };

@@ -55,6 +55,7 @@ typedef struct JobSchedule { // factor of every learning rate at iteration i
 typedef struct JobOptimizer {
     OptimizerKind kind;
     double learning_rate, beta1, beta2, epsilon, momentum;
+    double average; // what is found is a mean that weighs iteration t with t^average; 0 = the last iteration's values
     JobSchedule schedule;
 } JobOptimizer;
 

@@ -68,6 +68,7 @@ static void flat_optimizer(Text *t, const JobOptimizer *o) {
     } else {
         line_real(t, "optimizer.momentum", o->momentum);
     }
+    line_real(t, "optimizer.average", o->average);
     const JobSchedule *s = &o->schedule;
     line_text(t, "optimizer.schedule.type", rey_schedule_name((int)s->kind));
     if (s->kind == SCHEDULE_COSINE || s->kind == SCHEDULE_EXPONENTIAL) {

@@ -104,6 +104,14 @@ static void sgd_step(const JobOptimizer *o, const Unknown *p, double *variable, 
     }
 }
 
+// Polynomial-decay averaging [shamir2013 section 4]: needs no horizon, and forgets the start.
+static void average_values(const JobOptimizer *o, Unknowns *u, int iteration) {
+    double weight = (o->average + 1) / (iteration + 1 + o->average);
+    for (int64_t i = 0; i < u->count; i++) {
+        u->average[i] += weight * ((double)u->value[i] - u->average[i]);
+    }
+}
+
 double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
     double factor = rey_schedule_factor(&o->schedule, iteration), norm = 0;
     for (size_t k = 0; k < u->items.count; k++) {
@@ -127,5 +135,15 @@ double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
             u->value[p->offset + i] = round_inside(p, x);
         }
     }
+    average_values(o, u, iteration);
     return sqrt(norm);
+}
+
+void rey_unknowns_take_average(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            u->value[i] = round_inside(p, u->average[i]);
+        }
+    }
 }

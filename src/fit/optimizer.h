@@ -23,6 +23,7 @@ typedef struct Unknowns {
     float *start, *value;   // as the scene holds them
     double *variable;       // what the optimizer moves: x, log x, or logit of x's place within the bounds
     double *first, *second; // moments; SGD uses the first as its velocity
+    double *average;        // of the values over the iterations, see JobOptimizer
     double *gradient;       // d loss / d value
 } Unknowns;
 
@@ -38,3 +39,5 @@ double rey_schedule_factor(const JobSchedule *schedule, int iteration);
 
 // One step along u->gradient at iteration i (from 0); returns the gradient's Euclidean norm in the variables.
 double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration);
+// Puts the average into value, for good: called when the optimisation is over.
+void rey_unknowns_take_average(Unknowns *u);

@@ -185,8 +185,10 @@ static rey_result allocate(Unknowns *u) {
     u->variable = rey_alloc_array(u->ctx, n, sizeof *u->variable);
     u->first = rey_alloc_array(u->ctx, n, sizeof *u->first);
     u->second = rey_alloc_array(u->ctx, n, sizeof *u->second);
+    u->average = rey_alloc_array(u->ctx, n, sizeof *u->average);
     u->gradient = rey_alloc_array(u->ctx, n, sizeof *u->gradient);
-    bool had = u->params && u->start && u->value && u->variable && u->first && u->second && u->gradient;
+    bool had = u->params && u->start && u->value && u->variable && u->first && u->second && u->average &&
+               u->gradient;
     return had ? REY_OK : REY_ERROR_MEMORY;
 }
 
@@ -215,7 +217,7 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
 
 void rey_unknowns_free(Unknowns *u) {
     if (u->ctx) {
-        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->gradient};
+        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->average, u->gradient};
         for (int i = 0; i < COUNT_OF(blocks); i++) {
             rey_free(u->ctx, blocks[i]);
         }
