@@ -198,13 +198,10 @@ static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
     }
     ChannelChoice choice = choose_channels(list);
     int64_t width = (int64_t)window.max.x - window.min.x + 1, height = (int64_t)window.max.y - window.min.y + 1;
-    // Even the best compression does not shrink a picture a thousand-fold below a byte per 64 pixels.
-    if (width > 0 && height > 0 && width < IMAGE_LARGEST && height < IMAGE_LARGEST &&
-        (uint64_t)(width * height) / 16384 > s->size) {
-        return rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: claims %lld x %lld pixels in %zu bytes", s->name,
-                        (long long)width, (long long)height, s->size);
+    rey_result result = rey_image_check_claim(s->ctx, s->name, width, height, s->size);
+    if (result == REY_OK) {
+        result = rey_image_new(s->ctx, s->name, width, height, choice.count, out);
     }
-    rey_result result = rey_image_new(s->ctx, s->name, width, height, choice.count, out);
     if (result != REY_OK) {
         return result;
     }

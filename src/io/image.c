@@ -22,6 +22,16 @@ rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int6
     return out->data ? REY_OK : REY_ERROR_MEMORY;
 }
 
+rey_result rey_image_check_claim(rey_context *ctx, const char *name, int64_t width, int64_t height, size_t size) {
+    // Deflate packs at most 8300 one-bit pixels into a byte, JPEG and OpenEXR fewer but for a file's fixed parts.
+    if (width > 0 && height > 0 && width <= IMAGE_LARGEST && height <= IMAGE_LARGEST &&
+        (uint64_t)(width * height) / 16384 > size) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: claims %lld x %lld pixels in %zu bytes", name, (long long)width,
+                        (long long)height, size);
+    }
+    return REY_OK;
+}
+
 rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                                  rey_image *out) {
     static const struct {

@@ -18,9 +18,11 @@ static void on_error(j_common_ptr jpeg) {
     longjmp(e->back, 1);
 }
 
+// Replaces the library's own handler, which counts warnings beside printing them.
 static void on_message(j_common_ptr jpeg, int level) {
-    UNUSED(jpeg);
-    UNUSED(level);
+    if (level < 0) {
+        jpeg->err->num_warnings++;
+    }
 }
 
 // A truncated file makes the library invent the rest and warn: that is an error here.
@@ -45,11 +47,14 @@ rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char
     jpeg_read_header(&jpeg, TRUE);
     jpeg.out_color_space = jpeg.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
     jpeg_start_decompress(&jpeg);
-    rey_result result = rey_image_new(ctx, name, jpeg.output_width, jpeg.output_height, jpeg.output_components, out);
+    rey_result result = rey_image_check_claim(ctx, name, jpeg.output_width, jpeg.output_height, size);
+    if (result == REY_OK) {
+        result = rey_image_new(ctx, name, jpeg.output_width, jpeg.output_height, jpeg.output_components, out);
+    }
     size_t count = (size_t)jpeg.output_width * (size_t)jpeg.output_components;
     row = result == REY_OK ? rey_alloc(ctx, count) : NULL;
     result = result == REY_OK && !row ? REY_ERROR_MEMORY : result;
-    while (result == REY_OK && jpeg.output_scanline < jpeg.output_height) {
+    while (result == REY_OK && jpeg.output_scanline < jpeg.output_height && !is_damaged(&jpeg)) {
         float *line = out->data + jpeg.output_scanline * count;
         JSAMPROW rows[1] = {row};
         jpeg_read_scanlines(&jpeg, rows, 1);

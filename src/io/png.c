@@ -1,46 +1,101 @@
-// png.c: PNG through libpng's simplified interface.
+// png.c: PNG through libpng: read sample by sample, written by its simplified interface.
 #include "io/file.h"
 #include "io/image.h"
 
 #include <math.h>
 #include <png.h>
+#include <setjmp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    png_image png = {.version = PNG_IMAGE_VERSION};
-    if (!png_image_begin_read_from_memory(&png, bytes, size)) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: %s", name, png.message);
+// What the library's callbacks and the code behind its jump see.
+typedef struct Reader {
+    rey_context *ctx;
+    const char *name;
+    const unsigned char *bytes;
+    size_t size, at;
+    unsigned char *pixels; // width x height, whole rows
+    char message[128];
+} Reader;
+
+static void on_error(png_structp png, png_const_charp message) {
+    Reader *r = png_get_error_ptr(png);
+    snprintf(r->message, sizeof r->message, "%s", message);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp message) {
+    UNUSED(png);
+    UNUSED(message);
+}
+
+static void on_read(png_structp png, png_bytep out, size_t count) {
+    Reader *r = png_get_io_ptr(png);
+    if (count > r->size - r->at) {
+        png_error(png, "the file ends early");
     }
-    bool wide = png.format & PNG_FORMAT_FLAG_LINEAR, colour = png.format & PNG_FORMAT_FLAG_COLOR;
-    int channels = colour ? 3 : 1;
-    rey_result result = rey_image_new(ctx, name, png.width, png.height, channels, out);
-    // 16-bit files come out linear, 8-bit ones encoded. Alpha is asked for, so that nothing is blended, and dropped.
-    png.format = (colour ? PNG_FORMAT_RGBA : PNG_FORMAT_GA) | (wide ? PNG_FORMAT_FLAG_LINEAR : 0);
-    size_t count = PNG_IMAGE_SIZE(png) / (wide ? 2 : 1);
-    void *pixels = result == REY_OK ? rey_alloc_array(ctx, count, wide ? 2 : 1) : NULL;
-    if (!pixels) {
-        png_image_free(&png);
-        return result == REY_OK ? REY_ERROR_MEMORY : result;
+    memcpy(out, r->bytes + r->at, count);
+    r->at += count;
+}
+
+// Everything between the signature and the samples, 8 or 16 bits of each, most significant byte first.
+static rey_result read_samples(Reader *r, png_structp png, png_infop info, rey_image *out) {
+    double gamma;
+    png_read_info(png, info);
+    int64_t width = png_get_image_width(png, info), height = png_get_image_height(png, info);
+    bool colour = png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR;
+    rey_result result = rey_image_check_claim(r->ctx, r->name, width, height, r->size);
+    if (result == REY_OK) {
+        result = rey_image_new(r->ctx, r->name, width, height, colour ? 3 : 1, out);
     }
-    if (!png_image_finish_read(&png, NULL, pixels, 0, NULL)) {
-        result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: %s", name, png.message);
+    if (result != REY_OK) {
+        return result;
     }
-    int64_t n = (int64_t)out->width * out->height;
-    for (int64_t i = 0; i < n && result == REY_OK; i++) {
-        for (int c = 0; c < channels; c++) {
-            int64_t at = i * (channels + 1) + c;
-            float alpha = wide ? (float)((uint16_t *)pixels)[i * (channels + 1) + channels] / 65535.0f : 1;
-            out->data[i * channels + c] = wide ? (float)((uint16_t *)pixels)[at] / 65535.0f / fmaxf(alpha, 1e-6f)
-                                               : (float)((uint8_t *)pixels)[at] / 255.0f;
-            if (wide) { // the library premultiplied and decoded; the picture keeps the file's encoding
-                out->data[i * channels + c] = rey_srgb_encode(fminf(out->data[i * channels + c], 1));
-            }
+    out->srgb = !(png_get_gAMA(png, info, &gamma) && gamma == 1);
+    png_set_expand(png);
+    png_set_strip_alpha(png);
+    int passes = png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+    size_t row = png_get_rowbytes(png, info);
+    r->pixels = rey_alloc_array(r->ctx, (size_t)height, row);
+    if (!r->pixels) {
+        return REY_ERROR_MEMORY;
+    }
+    memset(r->pixels, 0, (size_t)height * row);
+    for (int pass = 0; pass < passes; pass++) {
+        for (int64_t y = 0; y < height; y++) {
+            png_read_row(png, r->pixels + (size_t)y * row, NULL);
         }
     }
-    out->srgb = true;
-    rey_free(ctx, pixels);
-    png_image_free(&png);
+    png_read_end(png, NULL);
+    int64_t count = width * height * out->channels;
+    bool wide = png_get_bit_depth(png, info) == 16;
+    for (int64_t i = 0; i < count; i++) {
+        out->data[i] = wide ? (float)(r->pixels[2 * i] << 8 | r->pixels[2 * i + 1]) / 65535.0f
+                            : (float)r->pixels[i] / 255.0f;
+    }
+    return REY_OK;
+}
+
+// The samples as the file encodes them: the simplified interface would take 16 bits for linear and blend alpha.
+rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
+    Reader reader = {.ctx = ctx, .name = name, .bytes = bytes, .size = size};
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_error, on_warning);
+    png_infop info = png ? png_create_info_struct(png) : NULL;
+    rey_result result = REY_ERROR_MEMORY;
+    if (!info) {
+        png_destroy_read_struct(&png, NULL, NULL);
+        return rey_fail(ctx, result, "%s: not enough memory to read it", name);
+    }
+    png_set_read_fn(png, &reader, on_read);
+    if (setjmp(png_jmpbuf(png))) {
+        result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: %s", name, reader.message);
+    } else {
+        result = read_samples(&reader, png, info, out);
+    }
+    png_destroy_read_struct(&png, &info, NULL);
+    rey_free(ctx, reader.pixels);
     return result;
 }
 
