@@ -6,6 +6,7 @@
 //   clearcoat     clearcoat / 4 (0.04 + 0.96 w) Dc Gc |cos_o|
 //   diffuse       brdf base / pi |cos_o| principled_diffuse()
 //   sheen         sheen (1 - metallic) w(wo.m) (1 + (tint - 1) sheen_tint) |cos_o|
+// (the sheen also where brdf = 0, as that renderer's vectorised variants have it; its scalar ones leave it out there)
 // and from the back bsdf F D G / (4 |cos_i|) and the refraction. Reciprocal; gains energy by design where sheen,
 // clearcoat and spec_tint are on, or a rough white base lies under the dielectric reflection.
 #pragma once

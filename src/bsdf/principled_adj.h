@@ -44,7 +44,8 @@ KFN void principled_refraction_adj(const Principled *p, const PrincipledTerms *t
     Float jacobian = principled_refraction(t, wi), k = dg * jacobian, f1 = 1.0f - t->fresnel;
     // f = sqrt(base) bsdf (1 - F) D G jacobian
     for (int c = 0; c < SPEC_N; c++) {
-        dp->base_color.c[c] = dp->base_color.c[c] + df.c[c] * t->bsdf * f1 * k * principled_root_slope(p->base_color.c[c]);
+        Float slope = principled_root_slope(p->base_color.c[c]);
+        dp->base_color.c[c] = dp->base_color.c[c] + df.c[c] * t->bsdf * f1 * k * slope;
     }
     Float dvalue = spec_dot(df, principled_root(p->base_color)), dk = dvalue * t->bsdf * f1;
     back->bsdf = back->bsdf + dvalue * f1 * k;
@@ -90,7 +91,8 @@ KFN void principled_base_adj(const Principled *p, const PrincipledTerms *t, Vec3
     dwo->z = dwo->z + f_sign(wo.z) * dco;
 }
 
-KFN void principled_adj(const Principled *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Principled *dp, Vec3 *dwi, Vec3 *dwo) {
+KFN void principled_adj(const Principled *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Principled *dp, Vec3 *dwi,
+                        Vec3 *dwo) {
     PrincipledTerms t = principled_terms(p, wi, wo, lobe);
     Float d = microfacet_D(&t.mf, t.m), gi = smith_G1(&t.mf, wi, t.m), go = smith_G1(&t.mf, wo, t.m), dg = d * gi * go;
     df = spec_zero_unless(t.counts, df);

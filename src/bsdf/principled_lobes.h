@@ -132,8 +132,8 @@ KFN PrincipledDiffuse principled_diffuse(Float ci, Float co, Float cd, Float rou
     return d;
 }
 
-KFN void principled_diffuse_adj(const PrincipledDiffuse *d, Float ci, Float co, Float cd, Float roughness, Float flatness,
-                                Float dvalue, Float *dci, Float *dco, Float *dcd, Float *droughness) {
+KFN void principled_diffuse_adj(const PrincipledDiffuse *d, Float ci, Float co, Float cd, Float roughness,
+                                Float flatness, Float dvalue, Float *dci, Float *dco, Float *dcd, Float *droughness) {
     // value = smooth + (flat - smooth) flatness
     Float ds = dvalue * (1.0f - flatness), df = 1.25f * dvalue * flatness;
     // flat = 1.25 (si so through + 0.5), through = 1 / (ci + co) - 0.5

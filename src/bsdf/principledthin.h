@@ -107,8 +107,9 @@ KFN Float principledthin_pdf(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe
     Float pdf = f_select(t.reflects, lobes[THIN_MATTE], lobes[THIN_THROUGH]) * f_abs(t.wo.z) * INV_PI;
     if (m_any(m_gt(clear, f_set(0)))) {
         // wi and the mirrored wo make the same angle with m.
-        Float facets = interface_pdf(&t.mf, t.wi, t.m, p->eta, p->floor) * f_safe_rcp(4.0f * v3_dot(v3_sub(t.h, t.wi), t.m));
-        pdf = pdf + f_zero_unless(t.visible, clear * facets);
+        Float facets = interface_pdf(&t.mf, t.wi, t.m, p->eta, p->floor);
+        Float jacobian = f_safe_rcp(4.0f * v3_dot(v3_sub(t.h, t.wi), t.m));
+        pdf = pdf + f_zero_unless(t.visible, clear * facets * jacobian);
     }
     return f_zero_unless(t.counts, pdf);
 }
@@ -116,7 +117,8 @@ KFN Float principledthin_pdf(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe
 KFN BsdfSample principledthin_sample(const PrincipledThin *p, Vec3 wi, Float u1, Vec2 u2) {
     Float lobes[THIN_LOBES], side = f_sign(wi.z);
     principledthin_choice(p, lobes);
-    Float first = lobes[THIN_REFLECTION], second = first + lobes[THIN_TRANSMISSION], third = second + lobes[THIN_MATTE];
+    Float first = lobes[THIN_REFLECTION], second = first + lobes[THIN_TRANSMISSION];
+    Float third = second + lobes[THIN_MATTE];
     Mask reflected = m_lt(u1, first), clear = m_lt(u1, second), matte = m_lt(u1, third);
     Microfacet mf = principled_facets(p->roughness * principledthin_scale(reflected, p->eta), p->anisotropic);
     // A random number of its own for the chosen one of the first two lobes.
