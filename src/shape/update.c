@@ -16,29 +16,26 @@ void rey_rectangle_mesh(float vertices[RECTANGLE_VERTICES][8], int32_t triangles
     memcpy(triangles, t, sizeof t);
 }
 
+// The format's order of faces, and of corners within them: uv (0,1), (1,1), (1,0), (0,0).
 void rey_cube_mesh(float vertices[CUBE_VERTICES][8], int32_t triangles[CUBE_TRIANGLES][3]) {
-    // Corners of a face counter-clockwise from outside, with uv (0,1), (1,1), (1,0), (0,0).
+    static const struct {
+        float normal[3], corner[4][3];
+    } faces[6] = {{{0, -1, 0}, {{1, -1, -1}, {1, -1, 1}, {-1, -1, 1}, {-1, -1, -1}}},
+                  {{0, 1, 0}, {{1, 1, -1}, {-1, 1, -1}, {-1, 1, 1}, {1, 1, 1}}},
+                  {{1, 0, 0}, {{1, -1, -1}, {1, 1, -1}, {1, 1, 1}, {1, -1, 1}}},
+                  {{0, 0, 1}, {{1, -1, 1}, {1, 1, 1}, {-1, 1, 1}, {-1, -1, 1}}},
+                  {{-1, 0, 0}, {{-1, -1, 1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, -1}}},
+                  {{0, 0, -1}, {{1, 1, -1}, {1, -1, -1}, {-1, -1, -1}, {-1, 1, -1}}}};
     static const float uv[4][2] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
     for (int face = 0; face < 6; face++) {
-        int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
-        float side = face % 2 ? 1.0f : -1.0f;
         for (int k = 0; k < 4; k++) {
             float *vertex = vertices[face * 4 + k];
-            float x = k == 1 || k == 2 ? 1.0f : -1.0f, y = k >= 2 ? 1.0f : -1.0f;
-            memset(vertex, 0, 8 * sizeof *vertex);
-            vertex[axis] = side;
-            vertex[u] = x * side;
-            vertex[v] = y;
-            vertex[3 + axis] = side;
-            vertex[6] = uv[k][0];
-            vertex[7] = uv[k][1];
+            memcpy(vertex, faces[face].corner[k], 3 * sizeof *vertex);
+            memcpy(vertex + 3, faces[face].normal, 3 * sizeof *vertex);
+            memcpy(vertex + 6, uv[k], 2 * sizeof *vertex);
         }
-        for (int k = 0; k < 2; k++) {
-            int32_t *t = triangles[face * 2 + k];
-            t[0] = face * 4;
-            t[1] = face * 4 + k + 1;
-            t[2] = face * 4 + k + 2;
-        }
+        int32_t first = face * 4, t[2][3] = {{first, first + 1, first + 2}, {first + 3, first, first + 2}};
+        memcpy(triangles[2 * face], t, sizeof t);
     }
 }
 
