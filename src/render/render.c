@@ -2,6 +2,7 @@
 // that do not depend on the number of threads, and merge the units' results in a fixed order.
 #include "backend/backend.h"
 #include "base/parallel.h"
+#include "math/rng.h"
 #include "render/film.h"
 #include "render/update.h"
 
@@ -36,18 +37,6 @@ typedef struct Render {
     atomic_bool cancelled;
     pthread_mutex_t lock;   // of stats and done, and around progress
 } Render;
-
-static uint32_t hash(uint32_t x) {
-    x ^= x >> 16;
-    x *= 0x7feb352du;
-    x ^= x >> 15;
-    x *= 0x846ca68bu;
-    return x ^ (x >> 16);
-}
-
-static uint32_t scramble_of(uint32_t seed, uint32_t set, uint32_t sensor, uint32_t term) {
-    return hash(hash(hash(hash(seed + 0x9e3779b9u) ^ set) + sensor * 0x85ebca6bu) ^ term);
-}
 
 static void render_free(Render *r) {
     rey_context *ctx = r->scene->ctx;
@@ -220,7 +209,7 @@ rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image,
     }
     if (result == REY_OK) {
         r.job.spp = r.def.spp;
-        r.job.scramble = scramble_of(def->seed, def->set, (uint32_t)def->sensor, 0);
+        r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
         r.total = r.tiles;
         rey_parallel_for(scene->ctx->def.threads, r.tiles, film_unit, &r);
         collect_films(&r, r.def.spp, picture);
@@ -233,6 +222,11 @@ rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image,
 }
 
 // ---- derivatives -------------------------------------------------------------------------------------------------
+
+// Whether the kernels know the derivative of the path integrand with respect to a parameter.
+static bool has_interior(const Param *p) {
+    return p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0;
+}
 
 // Refuses parameters whose derivative would lack a term.
 static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
@@ -247,12 +241,16 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         int missing = info.terms & ~available;
+        bool interior = has_interior(&ARRAY_AT(scene->params, Param, selection.params[i]));
         if (missing && !def->terms) {
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "the gradient of %s needs the term '%s', which does not exist yet: %s. "
-                            "--terms interior gives the part that does",
-                            info.name, rey_term_name(bit), info.why);
+                            "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
+                            rey_term_name(bit), info.why, interior ? ". --terms interior gives the part that does" : "");
+        }
+        if (!interior) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
+                            info.why);
         }
     }
     if (def->terms & ~available) {
@@ -311,7 +309,7 @@ static int32_t set_spp(const Render *r) {
 
 static uint32_t set_scramble(const Render *r, int set) {
     uint32_t number = r->def.sets == 1 ? r->def.set : r->def.set * 0x10001u + (uint32_t)set + 1;
-    return scramble_of(r->def.seed, number, (uint32_t)r->def.sensor, r->def.sets == 1 ? 0 : 1);
+    return rng_scramble(r->def.seed, number, (uint32_t)r->def.sensor, r->def.sets == 1 ? 0 : 1);
 }
 
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
