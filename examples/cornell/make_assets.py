@@ -59,7 +59,7 @@ def knot(t):
     return (r * math.cos(2 * t), 1.15 * math.sin(3 * t), r * math.sin(2 * t))
 
 
-def write_knot(path, along=360, around=32, tube=0.52, scale=46.0, centre=(385, 118, 330)):
+def write_knot(path, along=360, around=32, tube=0.52, scale=27.0, centre=(186, 211, 169)):
     vertices, faces = [], []
     for i in range(along):
         t = 2 * math.pi * i / along
@@ -84,14 +84,26 @@ def write_knot(path, along=360, around=32, tube=0.52, scale=46.0, centre=(385, 1
             f.write(struct.pack("<B3i", 3, *t))
 
 
-def write_npy(path, height, width, pixel):
-    head = "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, 3), }" % (height, width)
-    head += " " * (63 - (10 + len(head)) % 64) + "\n"
+def write_exr(path, height, width, pixel):
+    """A picture of floats, without compression: https://openexr.com/en/latest/OpenEXRFileLayout.html"""
+    def attribute(name, kind, data):
+        return ("%s\0%s\0" % (name, kind)).encode() + struct.pack("<I", len(data)) + data
+
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    channels = b"".join(c + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for c in (b"B", b"G", b"R")) + b"\0"
+    head = struct.pack("<2I", 20000630, 2) + attribute("channels", "chlist", channels)
+    head += attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", box)
+    head += attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", b"\0")
+    head += attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    head += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0))
+    head += attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
+    row_bytes = 12 * width
     with open(path, "wb") as f:
-        f.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode())
+        f.write(head + b"".join(struct.pack("<Q", len(head) + 8 * height + y * (8 + row_bytes)) for y in range(height)))
         for y in range(height):
-            for x in range(width):
-                f.write(struct.pack("<3f", *pixel((x + 0.5) / width, (y + 0.5) / height)))
+            row = [pixel((x + 0.5) / width, (y + 0.5) / height) for x in range(width)]
+            f.write(struct.pack("<2i", y, row_bytes))
+            f.write(b"".join(struct.pack("<%df" % width, *(c[k] for c in row)) for k in (2, 1, 0)))
 
 
 def smooth(edge, x, width):
@@ -176,13 +188,13 @@ def main():
         write_obj(os.path.join(data, name + ".obj"), [quad])
     write_obj(os.path.join(data, "block.obj"), SHORT_BLOCK)
     write_knot(os.path.join(data, "knot.ply"))
-    write_npy(os.path.join(data, "floor_truth.npy"), 128, 128, floor_picture(rng))
-    write_npy(os.path.join(data, "environment_truth.npy"), 32, 64, environment(rng))
-    write_npy(os.path.join(data, "floor_start.npy"), 128, 128, lambda u, v: (0.5, 0.5, 0.5))
-    write_npy(os.path.join(data, "environment_start.npy"), 32, 64, lambda u, v: (0.5, 0.5, 0.5))
+    write_exr(os.path.join(data, "floor_truth.exr"), 128, 128, floor_picture(rng))
+    write_exr(os.path.join(data, "environment_truth.exr"), 32, 64, environment(rng))
+    write_exr(os.path.join(data, "floor_start.exr"), 128, 128, lambda u, v: (0.5, 0.5, 0.5))
+    write_exr(os.path.join(data, "environment_start.exr"), 32, 64, lambda u, v: (0.5, 0.5, 0.5))
     truth, start = values(rng, shipped)
-    write_scene(folder, "truth.xml", truth, "floor_truth.npy", "environment_truth.npy")
-    write_scene(folder, "scene.xml", start, "floor_start.npy", "environment_start.npy")
+    write_scene(folder, "truth.xml", truth, "floor_truth.exr", "environment_truth.exr")
+    write_scene(folder, "scene.xml", start, "floor_start.exr", "environment_start.exr")
 
 
 if __name__ == "__main__":
