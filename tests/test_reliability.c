@@ -20,6 +20,8 @@ static const char scene_text[] =
     "</transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"6\"/><integer name=\"height\" value=\"6\"/></film>"
     "</sensor><bsdf type=\"roughplastic\" id=\"satin\"/>"
     "<shape type=\"sphere\"><ref id=\"satin\"/></shape>"
+    "<shape type=\"shapegroup\" id=\"pair\"><shape type=\"cylinder\"/><shape type=\"sphere\"/></shape>"
+    "<shape type=\"instance\"><ref id=\"pair\"/><transform name=\"to_world\"><scale value=\"0.3\"/></transform></shape>"
     "<shape type=\"cube\"><transform name=\"to_world\"><translate z=\"-3\"/></transform>"
     "<bsdf type=\"mask\"><bsdf type=\"diffuse\" id=\"wall\"/></bsdf></shape>"
     "<shape type=\"rectangle\"><transform name=\"to_world\"><translate z=\"5\"/></transform>"

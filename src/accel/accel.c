@@ -9,6 +9,13 @@
 #include <string.h>
 
 static void accel_free(rey_scene *scene) {
+    for (int32_t i = 0; scene->embree_groups && i < scene->view.collections; i++) {
+        if (scene->embree_groups[i]) {
+            rtcReleaseScene(scene->embree_groups[i]);
+        }
+    }
+    rey_free(scene->ctx, scene->embree_groups);
+    scene->embree_groups = NULL;
     if (scene->view.embree) {
         rtcReleaseScene(scene->view.embree);
     }
@@ -141,6 +148,11 @@ static const GeometryForm *geometry_form(int32_t kind) {
     return &forms[kind];
 }
 
+// Where a shape stands: the scene itself, or its shapegroup.
+static RTCScene scene_of(const rey_scene *scene, const ShapeRecord *shape) {
+    return shape->collection < 0 ? scene->view.embree : scene->embree_groups[shape->collection];
+}
+
 static rey_result add_shape(rey_scene *scene, int32_t id) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
@@ -151,7 +163,7 @@ static rey_result add_shape(rey_scene *scene, int32_t id) {
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
     geometry_form(shape->kind)->set(view, shape, geometry);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(view->embree, geometry, (unsigned)id);
+    rtcAttachGeometryByID(scene_of(scene, shape), geometry, (unsigned)id);
     rtcReleaseGeometry(geometry);
     return check_device(scene);
 }
@@ -186,28 +198,98 @@ static rey_result accel_create(rey_scene *scene) {
     if (!scene->view.embree) {
         return check_device(scene);
     }
-    rtcSetSceneBuildQuality(scene->view.embree, RTC_BUILD_QUALITY_LOW);
+    // One structure over all boxes is better than a fast one where there are many instances.
+    rtcSetSceneBuildQuality(scene->view.embree,
+                            scene->view.instances_count ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
+    scene->embree_groups = rey_alloc_array(scene->ctx, (size_t)scene->view.collections + 1, sizeof(void *));
+    if (!scene->embree_groups) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int32_t i = 0; i < scene->view.collections; i++) {
+        scene->embree_groups[i] = rtcNewScene(scene->embree_device);
+        if (!scene->embree_groups[i]) {
+            return check_device(scene);
+        }
+    }
     return REY_OK;
 }
 
-rey_result rey_accel_update(rey_scene *scene) {
-    bool fresh = !scene->view.embree, changed = fresh;
-    rey_result result = fresh ? accel_create(scene) : REY_OK;
+// Instances are numbered behind the shapes.
+static unsigned instance_number(const rey_scene *scene, int32_t id) {
+    return (unsigned)(scene->view.shapes_count + id);
+}
+
+static void place_instance(rey_scene *scene, int32_t id, RTCGeometry geometry) {
+    const SceneView *view = &scene->view;
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, view->tables + view->instances[id].table);
+    rtcCommitGeometry(geometry);
+}
+
+static rey_result add_instance(rey_scene *scene, int32_t id) {
+    RTCGeometry geometry = rtcNewGeometry(scene->embree_device, RTC_GEOMETRY_TYPE_INSTANCE);
+    if (!geometry) {
+        return check_device(scene);
+    }
+    rtcSetGeometryInstancedScene(geometry, scene->embree_groups[scene->view.instances[id].group]);
+    place_instance(scene, id, geometry);
+    rtcAttachGeometryByID(scene->view.embree, geometry, instance_number(scene, id));
+    rtcReleaseGeometry(geometry);
+    return check_device(scene);
+}
+
+static rey_result update_shapes(rey_scene *scene, bool fresh, bool *groups_changed, bool *changed) {
+    rey_result result = REY_OK;
     for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
+        const ShapeRecord *shape = scene->view.shapes + i;
         if (fresh) {
             result = add_shape(scene, i);
         } else if (scene->dirty_shapes[i]) {
-            RTCGeometry geometry = rtcGetGeometry(scene->view.embree, (unsigned)i);
-            rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+            RTCGeometry geometry = rtcGetGeometry(scene_of(scene, shape), (unsigned)i);
+            if (geometry_form(shape->kind)->type != RTC_GEOMETRY_TYPE_USER) {
+                rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+            }
             rtcCommitGeometry(geometry);
-            changed = true;
             result = check_device(scene);
+            *changed = true;
         }
+        *groups_changed |= shape->collection >= 0 && (fresh || scene->dirty_shapes[i]);
+    }
+    return result;
+}
+
+static rey_result update_instances(rey_scene *scene, bool fresh, bool groups_changed, bool *changed) {
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < scene->view.collections && groups_changed; i++) {
+        rtcCommitScene(scene->embree_groups[i]);
+    }
+    for (int32_t i = 0; i < scene->view.instances_count && result == REY_OK; i++) {
+        if (fresh) {
+            result = add_instance(scene, i);
+        } else if (groups_changed || scene->dirty_instances[i]) {
+            place_instance(scene, i, rtcGetGeometry(scene->view.embree, instance_number(scene, i)));
+            result = check_device(scene);
+            *changed = true;
+        }
+    }
+    return result;
+}
+
+rey_result rey_accel_update(rey_scene *scene) {
+    bool fresh = !scene->view.embree, changed = fresh, groups_changed = false;
+    rey_result result = fresh ? accel_create(scene) : REY_OK;
+    if (result == REY_OK) {
+        result = update_shapes(scene, fresh, &groups_changed, &changed);
+    }
+    if (result == REY_OK) {
+        result = update_instances(scene, fresh, groups_changed, &changed);
     }
     if (result == REY_OK && changed) {
         rtcCommitScene(scene->view.embree);
         result = check_device(scene);
         set_bounds(scene);
+    }
+    if (result != REY_OK && fresh) {
+        accel_free(scene); // the next attempt starts anew
     }
     return result;
 }

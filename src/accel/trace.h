@@ -73,6 +73,13 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
     hit.prim = i_select(found, i_load(PACKET_I(packet.hit.primID)), i_set(0));
     hit.u = f_zero_unless(found, f_load(PACKET_F(packet.hit.u)));
     hit.v = f_zero_unless(found, f_load(PACKET_F(packet.hit.v)));
+    hit.instance = i_set(0);
+    if (scene->instances_count) {
+        // Instances are numbered behind the shapes.
+        Int number = i_load(PACKET_I(packet.hit.instID[0]));
+        Mask inside = found & mi_lt(i_set(-1), number);
+        hit.instance = i_select(inside, number - (int32_t)scene->shapes_count, i_set(0));
+    }
     hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
     return hit;
 }

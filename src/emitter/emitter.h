@@ -167,7 +167,7 @@ KFN TexCoord emitter_texcoord(const SceneView *scene, const EmitterRecord *e, Ve
     if (!e->attributes) {
         return texcoord(uv, NULL);
     }
-    *hit = (Hit){i_set(e->shape), prim, uv.x, uv.y, v3_zero()};
+    *hit = (Hit){i_set(e->shape), prim, uv.x, uv.y, v3_zero(), i_set(0)};
     return texcoord(mesh_interaction(scene, scene->shapes[e->shape].flags, hit).uv, hit);
 }
 

@@ -30,6 +30,7 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count) {
     v.slot = i_gather(p->slot, v.at);
     v.hit.shape = i_max(i_gather(ws->hit_shape, v.at), i_set(0));
     v.hit.prim = i_gather(ws->hit_prim, v.at);
+    v.hit.instance = i_gather(ws->hit_instance, v.at);
     v.hit.u = real_gather(ws->hit_u, v.at);
     v.hit.v = real_gather(ws->hit_v, v.at);
     v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
@@ -63,6 +64,7 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis) {
     Records *r = &t->ws.records;
     i_store(r->shape + at, v->hit.shape);
     i_store(r->prim + at, v->hit.prim);
+    i_store(r->instance + at, v->hit.instance);
     i_store(r->slot + at, v->slot);
     f_store(r->u + at, v->hit.u);
     f_store(r->v + at, v->hit.v);

@@ -109,6 +109,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.group = t->scene->groups + batch->group;
     s.hit.shape = i_load(r->shape + at);
     s.hit.prim = i_load(r->prim + at);
+    s.hit.instance = i_load(r->instance + at);
     s.hit.u = f_load(r->u + at);
     s.hit.v = f_load(r->v + at);
     s.hit.p = record_v3(r->px, r->py, r->pz, at);

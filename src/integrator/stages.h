@@ -145,6 +145,7 @@ KFN Hit trace_past_emitters(Tracer *t, Ray ray, Mask m, Hit hit) {
         t->job->rays += m_count(again);
         hit.shape = i_select(again, next.shape, hit.shape);
         hit.prim = i_select(again, next.prim, hit.prim);
+        hit.instance = i_select(again, next.instance, hit.instance);
         hit.u = f_select(again, next.u, hit.u);
         hit.v = f_select(again, next.v, hit.v);
         hit.p = v3_select(again, next.p, hit.p);
@@ -167,6 +168,7 @@ static void trace_stage(Tracer *t, int32_t bounce) {
         Int group = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), group);
         i_store(ws->hit_shape + k, hit.shape);
         i_store(ws->hit_prim + k, hit.prim);
+        i_store(ws->hit_instance + k, hit.instance);
         i_store(ws->hit_group + k, i_select(found, group + 1, i_set(0)));
         f_store(ws->hit_u + k, hit.u);
         f_store(ws->hit_v + k, hit.v);

@@ -28,7 +28,7 @@ enum {
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(bx) F(by) F(bz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist)     \
     F(ltx) F(lty) F(ltz) F(wox) F(woy) F(woz) F(sw)
-#define RECORD_INTS(I) I(shape) I(prim) I(slot) I(light) I(lprim) I(lobe)
+#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe)
 
 #define DECLARE_FLOAT(name) real *name;
 #define DECLARE_INT(name) int32_t *name;
@@ -58,7 +58,7 @@ typedef struct Workspace {
     int32_t batch_capacity, record_capacity;
     int32_t chunk;
     // per ray of the current bounce
-    int32_t *hit_shape, *hit_prim, *hit_group, *order;
+    int32_t *hit_shape, *hit_prim, *hit_instance, *hit_group, *order;
     real *hit_u, *hit_v, *hit_x, *hit_y, *hit_z;
     // per slot: radiance (or derivative), film position, pixel and sample numbers, adjoint, suffix radiance
     real *lx, *ly, *lz, *film_x, *film_y, *ax, *ay, *az, *sx, *sy, *sz;
@@ -92,6 +92,7 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     }
     CARVE(ws->hit_shape, n)
     CARVE(ws->hit_prim, n)
+    CARVE(ws->hit_instance, n)
     CARVE(ws->hit_group, n)
     CARVE(ws->order, n)
     CARVE(ws->hit_u, n)

@@ -46,6 +46,7 @@ typedef struct Builder {
     SceneSource *source;
     Array prefixes; // of Prefix: the first parameter path of each object
     Array attribute_uses; // of AttributeUse
+    int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
 } Builder;
 
 #define TRY(expression)                                                                                                \
@@ -98,6 +99,8 @@ rey_result build_pose(Builder *b, const double matrix[16], const char *path, Par
 rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_instance(Builder *b, rey_xml_node *node, const char *path);
 // shape: of an area light, else -1.
 rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out);
 rey_result build_sensor(Builder *b, rey_xml_node *node, const char *path);

@@ -12,7 +12,7 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance", "obj", "ply", "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
@@ -321,6 +321,9 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
     } else {
         TRY(build_default_bsdf(b, node, emitter ? 0 : 0.5, name, &shape->bsdf));
     }
+    if (emitter && b->collection >= 0) {
+        return rey_xml_fail(b->ctx, emitter->at, REY_ERROR_UNSUPPORTED, "a light cannot stand inside a shapegroup");
+    }
     if (emitter) {
         build_join(name, path, "emitter");
         TRY(build_emitter(b, emitter->node, id, name, &shape->emitter));
@@ -335,8 +338,14 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
 }
 
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
+    if (strcmp(node->type, "shapegroup") == 0) {
+        return build_shapegroup(b, node, path);
+    }
+    if (strcmp(node->type, "instance") == 0) {
+        return build_instance(b, node, path);
+    }
     ShapeRecord shape = {.emitter = -1, .interior = -1, .exterior = -1, .positions = -1, .normals = -1, .uvs = -1,
-                         .to_world = -1, .table = -1, .area_cdf = -1};
+                         .to_world = -1, .table = -1, .area_cdf = -1, .collection = b->collection};
     bool first, flip;
     double weight;
     TRY(build_visit(b, node, path, &first));
@@ -346,7 +355,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     }
     TRY(rey_xml_get_bool(b->ctx, node, "flip_normals", false, &flip));
     TRY(rey_xml_get_float(b->ctx, node, "silhouette_sampling_weight", 1, &weight));
-    shape.flags = flip ? SHAPE_FLIP_NORMALS : 0;
+    shape.flags = (flip ? SHAPE_FLIP_NORMALS : 0) | (b->collection >= 0 ? SHAPE_INSTANCED : 0);
     if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
         TRY(build_mesh(b, node, id, path, &shape));
     } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {

@@ -88,7 +88,7 @@ static bool is_known_plugin(const char *type) {
         "thindielectric", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
         "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
         "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
-        "sunsky", "timed_sunsky", "shapegroup", "instance", "bsplinecurve", "linearcurve", "sdfgrid", "merge",
+        "sunsky", "timed_sunsky", "bsplinecurve", "linearcurve", "sdfgrid", "merge",
         "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
         "batch", "volume", "blackbody", "regular", "irregular", "ptracer", "aov", "depth", "volpath",
         "volpathmis", "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
@@ -183,7 +183,7 @@ static void source_free(void *document) {
 
 rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                             rey_scene **out) {
-    Builder b = {.ctx = ctx};
+    Builder b = {.ctx = ctx, .collection = -1};
     *out = NULL;
     TRY(rey_scene_new(ctx, &b.scene));
     b.source = rey_alloc(ctx, sizeof *b.source);

@@ -330,6 +330,8 @@ static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, con
     const ShapeRecord *shape = node->tag == REY_XML_SHAPE ? find_shape(w, node) : NULL;
     if (shape) {
         TRY(write_shape_parts(w, depth + 1, node, shape));
+    } else if (node->tag == REY_XML_SHAPE && strcmp(node->type, "instance") == 0) {
+        write_matrix(w, depth + 1, "to_world", theta(w, w->scene->view.instances[node->built].to_world), 16);
     } else if (node->tag == REY_XML_SENSOR) {
         write_sensor_parts(w, depth + 1, w->scene->view.sensors + node->built);
     } else if (node->tag == REY_XML_EMITTER) {

@@ -17,6 +17,9 @@ rey_result rey_scene_update(rey_scene *scene) {
     for (int32_t i = 0; i < view->shapes_count && result == REY_OK; i++) {
         result = scene->dirty_shapes[i] ? rey_shape_update(scene, i) : REY_OK;
     }
+    for (int32_t i = 0; i < view->instances_count && result == REY_OK; i++) {
+        result = scene->dirty_instances[i] ? rey_instance_update(scene, i) : REY_OK;
+    }
     for (int32_t i = 0; i < view->bsdfs_count && result == REY_OK; i++) {
         result = scene->dirty_bsdfs[i] ? rey_bsdf_update(scene, i) : REY_OK;
     }
@@ -31,6 +34,7 @@ rey_result rey_scene_update(rey_scene *scene) {
     }
     rey_emitter_weights(scene);
     memset(scene->dirty_shapes, 0, (size_t)view->shapes_count);
+    memset(scene->dirty_instances, 0, (size_t)view->instances_count);
     memset(scene->dirty_bsdfs, 0, (size_t)view->bsdfs_count);
     memset(scene->dirty_emitters, 0, (size_t)view->emitters_count);
     scene->dirty = false;

@@ -3,6 +3,7 @@ ARRAY(float, theta, "all numbers that could ever be optimised: colours, texels, 
 ARRAY(TextureNode, textures, "textures, constants among them; a slot of any kind is an index into this")
 ARRAY(BsdfNode, bsdfs, "scattering functions; adapters refer to their children by index")
 ARRAY(ShapeRecord, shapes, "shapes; the index is Embree's geometry id")
+ARRAY(InstanceRecord, instances, "shapegroups seen through a pose of their own")
 ARRAY(int32_t, triangles, "render indices, three per triangle, relative to the shape's first vertex")
 ARRAY(int32_t, welded, "per render vertex, the smallest vertex of its shape at the same position")
 ARRAY(int32_t, attributes, "per attribute name and shape: where a mesh's values begin in theta (-1 = none), numbers per item")

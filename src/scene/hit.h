@@ -11,6 +11,7 @@ typedef struct Hit {
     Int prim;    // triangle within the shape
     Float u, v;  // barycentrics of the second and third vertex; analytic shapes: unused
     Vec3 p;      // analytic shapes: the point on the ray
+    Int instance; // of shapes with SHAPE_INSTANCED, else 0
 } Hit;
 
 // Texture coordinates and, on surfaces, the hit that they belong to: attributes of meshes are read there.

@@ -123,6 +123,9 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
         bool pose = p->theta == scene->view.shapes[p->geometry].to_world;
         scene->dirty_shapes[p->geometry] |= pose ? SHAPE_DIRTY_POSE : SHAPE_DIRTY_VERTICES;
     }
+    if (p->instance >= 0) {
+        scene->dirty_instances[p->instance] = 1;
+    }
     if (p->emitter >= 0) {
         scene->dirty_emitters[p->emitter] = 1;
     }

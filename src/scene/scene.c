@@ -34,9 +34,10 @@ rey_result rey_scene_freeze(rey_scene *scene) {
 #undef ARRAY
     scene->arena = rey_alloc(scene->ctx, bytes);
     scene->dirty_shapes = rey_alloc(scene->ctx, scene->build.shapes.count + 1);
+    scene->dirty_instances = rey_alloc(scene->ctx, scene->build.instances.count + 1);
     scene->dirty_bsdfs = rey_alloc(scene->ctx, scene->build.bsdfs.count + 1);
     scene->dirty_emitters = rey_alloc(scene->ctx, scene->build.emitters.count + 1);
-    if (!scene->arena || !scene->dirty_shapes || !scene->dirty_bsdfs || !scene->dirty_emitters) {
+    if (!scene->arena || !scene->dirty_shapes || !scene->dirty_instances || !scene->dirty_bsdfs || !scene->dirty_emitters) {
         return REY_ERROR_MEMORY;
     }
     scene->arena_bytes = bytes;
@@ -52,6 +53,7 @@ rey_result rey_scene_freeze(rey_scene *scene) {
 #include "scene/arrays.inl"
 #undef ARRAY
     memset(scene->dirty_shapes, 1, (size_t)scene->view.shapes_count);
+    memset(scene->dirty_instances, 1, (size_t)scene->view.instances_count);
     memset(scene->dirty_bsdfs, 1, (size_t)scene->view.bsdfs_count);
     memset(scene->dirty_emitters, 1, (size_t)scene->view.emitters_count);
     scene->dirty = true;
@@ -79,6 +81,7 @@ void rey_scene_destroy(rey_scene *scene) {
     rey_array_free(ctx, &scene->aliases);
     rey_free(ctx, scene->arena);
     rey_free(ctx, scene->dirty_shapes);
+    rey_free(ctx, scene->dirty_instances);
     rey_free(ctx, scene->dirty_bsdfs);
     rey_free(ctx, scene->dirty_emitters);
     rey_free(ctx, scene->integrator);

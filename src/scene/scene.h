@@ -30,7 +30,7 @@ typedef struct BsdfNode {
     int32_t table;               // first derived value in `tables`, -1 = none
 } BsdfNode;
 
-enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4 };
+enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16 };
 // Host only: the vertex normals were computed from the positions and follow them.
 enum { SHAPE_SMOOTH_NORMALS = 8 };
 
@@ -44,7 +44,14 @@ typedef struct ShapeRecord {
     int32_t table;                           // what the kind derives from to_world
     int32_t area_cdf;                        // tables offset: triangle_count cumulative areas (mesh emitters), -1 = none
     float area;                              // surface area [scene units^2]
+    int32_t collection;                      // shapegroup that it belongs to, -1 = stands in the scene itself
 } ShapeRecord;
+
+typedef struct InstanceRecord {
+    int32_t group;    // number of the shapegroup
+    int32_t to_world; // theta offset of 4 x 4
+    int32_t table;    // rows of to_world (12), rows of its inverse (12)
+} InstanceRecord;
 
 enum { EMITTER_AREA, EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP };
 
@@ -95,6 +102,7 @@ typedef struct SceneView {
     int32_t max_depth, rr_depth, hide_emitters;
     float bounds_centre[3], bounds_half[3], bounds_radius;
     void *embree;             // RTCScene
+    int32_t collections;      // number of shapegroups
     bool uniform_emitters;    // every emitter is chosen with the same probability
     int32_t emitter_cdf;      // tables offset of cumulative emitter weights
 } SceneView;
@@ -112,10 +120,11 @@ typedef struct Param {
     int32_t normals;          // shape that these are the vertex normals of, -1 = none
     int32_t attribute;        // entry of `attributes` that these are the values of, -1 = none
     int32_t geometry;         // shape whose geometry follows, -1 = none
+    int32_t instance;         // instance whose pose this is, -1 = none
     int32_t emitter;          // emitter whose pose this is, -1 = none
     uint32_t version;         // counts changes
 } Param;
-#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
+#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
 
 typedef struct Alias {
     char *name;
@@ -134,9 +143,9 @@ struct rey_scene {
     } build;
     void *arena;
     size_t arena_bytes;
-    void *embree_device;
+    void *embree_device, **embree_groups; // RTCDevice; one RTCScene per shapegroup
     void (*accel_free)(rey_scene *scene); // set by accel, which owns view.embree and embree_device
-    uint8_t *dirty_shapes, *dirty_bsdfs, *dirty_emitters; // derived data to rebuild before the next kernel runs
+    uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters; // derived data to rebuild before the next kernel runs
     bool dirty;
     char *integrator;
     void *document;           // io's source document, owned; freed through document_free

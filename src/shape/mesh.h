@@ -2,7 +2,7 @@
 // Points are rebuilt from barycentrics, A + (u e1 + v e2), which is the most precise form in float.
 #pragma once
 
-#include "shape/interaction.h"
+#include "shape/instance.h"
 
 KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
@@ -68,6 +68,9 @@ KFN void mesh_interaction_adj(const SceneView *scene, int32_t flags, const Hit *
     for (int k = 0; k < 3; k++) {
         sum = v3_madd(sum, w[k], theta_v3(scene, normals + c.i[k] * 3));
     }
+    if (flags & SHAPE_INSTANCED) {
+        dn = instance_normal_adj(scene, hit, v3_normalize(sum), dn);
+    }
     v3_normalize_adj(sum, dn, &dsum);
     Int begin = i_gather(sink->normals_at, hit->shape);
     m = m & mi_lt(i_set(-1), begin);
@@ -92,6 +95,7 @@ KFN Hit mesh_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     hit.u = 1.0f - root;
     hit.v = u.y * root;
     hit.p = v3_zero();
+    hit.instance = i_set(0);
     return hit;
 }
 

@@ -84,4 +84,4 @@ KFN Vec3 pose_normal(const SceneView *scene, Int at, Vec3 n) {
 }
 
 // A point of a shape without triangles.
-KFN Hit hit_at(int32_t id, Vec3 p) { return (Hit){i_set(id), i_set(0), f_set(0), f_set(0), p}; }
+KFN Hit hit_at(int32_t id, Vec3 p) { return (Hit){i_set(id), i_set(0), f_set(0), f_set(0), p, i_set(0)}; }

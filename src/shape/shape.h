@@ -4,6 +4,7 @@
 
 #include "shape/cylinder.h"
 #include "shape/disk.h"
+#include "shape/instance.h"
 #include "shape/mesh.h"
 #include "shape/sphere.h"
 
@@ -23,7 +24,7 @@ enum {
 #define SHAPE_MESH_KIND SHAPE_CASE
 #define SHAPE_POSED SHAPE_CASE
 
-KFN Interaction shape_interaction(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit) {
+KFN Interaction surface_interaction(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit) {
     switch (kind) {
 #define SHAPE_CASE(ENUM, prefix, ...)                                                                                  \
     case SHAPE_##ENUM:                                                                                                 \
@@ -32,6 +33,15 @@ KFN Interaction shape_interaction(const SceneView *scene, int32_t kind, int32_t 
 #include "shape/kinds.inl"
 #undef SHAPE_CASE
     }
+}
+
+KFN Interaction shape_interaction(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit) {
+    if (flags & SHAPE_INSTANCED) {
+        Hit local = instance_hit(scene, hit);
+        Interaction si = surface_interaction(scene, kind, flags, &local);
+        return instance_interaction(scene, hit, &si);
+    }
+    return surface_interaction(scene, kind, flags, hit);
 }
 
 // A point of shape `id` to connect ref with.

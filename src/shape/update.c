@@ -151,3 +151,10 @@ rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     }
     return result;
 }
+
+rey_result rey_instance_update(rey_scene *scene, int32_t id) {
+    SceneView *view = &scene->view;
+    const InstanceRecord *instance = view->instances + id;
+    bool regular = pose_table(view->theta + instance->to_world, view->tables + instance->table);
+    return regular ? REY_OK : rey_fail(scene->ctx, REY_ERROR_SCENE, "an instance's to_world cannot be inverted");
+}

@@ -7,6 +7,7 @@
 // Brings a shape's derived data up to date: vertices of rectangles and cubes, tables of spheres and disks, area and
 // cumulative triangle areas of mesh emitters.
 rey_result rey_shape_update(rey_scene *scene, int32_t shape);
+rey_result rey_instance_update(rey_scene *scene, int32_t instance);
 
 // Unit meshes of shapes that follow to_world: 4 or 24 vertices of position (3), normal (3), uv (2).
 enum { RECTANGLE_VERTICES = 4, RECTANGLE_TRIANGLES = 2, CUBE_VERTICES = 24, CUBE_TRIANGLES = 12 };

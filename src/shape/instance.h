@@ -1,0 +1,39 @@
+// instance.h: surfaces of a shapegroup seen through an instance: p = M q, normals by the inverse transpose. Table of an
+// instance: rows of to_world (12), rows of its inverse (12).
+#pragma once
+
+#include "shape/pose.h"
+
+#define INSTANCE_TABLE 24
+
+KFN Int instance_table(const SceneView *scene, const Hit *hit) {
+    return i_gather((const int32_t *)scene->instances, hit->instance * (int32_t)(sizeof(InstanceRecord) / 4) +
+                                                           (int32_t)(offsetof(InstanceRecord, table) / 4));
+}
+
+// The hit in the group's own space.
+KFN Hit instance_hit(const SceneView *scene, const Hit *hit) {
+    Hit local = *hit;
+    local.p = pose_to_local(scene, instance_table(scene, hit), hit->p);
+    return local;
+}
+
+KFN Interaction instance_interaction(const SceneView *scene, const Hit *hit, const Interaction *local) {
+    Int at = instance_table(scene, hit);
+    Interaction si = *local;
+    si.p = pose_to_world(scene, at, local->p);
+    si.ng = pose_normal(scene, at, local->ng);
+    Vec3 d = local->dp_du;
+    si.dp_du = v3(v3_dot(table_v3(scene, at), d), v3_dot(table_v3(scene, at + 4), d), v3_dot(table_v3(scene, at + 8), d));
+    si.sh = frame_from_tangent(pose_normal(scene, at, local->sh.n), si.dp_du);
+    return si;
+}
+
+// The adjoint dn of the world's unit normal n = normalize(M^-T m) becomes that of m, a unit normal in the group's space.
+KFN Vec3 instance_normal_adj(const SceneView *scene, const Hit *hit, Vec3 m, Vec3 dn) {
+    Int at = instance_table(scene, hit);
+    Vec3 x = table_v3(scene, at + 12), y = table_v3(scene, at + 16), z = table_v3(scene, at + 20), dq = v3_zero();
+    Vec3 q = v3_madd(v3_madd(v3_scale(x, m.x), m.y, y), m.z, z);
+    v3_normalize_adj(q, dn, &dq);
+    return v3(v3_dot(x, dq), v3_dot(y, dq), v3_dot(z, dq));
+}
