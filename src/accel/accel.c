@@ -36,7 +36,7 @@ static rey_result check_device(rey_scene *scene) {
 
 // Embree's C header leaves the accessors of packets of any size to C++. Layout: one row of n entries per field.
 enum { RAY_ORG = 0, RAY_TNEAR = 3, RAY_DIR = 4, RAY_TFAR = 8, RAY_FIELDS = 12 };
-enum { HIT_U = 3, HIT_V = 4, HIT_PRIM = 5, HIT_GEOM = 6, HIT_INST = 7 };
+enum { HIT_NG = 0, HIT_U = 3, HIT_V = 4, HIT_PRIM = 5, HIT_GEOM = 6, HIT_INST = 7 };
 
 // ---- surfaces that Embree does not know --------------------------------------------------------------------------
 
@@ -117,9 +117,11 @@ static inline void user_occluded(const struct RTCOccludedFunctionNArguments *arg
     }
 #define SHAPE_MESH_KIND(ENUM, prefix)
 #define SHAPE_POSED(ENUM, prefix, form, ...) DEFINE_##form(prefix)
+#define SHAPE_CURVE(ENUM, prefix, ...)
 #include "shape/kinds.inl"
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE
 
 // ---- shapes ------------------------------------------------------------------------------------------------------
 
@@ -132,6 +134,28 @@ static void mesh_set(const SceneView *view, const ShapeRecord *shape, RTCGeometr
                                (size_t)shape->triangle_count);
 }
 
+// Tubes are seen from outside only: who looks in at an open end looks through, as in other programs of the format.
+static void curve_filter(const struct RTCFilterFunctionNArguments *args) {
+    unsigned n = args->N;
+    const float *rays = (const float *)args->ray, *hits = (const float *)args->hit;
+    for (unsigned i = 0; i < n; i++) {
+        float cosine = 0;
+        for (unsigned k = 0; k < 3; k++) {
+            cosine += rays[(RAY_DIR + k) * n + i] * hits[(HIT_NG + k) * n + i];
+        }
+        args->valid[i] = cosine > 0 ? 0 : args->valid[i];
+    }
+}
+
+static void curve_set(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, view->theta,
+                               (size_t)shape->positions * sizeof(float), 4 * sizeof(float), (size_t)shape->vertex_count);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, view->segments,
+                               (size_t)shape->segment * sizeof(int32_t), sizeof(int32_t), (size_t)shape->segment_count);
+    rtcSetGeometryIntersectFilterFunction(geometry, curve_filter);
+    rtcSetGeometryOccludedFilterFunction(geometry, curve_filter);
+}
+
 typedef struct GeometryForm {
     enum RTCGeometryType type;
     void (*set)(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry);
@@ -141,9 +165,11 @@ static const GeometryForm *geometry_form(int32_t kind) {
     static const GeometryForm forms[] = {
 #define SHAPE_MESH_KIND(ENUM, prefix) {RTC_GEOMETRY_TYPE_TRIANGLE, prefix##_set},
 #define SHAPE_POSED(ENUM, prefix, form, ...) {RTC_GEOMETRY_TYPE_##form, prefix##_set},
+#define SHAPE_CURVE(ENUM, prefix, form, ...) {RTC_GEOMETRY_TYPE_##form, curve_set},
 #include "shape/kinds.inl"
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE
     };
     return &forms[kind];
 }

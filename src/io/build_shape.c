@@ -12,7 +12,7 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "shapegroup", "instance", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "shapegroup", "instance", "obj", "ply", "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
@@ -221,11 +221,13 @@ static const PosedPlugin *posed_plugin(const char *name) {
 #define FORM_LENGTH false
 #define POSED_PARAM(form, field, x, y, z, text) {FORM_##form, #field, {x, y, z}},
 #define SHAPE_MESH_KIND(ENUM, prefix)
+#define SHAPE_CURVE(ENUM, prefix, ...)
 #define SHAPE_POSED(ENUM, prefix, form, plugin, PARAMS)                                                                \
     {plugin, SHAPE_##ENUM, ENUM##_TABLE, prefix##_fold, {PARAMS(POSED_PARAM){false, NULL, {0}}}},
 #include "shape/kinds.inl"
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE
     };
     for (int i = 1; i < COUNT_OF(plugins); i++) {
         if (strcmp(plugins[i].name, name) == 0) {
@@ -360,6 +362,8 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
         TRY(build_mesh(b, node, id, path, &shape));
     } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {
         TRY(build_posed(b, node, id, path, &shape));
+    } else if (build_is_curve(node->type)) {
+        TRY(build_curve(b, node, id, path, &shape));
     } else {
         return build_unknown(b, node, shape_word, NULL);
     }

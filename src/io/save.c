@@ -1,6 +1,7 @@
 // save.c: writes a scene back: the source document with the current values of all parameters. Pictures become EXR files
 // and meshes PLY files in a folder beside the XML, so that the result stands alone.
 #include "io/build.h"
+#include "io/curve.h"
 #include "io/file.h"
 #include "io/image.h"
 #include "io/mesh.h"
@@ -212,6 +213,14 @@ static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     return result;
 }
 
+static rey_result write_curves(Writer *w, int depth, const rey_xml_node *node, const ShapeRecord *shape) {
+    char path[4096], name[1024], text[1024];
+    data_path(w, "curves", ".txt", path, name);
+    line(w, depth, "<string name=\"filename\" value=\"%s\"/>", escaped(name, text));
+    return rey_curves_write(w->ctx, path, theta(w, shape->positions), w->scene->view.segments + shape->segment,
+                            shape->segment_count, build_curve_order(node->type));
+}
+
 // ---- nodes -------------------------------------------------------------------------------------------------------
 
 static const ShapeRecord *find_shape(const Writer *w, const rey_xml_node *node) {
@@ -234,6 +243,9 @@ static rey_result write_shape_parts(Writer *w, int depth, const rey_xml_node *no
         line(w, depth, "<bsdf type=\"diffuse\">");
         write_value(w, depth + 1, "reflectance", base);
         line(w, depth, "</bsdf>");
+    }
+    if (shape->segment_count > 0) {
+        return write_curves(w, depth, node, shape);
     }
     if (is_file_mesh(node)) {
         return write_mesh(w, depth, shape);

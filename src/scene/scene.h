@@ -42,6 +42,7 @@ typedef struct ShapeRecord {
     int32_t positions, normals, uvs;         // theta offsets, -1 = none
     int32_t to_world;                        // theta offset of a row-major 4 x 4 matrix, -1 = vertices are in the world
     int32_t table;                           // what the kind derives from to_world
+    int32_t segment, segment_count;          // curves: in `segments`; positions holds 4 numbers per control point
     int32_t area_cdf;                        // tables offset: triangle_count cumulative areas (mesh emitters), -1 = none
     float area;                              // surface area [scene units^2]
     int32_t collection;                      // shapegroup that it belongs to, -1 = stands in the scene itself

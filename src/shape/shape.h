@@ -2,6 +2,7 @@
 // are part of the shading group.
 #pragma once
 
+#include "shape/curve.h"
 #include "shape/cylinder.h"
 #include "shape/disk.h"
 #include "shape/instance.h"
@@ -15,14 +16,17 @@
 enum {
 #define SHAPE_MESH_KIND(ENUM, prefix) SHAPE_##ENUM,
 #define SHAPE_POSED(ENUM, prefix, ...) SHAPE_##ENUM,
+#define SHAPE_CURVE(ENUM, prefix, ...) SHAPE_##ENUM,
 #include "shape/kinds.inl"
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE
     SHAPE_KIND_COUNT
 };
 
 #define SHAPE_MESH_KIND SHAPE_CASE
 #define SHAPE_POSED SHAPE_CASE
+#define SHAPE_CURVE SHAPE_CASE
 
 KFN Interaction surface_interaction(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit) {
     switch (kind) {
@@ -43,6 +47,9 @@ KFN Interaction shape_interaction(const SceneView *scene, int32_t kind, int32_t 
     }
     return surface_interaction(scene, kind, flags, hit);
 }
+
+#undef SHAPE_CURVE
+#define SHAPE_CURVE(...) // no lights
 
 // A point of shape `id` to connect ref with.
 KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
@@ -70,3 +77,4 @@ KFN Float shape_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const 
 
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE

@@ -121,6 +121,7 @@ static rey_result posed_follow(rey_scene *scene, ShapeRecord *shape) {
     bool regular = true;
     switch (shape->kind) {
 #define SHAPE_MESH_KIND(ENUM, prefix)
+#define SHAPE_CURVE(ENUM, prefix, ...)
 #define SHAPE_POSED(ENUM, prefix, ...)                                                                                 \
     case SHAPE_##ENUM:                                                                                                 \
         regular = prefix##_follow(m, t, &shape->area);                                                                 \
@@ -128,6 +129,7 @@ static rey_result posed_follow(rey_scene *scene, ShapeRecord *shape) {
 #include "shape/kinds.inl"
 #undef SHAPE_MESH_KIND
 #undef SHAPE_POSED
+#undef SHAPE_CURVE
     default:
         break;
     }
@@ -137,6 +139,9 @@ static rey_result posed_follow(rey_scene *scene, ShapeRecord *shape) {
 rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     ShapeRecord *shape = scene->view.shapes + id;
     rey_result result = REY_OK;
+    if (shape->segment_count > 0) {
+        return REY_OK; // control points are all there is of a curve
+    }
     if (shape->kind != SHAPE_MESH) {
         return posed_follow(scene, shape);
     }

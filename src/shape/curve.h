@@ -1,0 +1,87 @@
+// curve.h: round tubes along curves. A segment is 4 control points of a uniform cubic B-spline or 2 of a polyline, each
+// with a radius; a hit's u is the position along the segment. uv = (angle / 2 pi, position along all segments).
+#pragma once
+
+#include "shape/pose.h"
+
+enum { BSPLINE_POINTS = 4, LINEAR_POINTS = 2 };
+
+// Centre, radius and derivatives at the hit.
+typedef struct CurvePoint {
+    Vec3 c, c1, c2;
+    Float r, r1;
+} CurvePoint;
+
+// Sums control points [first, first + n) of a shape with the weights of value, first and second derivative.
+KFN CurvePoint curve_sum(const SceneView *scene, const Hit *hit, int n, const Float *b, const Float *b1, const Float *b2) {
+    Int segment = SHAPE_FIELD(scene, hit->shape, segment) + hit->prim;
+    Int at = SHAPE_FIELD(scene, hit->shape, positions) + i_gather(scene->segments, segment) * 4;
+    CurvePoint p = {v3_zero(), v3_zero(), v3_zero(), f_set(0), f_set(0)};
+    for (int k = 0; k < n; k++) {
+        Vec3 c = v3(theta_at(scene, at + 4 * k), theta_at(scene, at + (4 * k + 1)), theta_at(scene, at + (4 * k + 2)));
+        Float r = theta_at(scene, at + (4 * k + 3));
+        p.c = v3_madd(p.c, b[k], c);
+        p.c1 = v3_madd(p.c1, b1[k], c);
+        p.c2 = v3_madd(p.c2, b2[k], c);
+        p.r = p.r + b[k] * r;
+        p.r1 = p.r1 + b1[k] * r;
+    }
+    return p;
+}
+
+KFN Vec2 curve_uv(const SceneView *scene, const Hit *hit, Vec3 tangent, Vec3 radial) {
+    Frame f = frame_from_normal(tangent);
+    Float angle = f_atan2(v3_dot(radial, f.t), v3_dot(radial, f.s)) + PI;
+    Float segments = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count));
+    return (Vec2){angle * INV_TWO_PI, (f_from_i(hit->prim) + hit->u) / segments};
+}
+
+KFN Interaction curve_finish(int32_t flags, Interaction si) {
+    if (flags & SHAPE_FLIP_NORMALS) {
+        si.ng = v3_neg(si.ng);
+    }
+    si.sh = frame_from_tangent(si.ng, si.dp_du);
+    return si;
+}
+
+// Swept circle p = c + r e, e perpendicular to T = c' / |c'|: n is parallel to e - T r' / (|c'| - r (c'' . e) / |c'|).
+KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+    Float v = hit->u, w = 1.0f - v, v2 = v * v;
+    Float b[4] = {w * w * w * (1.0f / 6), (3.0f * v2 * v - 6.0f * v2 + 4.0f) * (1.0f / 6),
+                  (-3.0f * v2 * v + 3.0f * v2 + 3.0f * v + 1.0f) * (1.0f / 6), v2 * v * (1.0f / 6)};
+    Float b1[4] = {-0.5f * w * w, 0.5f * (3.0f * v2 - 4.0f * v), 0.5f * (-3.0f * v2 + 2.0f * v + 1.0f), 0.5f * v2};
+    Float b2[4] = {w, 3.0f * v - 2.0f, 1.0f - 3.0f * v, v};
+    CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, b, b1, b2);
+    Float speed = v3_length(p.c1);
+    Vec3 tangent = v3_scale(p.c1, f_safe_rcp(speed)), away = v3_sub(hit->p, p.c);
+    Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));
+    Float stretch = speed - p.r * v3_dot(p.c2, e) * f_safe_rcp(speed);
+    Interaction si;
+    si.ng = v3_normalize(v3_madd(e, -p.r1 * f_safe_rcp(stretch), tangent));
+    si.p = v3_madd(p.c, p.r, e);
+    si.uv = curve_uv(scene, hit, tangent, e);
+    si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
+    return curve_finish(flags, si);
+}
+
+// Cone that touches the spheres at both ends, and those spheres: the normal points away from the sphere of the family
+// between them that touches the surface at p.
+KFN Interaction linear_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+    Float b[2] = {1.0f - hit->u, hit->u}, b1[2] = {f_set(-1), f_set(1)}, b2[2] = {f_set(0), f_set(0)};
+    CurvePoint p = curve_sum(scene, hit, LINEAR_POINTS, b, b1, b2);
+    Float length2 = v3_dot(p.c1, p.c1);
+    Vec3 start = v3_madd(p.c, -hit->u, p.c1), tangent = v3_normalize(p.c1);
+    Float r0 = p.r - hit->u * p.r1;
+    // (p - c(t)) . c' + r(t) r' = 0
+    Float t = (v3_dot(v3_sub(hit->p, start), p.c1) + r0 * p.r1) * f_safe_rcp(length2 - p.r1 * p.r1);
+    t = f_clamp(t, f_set(0), f_set(1));
+    Vec3 centre = v3_madd(start, t, p.c1);
+    Interaction si;
+    si.ng = v3_normalize(v3_sub(hit->p, centre));
+    si.p = v3_madd(centre, r0 + t * p.r1, si.ng);
+    Vec3 away = v3_sub(si.p, p.c);
+    Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));
+    si.uv = curve_uv(scene, hit, tangent, e);
+    si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
+    return curve_finish(flags, si);
+}
