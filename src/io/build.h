@@ -103,6 +103,7 @@ bool build_is_curve(const char *plugin);
 int build_curve_order(const char *plugin); // control points per segment
 rey_result build_curve(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);
 rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_merge(Builder *b, rey_xml_node *node, const char *path);
 rey_result build_instance(Builder *b, rey_xml_node *node, const char *path);
 // shape: of an area light, else -1.
 rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out);

@@ -1,4 +1,5 @@
-// build_instance.c: shapegroups, which are invisible themselves, and their instances.
+// build_instance.c: shapegroups, which are invisible themselves, and their instances; merge, whose shapes stand in the
+// scene as they are: shading groups bring together what it would.
 #include "io/build.h"
 #include "shape/affine.h"
 #include "shape/instance.h"
@@ -8,6 +9,23 @@
 
 static const char *const instance_why = "moving an instance moves silhouettes, seen by the camera and by other path vertices";
 
+// The shapes inside a node.
+static rey_result build_shapes_of(Builder *b, rey_xml_node *node, const char *path) {
+    for (int i = 0; i < node->child_count; i++) {
+        rey_xml_child *child = &node->children[i];
+        char name[MAX_PATH_NAME], full[MAX_PATH_NAME];
+        if (child->node->tag != REY_XML_SHAPE) {
+            return rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "a %s holds shapes, not a %s", node->type,
+                                rey_xml_tag_name(child->node->tag));
+        }
+        child->used = true;
+        snprintf(name, sizeof name, "shape_%d", i);
+        build_join(full, path, child->node->id ? child->node->id : name);
+        TRY(build_shape(b, child->node, full));
+    }
+    return REY_OK;
+}
+
 rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path) {
     if (node->built >= 0) {
         return REY_OK;
@@ -16,19 +34,13 @@ rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shapegroup cannot stand inside a shapegroup");
     }
     b->collection = node->built = b->scene->view.collections++;
-    for (int i = 0; i < node->child_count; i++) {
-        rey_xml_child *child = &node->children[i];
-        char name[MAX_PATH_NAME], full[MAX_PATH_NAME];
-        if (child->node->tag != REY_XML_SHAPE) {
-            return rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "a shapegroup holds shapes, not a %s",
-                                rey_xml_tag_name(child->node->tag));
-        }
-        child->used = true;
-        snprintf(name, sizeof name, "shape_%d", i);
-        build_join(full, path, child->node->id ? child->node->id : name);
-        TRY(build_shape(b, child->node, full));
-    }
+    TRY(build_shapes_of(b, node, path));
     b->collection = -1;
+    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+}
+
+rey_result build_merge(Builder *b, rey_xml_node *node, const char *path) {
+    TRY(build_shapes_of(b, node, path));
     return rey_xml_check_unused(b->ctx, node, NULL, NULL);
 }
 

@@ -12,7 +12,7 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "shapegroup", "instance", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "shapegroup", "instance", "merge", "obj", "ply", "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
@@ -342,6 +342,9 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     if (strcmp(node->type, "shapegroup") == 0) {
         return build_shapegroup(b, node, path);
+    }
+    if (strcmp(node->type, "merge") == 0) {
+        return build_merge(b, node, path);
     }
     if (strcmp(node->type, "instance") == 0) {
         return build_instance(b, node, path);
