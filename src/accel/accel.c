@@ -14,6 +14,11 @@ static void accel_free(rey_scene *scene) {
             rtcReleaseScene(scene->embree_groups[i]);
         }
     }
+    for (int32_t i = 0; scene->embree_surfaces && i < scene->view.shapes_count; i++) {
+        rey_free(scene->ctx, scene->embree_surfaces[i].voxels);
+    }
+    rey_free(scene->ctx, scene->embree_surfaces);
+    scene->embree_surfaces = NULL;
     rey_free(scene->ctx, scene->embree_groups);
     scene->embree_groups = NULL;
     if (scene->view.embree) {
@@ -41,12 +46,12 @@ enum { HIT_NG = 0, HIT_U = 3, HIT_V = 4, HIT_PRIM = 5, HIT_GEOM = 6, HIT_INST = 
 // ---- surfaces that Embree does not know --------------------------------------------------------------------------
 
 // A kind's own intersection: distance between near and far of a ray given in the shape's space, negative for none.
-typedef float meet_fn(const float *table, const double o[3], const double d[3], float near, float far);
-typedef void bounds_fn(const float *table, float low[3], float high[3]);
+typedef float meet_fn(const Surface *s, unsigned prim, const double o[3], const double d[3], float near, float far);
+typedef void bounds_fn(const Surface *s, unsigned prim, float low[3], float high[3]);
 
 static inline void user_bounds(const struct RTCBoundsFunctionArguments *args, bounds_fn *bounds) {
     float low[3], high[3];
-    bounds(args->geometryUserPtr, low, high);
+    bounds(args->geometryUserPtr, args->primID, low, high);
     for (int k = 0; k < 3; k++) {
         float pad = 1e-6f * (1 + fmaxf(fabsf(low[k]), fabsf(high[k])));
         low[k] -= pad;
@@ -56,15 +61,15 @@ static inline void user_bounds(const struct RTCBoundsFunctionArguments *args, bo
 }
 
 // Distance at which ray i of a packet of n meets the surface within its range, negative when it does not.
-static inline float user_hit(const float *table, const float *rays, unsigned n, unsigned i, meet_fn *meet) {
+static inline float user_hit(const Surface *s, unsigned prim, const float *rays, unsigned n, unsigned i, meet_fn *meet) {
     float o[3], d[3];
     double local_o[3], local_d[3];
     for (unsigned k = 0; k < 3; k++) {
         o[k] = rays[(RAY_ORG + k) * n + i];
         d[k] = rays[(RAY_DIR + k) * n + i];
     }
-    pose_ray(table, o, d, local_o, local_d);
-    return meet(table, local_o, local_d, rays[RAY_TNEAR * n + i], rays[RAY_TFAR * n + i]);
+    pose_ray(s->table, o, d, local_o, local_d);
+    return meet(s, prim, local_o, local_d, rays[RAY_TNEAR * n + i], rays[RAY_TFAR * n + i]);
 }
 
 static inline void user_intersect(const struct RTCIntersectFunctionNArguments *args, meet_fn *meet) {
@@ -72,11 +77,11 @@ static inline void user_intersect(const struct RTCIntersectFunctionNArguments *a
     float *rays = (float *)args->rayhit, *hits = rays + RAY_FIELDS * n;
     unsigned *ids = (unsigned *)hits;
     for (unsigned i = 0; i < n; i++) {
-        float t = args->valid[i] == -1 ? user_hit(args->geometryUserPtr, rays, n, i, meet) : -1;
+        float t = args->valid[i] == -1 ? user_hit(args->geometryUserPtr, args->primID, rays, n, i, meet) : -1;
         if (t >= 0) {
             rays[RAY_TFAR * n + i] = t;
             hits[HIT_U * n + i] = hits[HIT_V * n + i] = 0;
-            ids[HIT_PRIM * n + i] = 0;
+            ids[HIT_PRIM * n + i] = args->primID;
             ids[HIT_GEOM * n + i] = args->geomID;
             ids[HIT_INST * n + i] = args->context->instID[0];
         }
@@ -87,7 +92,7 @@ static inline void user_occluded(const struct RTCOccludedFunctionNArguments *arg
     unsigned n = args->N;
     float *rays = (float *)args->ray;
     for (unsigned i = 0; i < n; i++) {
-        if (args->valid[i] == -1 && user_hit(args->geometryUserPtr, rays, n, i, meet) >= 0) {
+        if (args->valid[i] == -1 && user_hit(args->geometryUserPtr, args->primID, rays, n, i, meet) >= 0) {
             rays[RAY_TFAR * n + i] = -INFINITY;
         }
     }
@@ -109,8 +114,7 @@ static inline void user_occluded(const struct RTCOccludedFunctionNArguments *arg
         user_occluded(args, prefix##_meet);                                                                            \
     }                                                                                                                  \
     static void prefix##_set(const SceneView *view, const ShapeRecord *shape, RTCGeometry geometry) {                  \
-        rtcSetGeometryUserPrimitiveCount(geometry, 1);                                                                 \
-        rtcSetGeometryUserData(geometry, view->tables + shape->table);                                                 \
+        UNUSED(view), UNUSED(shape);                                                                                   \
         rtcSetGeometryBoundsFunction(geometry, prefix##_bounds_of, NULL);                                              \
         rtcSetGeometryIntersectFunction(geometry, prefix##_intersect);                                                 \
         rtcSetGeometryOccludedFunction(geometry, prefix##_occluded);                                                   \
@@ -179,6 +183,48 @@ static RTCScene scene_of(const rey_scene *scene, const ShapeRecord *shape) {
     return shape->collection < 0 ? scene->view.embree : scene->embree_groups[shape->collection];
 }
 
+// Finds the voxels of a grid that its surface passes.
+static rey_result grid_voxels(rey_scene *scene, Surface *s) {
+    int64_t cells = 1;
+    unsigned active = 0;
+    for (int k = 0; k < 3; k++) {
+        cells *= (int64_t)s->table[SDFGRID_NODES + k] - 1;
+    }
+    rey_free(scene->ctx, s->voxels);
+    s->voxels = rey_alloc_array(scene->ctx, (size_t)cells, sizeof *s->voxels);
+    if (!s->voxels) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int32_t i = 0; i < cells; i++) {
+        double corners[8];
+        int32_t at[3];
+        if (sdfgrid_corners(s, i, corners, at)) {
+            s->voxels[active++] = i;
+        }
+    }
+    s->primitives = active;
+    return REY_OK;
+}
+
+static rey_result set_surface(rey_scene *scene, int32_t id, RTCGeometry geometry) {
+    const SceneView *view = &scene->view;
+    const ShapeRecord *shape = view->shapes + id;
+    Surface *s = scene->embree_surfaces + id;
+    if (geometry_form(shape->kind)->type != RTC_GEOMETRY_TYPE_USER) {
+        return REY_OK;
+    }
+    s->table = view->tables + shape->table;
+    s->primitives = 1;
+    rey_result result = REY_OK;
+    if (shape->kind == SHAPE_SDFGRID) {
+        s->grid = view->theta + shape->positions;
+        result = grid_voxels(scene, s);
+    }
+    rtcSetGeometryUserPrimitiveCount(geometry, s->primitives);
+    rtcSetGeometryUserData(geometry, s);
+    return result;
+}
+
 static rey_result add_shape(rey_scene *scene, int32_t id) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
@@ -188,10 +234,11 @@ static rey_result add_shape(rey_scene *scene, int32_t id) {
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
     geometry_form(shape->kind)->set(view, shape, geometry);
+    rey_result result = set_surface(scene, id, geometry);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene_of(scene, shape), geometry, (unsigned)id);
     rtcReleaseGeometry(geometry);
-    return check_device(scene);
+    return result == REY_OK ? check_device(scene) : result;
 }
 
 static void set_bounds(rey_scene *scene) {
@@ -228,7 +275,8 @@ static rey_result accel_create(rey_scene *scene) {
     rtcSetSceneBuildQuality(scene->view.embree,
                             scene->view.instances_count ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
     scene->embree_groups = rey_alloc_array(scene->ctx, (size_t)scene->view.collections + 1, sizeof(void *));
-    if (!scene->embree_groups) {
+    scene->embree_surfaces = rey_alloc_array(scene->ctx, (size_t)scene->view.shapes_count + 1, sizeof(Surface));
+    if (!scene->embree_groups || !scene->embree_surfaces) {
         return REY_ERROR_MEMORY;
     }
     for (int32_t i = 0; i < scene->view.collections; i++) {
@@ -274,8 +322,9 @@ static rey_result update_shapes(rey_scene *scene, bool fresh, bool *groups_chang
             if (geometry_form(shape->kind)->type != RTC_GEOMETRY_TYPE_USER) {
                 rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
             }
+            result = set_surface(scene, i, geometry);
             rtcCommitGeometry(geometry);
-            result = check_device(scene);
+            result = result == REY_OK ? check_device(scene) : result;
             *changed = true;
         }
         *groups_changed |= shape->collection >= 0 && (fresh || scene->dirty_shapes[i]);

@@ -99,6 +99,7 @@ rey_result build_pose(Builder *b, const double matrix[16], const char *path, Par
 rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);
 bool build_is_curve(const char *plugin);
 int build_curve_order(const char *plugin); // control points per segment
 rey_result build_curve(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);

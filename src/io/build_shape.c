@@ -12,7 +12,7 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "shapegroup", "instance", "merge", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "sdfgrid", "shapegroup", "instance", "merge", "obj", "ply", "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
@@ -284,7 +284,8 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     int32_t padding = (int32_t)(-tables->count % 4);
     int32_t first = rey_scene_append(b->scene, tables, sizeof(float), padding + plugin->table);
     shape->table = first + padding;
-    return first >= 0 ? REY_OK : REY_ERROR_MEMORY;
+    TRY(first >= 0 ? REY_OK : REY_ERROR_MEMORY);
+    return plugin->kind == SHAPE_SDFGRID ? build_sdfgrid(b, node, id, path, shape) : REY_OK;
 }
 
 static rey_result assign_group(Builder *b, ShapeRecord *shape) {

@@ -88,7 +88,7 @@ static bool is_known_plugin(const char *type) {
         "thindielectric", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
         "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
         "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
-        "sunsky", "timed_sunsky", "sdfgrid",
+        "sunsky", "timed_sunsky",
         "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
         "batch", "volume", "blackbody", "regular", "irregular", "ptracer", "aov", "depth", "volpath",
         "volpathmis", "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",

@@ -6,6 +6,8 @@
 #include "io/image.h"
 #include "io/mesh.h"
 #include "io/save.h"
+#include "io/vol.h"
+#include "shape/sdfgrid.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -221,6 +223,16 @@ static rey_result write_curves(Writer *w, int depth, const rey_xml_node *node, c
                             shape->segment_count, build_curve_order(node->type));
 }
 
+static rey_result write_grid(Writer *w, int depth, const ShapeRecord *shape) {
+    const float *nodes = w->scene->view.tables + shape->table + SDFGRID_NODES;
+    char path[4096], name[1024], text[1024];
+    data_path(w, "grid", ".vol", path, name);
+    line(w, depth, "<string name=\"filename\" value=\"%s\"/>", escaped(name, text));
+    rey_vol vol = {(int32_t)nodes[0], (int32_t)nodes[1], (int32_t)nodes[2], 1, {0, 0, 0, 1, 1, 1},
+                   w->scene->view.theta + shape->positions};
+    return rey_vol_write(w->ctx, path, &vol);
+}
+
 // ---- nodes -------------------------------------------------------------------------------------------------------
 
 static const ShapeRecord *find_shape(const Writer *w, const rey_xml_node *node) {
@@ -251,7 +263,7 @@ static rey_result write_shape_parts(Writer *w, int depth, const rey_xml_node *no
         return write_mesh(w, depth, shape);
     }
     write_matrix(w, depth, "to_world", theta(w, shape->to_world), 16);
-    return REY_OK;
+    return strcmp(node->type, "sdfgrid") == 0 ? write_grid(w, depth, shape) : REY_OK;
 }
 
 static void write_sensor_parts(Writer *w, int depth, const SensorRecord *s) {

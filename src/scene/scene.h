@@ -30,7 +30,7 @@ typedef struct BsdfNode {
     int32_t table;               // first derived value in `tables`, -1 = none
 } BsdfNode;
 
-enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16 };
+enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };
 // Host only: the vertex normals were computed from the positions and follow them.
 enum { SHAPE_SMOOTH_NORMALS = 8 };
 
@@ -144,6 +144,7 @@ struct rey_scene {
     } build;
     void *arena;
     size_t arena_bytes;
+    struct Surface *embree_surfaces; // per shape: what the ray tracer's callbacks see (shape/pose.h)
     void *embree_device, **embree_groups; // RTCDevice; one RTCScene per shapegroup
     void (*accel_free)(rey_scene *scene); // set by accel, which owns view.embree and embree_device
     uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters; // derived data to rebuild before the next kernel runs

@@ -49,7 +49,9 @@ static inline bool cylinder_follow(const float m[16], float *t, float *area) {
     return pose_table(m, t);
 }
 
-static inline void cylinder_bounds(const float *t, float low[3], float high[3]) {
+static inline void cylinder_bounds(const Surface *surface, unsigned prim, float low[3], float high[3]) {
+    const float *t = surface->table;
+    UNUSED(prim);
     for (int k = 0; k < 3; k++) {
         float reach = sqrtf(t[4 * k] * t[4 * k] + t[4 * k + 1] * t[4 * k + 1]);
         low[k] = t[4 * k + 3] - reach + fminf(t[4 * k + 2], 0);
@@ -58,8 +60,9 @@ static inline void cylinder_bounds(const float *t, float low[3], float high[3]) 
 }
 
 // Distance at which a ray, given in the cylinder's own space, meets it between near and far; negative when it does not.
-static inline float cylinder_meet(const float *t, const double o[3], const double d[3], float near, float far) {
-    UNUSED(t);
+static inline float cylinder_meet(const Surface *surface, unsigned prim, const double o[3], const double d[3], float near,
+                                  float far) {
+    UNUSED(surface), UNUSED(prim);
     double a = d[0] * d[0] + d[1] * d[1], b = o[0] * d[0] + o[1] * d[1];
     // Discriminant from the distance of the ray to the axis, which does not cancel.
     double miss = o[0] * d[1] - o[1] * d[0], discriminant = a - miss * miss;

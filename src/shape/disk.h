@@ -18,7 +18,9 @@ static inline bool disk_follow(const float m[16], float *t, float *area) {
     return pose_table(m, t);
 }
 
-static inline void disk_bounds(const float *t, float low[3], float high[3]) {
+static inline void disk_bounds(const Surface *surface, unsigned prim, float low[3], float high[3]) {
+    const float *t = surface->table;
+    UNUSED(prim);
     for (int k = 0; k < 3; k++) {
         float reach = sqrtf(t[4 * k] * t[4 * k] + t[4 * k + 1] * t[4 * k + 1]);
         low[k] = t[4 * k + 3] - reach;
@@ -27,8 +29,9 @@ static inline void disk_bounds(const float *t, float low[3], float high[3]) {
 }
 
 // Distance at which a ray, given in the disk's own space, meets it between near and far; negative when it does not.
-static inline float disk_meet(const float *t, const double o[3], const double d[3], float near, float far) {
-    UNUSED(t);
+static inline float disk_meet(const Surface *surface, unsigned prim, const double o[3], const double d[3], float near,
+                              float far) {
+    UNUSED(surface), UNUSED(prim);
     double at = d[2] != 0 ? -o[2] / d[2] : -1;
     double x = o[0] + at * d[0], y = o[1] + at * d[1];
     return at > near && at < far && x * x + y * y <= 1 ? (float)at : -1;

@@ -5,6 +5,14 @@
 #include "shape/affine.h"
 #include "shape/interaction.h"
 
+// What the ray tracer's callbacks of a shape see: its table and, of grids, the values and the voxels that the surface
+// passes, one primitive each.
+typedef struct Surface {
+    const float *table, *grid;
+    int32_t *voxels;
+    unsigned primitives;
+} Surface;
+
 // ---- host: row-major 4 x 4, applied to what comes before ---------------------------------------------------------
 
 static inline void pose_multiply(double m[16], const double r[16]) {

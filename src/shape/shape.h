@@ -7,6 +7,7 @@
 #include "shape/disk.h"
 #include "shape/instance.h"
 #include "shape/mesh.h"
+#include "shape/sdfgrid.h"
 #include "shape/sphere.h"
 
 // Parameters of a plugin that are folded into its pose: P(form, name, x, y, z, description), form POINT (three numbers)

@@ -295,7 +295,7 @@ static Mask meet_shape(const SceneView *scene, int32_t id, Vec3 o, Vec3 d, Hit *
             float along[3] = {(float)f_lane(d.x, lane), (float)f_lane(d.y, lane), (float)f_lane(d.z, lane)};
             double local_o[3], local_d[3];
             pose_ray(t, from, along, local_o, local_d);
-            at[lane] = (real)cylinder_meet(t, local_o, local_d, 0, INFINITY);
+            at[lane] = (real)cylinder_meet(NULL, 0, local_o, local_d, 0, INFINITY);
         }
         Float distance = f_load(at);
         hit->p = v3_madd(o, distance, d);
