@@ -2,11 +2,13 @@
 #pragma once
 
 #include "bsdf/blendbsdf.h"
+#include "bsdf/bumpmap.h"
 #include "bsdf/call.h"
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
 #include "bsdf/mask.h"
+#include "bsdf/normalmap.h"
 #include "bsdf/null.h"
 #include "bsdf/plastic.h"
 #include "bsdf/principled_adj.h"
@@ -38,6 +40,9 @@ enum {
 #define FETCH_METAL_K texture_eval
 #define FETCH_ALPHA_U texture_eval_real
 #define FETCH_ALPHA_V texture_eval_real
+#define FETCH_NORMAL texture_eval
+#define FETCH_HEIGHT texture_gradient
+#define FETCH_HEIGHT_SCALE texture_eval_real
 #define SCATTER_SPEC texture_adj
 #define SCATTER_REAL texture_adj_real
 #define SCATTER_IOR texture_adj_real
@@ -48,6 +53,9 @@ enum {
 #define SCATTER_METAL_K texture_adj
 #define SCATTER_ALPHA_U texture_adj_real
 #define SCATTER_ALPHA_V texture_adj_real
+#define SCATTER_NORMAL texture_adj
+#define SCATTER_HEIGHT texture_gradient_adj
+#define SCATTER_HEIGHT_SCALE texture_adj_real
 
 #define FETCH_FIELD(type, field, value, low, high, text, option)                                                       \
     record.field = FETCH_##type(call->scene, node->slot[slot++], call->uv);

@@ -3,11 +3,20 @@
 
 #include "bsdf/record.h"
 
+// The parameterisation of the surface in the shading frame: dp_du = (ux, 0, .), dp_dv = (vx, vy, .), and the geometric
+// normal. Only there where a function asks for it (BsdfNode.surface).
+typedef struct BsdfSurface {
+    Float ux, vx, vy;
+    Vec3 ng;
+} BsdfSurface;
+
 typedef struct BsdfCall {
     const SceneView *scene;
     int32_t node;
     TexCoord uv;
     real floor; // see KIND_RECORD
+    const BsdfSurface *surface;
+    BsdfSurface *dsurface; // its adjoint, null = not asked for
 } BsdfCall;
 
 static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);

@@ -14,4 +14,6 @@ BSDF_LEAF(PRINCIPLEDTHIN, principledthin, PrincipledThin, "principledthin", PRIN
 BSDF_LEAF(NULL, null, Null, "null", NO_PARAMS, NO_CONFIG, "")
 BSDF_ADAPTER(TWOSIDED, twosided, Twosided, "twosided", NO_PARAMS, NO_CONFIG, 1, 2, "brdf", "")
 BSDF_ADAPTER(MASK, mask, MaskBsdf, "mask", MASK_PARAMS, NO_CONFIG, 1, 1, "nested_bsdf", "")
+BSDF_ADAPTER(NORMALMAP, normalmap, NormalMap, "normalmap", NORMALMAP_PARAMS, TURNED_CONFIG, 1, 1, "nested_bsdf", "estevez2019")
+BSDF_ADAPTER(BUMPMAP, bumpmap, BumpMap, "bumpmap", BUMPMAP_PARAMS, TURNED_CONFIG, 1, 1, "nested_bsdf", "blinn1978")
 BSDF_ADAPTER(BLENDBSDF, blendbsdf, BlendBsdf, "blendbsdf", BLENDBSDF_PARAMS, NO_CONFIG, 2, 2, "bsdf", "")

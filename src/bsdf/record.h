@@ -2,7 +2,7 @@
 #pragma once
 
 #include "scene/kind.h"
-#include "scene/texture.h"
+#include "scene/texture_gradient.h"
 
 // Which part of a function a direction belongs to. Values of delta lobes are coefficients of the delta, their
 // densities discrete probabilities.
@@ -33,6 +33,9 @@ typedef struct BsdfSample {
 #define FIELD_METAL_K Spec
 #define FIELD_ALPHA_U Float
 #define FIELD_ALPHA_V Float
+#define FIELD_NORMAL Spec
+#define FIELD_HEIGHT Vec2
+#define FIELD_HEIGHT_SCALE Float
 
 #define RECORD_FIELD(type, field, value, low, high, text, option) FIELD_##type field;
 #define RECORD_CONFIG(field, value, choices, text) int32_t field;

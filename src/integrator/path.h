@@ -274,6 +274,17 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     return next_count + m_count(m);
 }
 
+// Hands the parameterisation of the surface to functions that ask for it.
+KFN void call_surface(BsdfCall *call, const Interaction *si, BsdfSurface *surface) {
+    if (call->scene->bsdfs[call->node].surface) {
+        surface->ux = v3_dot(si->sh.s, si->dp_du);
+        surface->vx = v3_dot(si->sh.s, si->dp_dv);
+        surface->vy = v3_dot(si->sh.t, si->dp_dv);
+        surface->ng = frame_to_local(&si->sh, si->ng);
+        call->surface = surface;
+    }
+}
+
 // Emission, light sampling and scattering of lanes that share a group.
 static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, const int32_t *order, int32_t count,
                              int32_t bounce, int32_t next_count) {
@@ -301,7 +312,9 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         return next_count;
     }
     SampleKey key = slot_key(t, v.slot);
-    BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor};
+    BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor, NULL, NULL};
+    BsdfSurface surface;
+    call_surface(&call, &si, &surface);
     if (scene->emitters_count > 0) {
         connect_lights(t, &v, &si, &call, wi, &key, bounce, record);
     }

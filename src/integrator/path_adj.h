@@ -68,6 +68,7 @@ typedef struct SurfaceSweep {
     Hit hit;
     Interaction si;
     BsdfCall call;
+    BsdfSurface surface;
     const EmitterRecord *emitter;
     const Group *group;
 } SurfaceSweep;
@@ -135,7 +136,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.wi = frame_to_local(&s.si.sh, back);
     s.wl = frame_to_local(&s.si.sh, s.light_d);
     s.wo = frame_to_local(&s.si.sh, s.wo_d);
-    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor};
+    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
     s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
     return s;
 }
@@ -167,6 +168,9 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
     Vec3 dwi = v3_zero();
     Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
     Vec3 unused = v3_zero();
+    BsdfCall call = s->call;
+    BsdfSurface dsurface = {f_set(0), f_set(0), f_set(0), v3_zero()};
+    call.dsurface = call.surface && sink->any_normals ? &dsurface : NULL;
     if (s->emitter) {
         // L += w_e Le
         emitter_adj(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
@@ -177,7 +181,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
         Vec3 dwl = v3_zero();
         Spec both = spec_mul(weight, s->light_weight);
         Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
-        bsdf_adj(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
+        bsdf_adj(&call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
         lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
                    spec_mul(both, s->f_light), sink);
         frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
@@ -186,12 +190,15 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
         // L += f w_s L_next
         Vec3 dwo = v3_zero();
         Spec df = spec_zero_unless(s->scattered, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
-        bsdf_adj(&s->call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &dwi, &dwo, NULL);
+        bsdf_adj(&call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &dwi, &dwo, NULL);
         frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &dframe, &unused);
     }
     if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         // wi = to_local(-d)
         frame_to_local_adj(&s->si.sh, v3_neg(s->d), dwi, &dframe, &unused);
+        // ux = s . dp_du, vx = s . dp_dv, vy = t . dp_dv
+        v3_acc(&dframe.s, v3_madd(v3_scale(s->si.dp_du, dsurface.ux), dsurface.vx, s->si.dp_dv));
+        v3_acc(&dframe.t, v3_scale(s->si.dp_dv, dsurface.vy));
         mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &dframe, sink, s->m);
     }
 }
@@ -216,6 +223,7 @@ static void path_backward(Tracer *t) {
         }
         SurfaceSweep s = surface_load(t, batch);
         s.call.uv.hit = &s.hit;
+        call_surface(&s.call, &s.si, &s.surface);
         Spec l = surface_primal(t, &s);
         Mask finite = s.m & m_finite(spec_sum(l));
         for (int c = 0; c < drives(t); c++) {

@@ -30,10 +30,18 @@ static rey_result refuse(Builder *b, const rey_xml_node *node) {
 }
 
 static TextureUse slot_use(const ParamDesc *p) {
-    bool real = p->type != PARAM_SPEC && p->type != PARAM_METAL_ETA && p->type != PARAM_METAL_K;
+    bool real = p->type != PARAM_SPEC && p->type != PARAM_METAL_ETA && p->type != PARAM_METAL_K &&
+                p->type != PARAM_NORMAL;
     bool bounded = p->type == PARAM_SPEC && p->high <= 1;
-    return (TextureUse){bounded ? REY_COLOUR_REFLECTANCE : REY_COLOUR_UNBOUNDED, real, p->low, p->high, "", p->text, 0,
-                        NULL};
+    bool turns = p->type == PARAM_NORMAL || p->type == PARAM_HEIGHT || p->type == PARAM_HEIGHT_SCALE;
+    return (TextureUse){bounded ? REY_COLOUR_REFLECTANCE : REY_COLOUR_UNBOUNDED,
+                        real,
+                        p->low,
+                        p->high,
+                        "",
+                        p->text,
+                        turns ? REY_TERM_TERMINATOR : 0,
+                        turns ? "the picture jumps where a shading normal turns away from the viewer" : NULL};
 }
 
 // Ratio of int_ior and ext_ior.
@@ -122,10 +130,45 @@ static rey_result alpha_slot(Builder *b, rey_xml_node *node, const ParamDesc *p,
     return build_slot(b, node, "alpha", slot_use(p), &value, 1, name, out);
 }
 
+// Attributes know nothing of the terms that a shading normal needs.
+static rey_result refuse_attribute(Builder *b, const rey_xml_node *node, int32_t texture) {
+    bool attribute = ARRAY_AT(b->scene->build.textures, TextureNode, texture).kind == TEXTURE_ATTRIBUTE;
+    return !attribute ? REY_OK
+                      : rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED,
+                                     "the texture of '%s' cannot be a mesh attribute", node->type);
+}
+
+// The only texture of a bump map, under any name. Its slope jumps between texels, and the jumps move with to_uv.
+static rey_result height_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t *out) {
+    int count = rey_xml_count_children(node, REY_XML_TEXTURES);
+    if (count != 1) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' takes one nested texture, found %d", node->type,
+                            count);
+    }
+    rey_xml_child *child = rey_xml_child_of(node, REY_XML_TEXTURES, 0);
+    TRY(build_texture(b, child->node, slot_use(p), path, out));
+    TRY(refuse_attribute(b, node, *out));
+    for (size_t i = 0; i < b->scene->params.count; i++) {
+        Param *param = &ARRAY_AT(b->scene->params, Param, i);
+        if (param->to_uv == *out) {
+            param->terms |= REY_TERM_PRIMARY;
+            param->why = "the slope of the heights jumps where uv moves from texel to texel";
+        }
+    }
+    return REY_OK;
+}
+
+static rey_result height_scale_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, const char *path, int32_t *out) {
+    double value;
+    TRY(rey_xml_get_float(b->ctx, node, p->name, (double)p->value, &value));
+    return build_constant(b, node, p->name, slot_use(p), &value, 1, path, out);
+}
+
 static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *kind, const char *path, BsdfNode *bsdf) {
     for (int i = 0; i < kind->param_count; i++) {
         const ParamDesc *p = &kind->params[i];
         double value = (double)p->value;
+        bsdf->surface |= p->type == PARAM_HEIGHT;
         char name[MAX_PATH_NAME];
         build_join(name, path, p->name);
         switch (p->type) {
@@ -147,9 +190,16 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
         case PARAM_ALPHA_V:
             TRY(alpha_slot(b, node, p, path, i ? bsdf->slot[i - 1] : -1, &bsdf->slot[i]));
             break;
+        case PARAM_HEIGHT:
+            TRY(height_slot(b, node, p, name, &bsdf->slot[i]));
+            break;
+        case PARAM_HEIGHT_SCALE:
+            TRY(height_scale_slot(b, node, p, name, &bsdf->slot[i]));
+            break;
         default:
             TRY(strcmp(p->option, "required") == 0 ? rey_xml_require(b->ctx, node, p->name) : REY_OK);
             TRY(build_slot(b, node, p->name, slot_use(p), &value, 1, name, &bsdf->slot[i]));
+            TRY(p->type == PARAM_NORMAL ? refuse_attribute(b, node, bsdf->slot[i]) : REY_OK);
         }
     }
     return REY_OK;
@@ -205,6 +255,7 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         snprintf(child, sizeof child, "%s%s", kind->child, kind->most_children > 1 ? number : "");
         build_join(name, path, child);
         TRY(build_bsdf(b, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), i)->node, name, &bsdf->child[i]));
+        bsdf->surface |= ARRAY_AT(b->scene->build.bsdfs, BsdfNode, bsdf->child[i]).surface;
     }
     return REY_OK;
 }

@@ -235,11 +235,29 @@ static rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use,
     return build_constant(b, node, property, use, rgb, count, path, out);
 }
 
+// A texture that several slots share needs the terms of all of them.
+static void add_terms(Builder *b, int32_t texture, const TextureUse *use) {
+    for (size_t i = 0; i < b->scene->params.count; i++) {
+        Param *p = &ARRAY_AT(b->scene->params, Param, i);
+        if (p->texture == texture || p->to_uv == texture) {
+            p->terms |= use->terms;
+            p->why = use->why && !*p->why ? use->why : p->why;
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        int32_t child = ARRAY_AT(b->scene->build.textures, TextureNode, texture).child[k];
+        if (child >= 0) {
+            add_terms(b, child, use);
+        }
+    }
+}
+
 rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
     bool first;
     TRY(build_visit(b, node, path, &first));
     if (!first) {
         *out = node->built;
+        add_terms(b, *out, &use);
         return REY_OK;
     }
     if (strcmp(node->type, "bitmap") == 0) {
@@ -252,6 +270,7 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
         TRY(build_spectrum(b, node, use, path, out));
     }
     node->built = *out;
+    add_terms(b, *out, &use);
     TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
     return build_finish(b, node, path);
 }

@@ -19,7 +19,10 @@ typedef enum ParamType {
     PARAM_METAL_ETA, // colour: eta, or from `material`
     PARAM_METAL_K,   // colour: k, or from `material`
     PARAM_ALPHA_U,   // number: alpha or alpha_u
-    PARAM_ALPHA_V    // number: alpha or alpha_v
+    PARAM_ALPHA_V,   // number: alpha or alpha_v
+    PARAM_NORMAL,    // colour texture that turns the shading normal
+    PARAM_HEIGHT,    // slope of a number texture, which turns the shading normal; the only texture of its function
+    PARAM_HEIGHT_SCALE // number, no texture: factor on the slope
 } ParamType;
 
 typedef struct ParamDesc {

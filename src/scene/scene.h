@@ -28,6 +28,7 @@ typedef struct BsdfNode {
     int32_t config[MAX_CONFIG];  // uniform switches, in the order of the kind's configuration list
     int32_t child[MAX_CHILDREN]; // nested functions, -1 = none
     int32_t table;               // first derived value in `tables`, -1 = none
+    int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
 } BsdfNode;
 
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };

@@ -92,6 +92,7 @@ KFN Interaction cylinder_interaction(const SceneView *scene, int32_t flags, cons
     phi = f_select(m_lt(phi, f_set(0)), phi + TWO_PI, phi);
     si.uv = (Vec2){phi * INV_TWO_PI, local.z};
     si.dp_du = v3_scale(v3_madd(v3_scale(pose_column(scene, at, 0), -local.y), local.x, pose_column(scene, at, 1)), f_set(TWO_PI));
+    si.dp_dv = pose_column(scene, at, 2);
     if (flags & SHAPE_FLIP_NORMALS) {
         si.ng = v3_neg(si.ng);
     }
@@ -109,6 +110,6 @@ KFN Hit cylinder_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
 }
 
 KFN Float cylinder_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
-    Vec3 dp_dv = pose_column(scene, i_set(scene->shapes[id].table), 2);
-    return area_density(ref, d, si, v3_length(v3_cross(si->dp_du, dp_dv)));
+    UNUSED(scene), UNUSED(id);
+    return area_density(ref, d, si, v3_length(v3_cross(si->dp_du, si->dp_dv)));
 }

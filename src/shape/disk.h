@@ -56,6 +56,8 @@ KFN Interaction disk_interaction(const SceneView *scene, int32_t flags, const Hi
     Float rr = f_safe_rcp(r);
     si.dp_du = v3_madd(v3_scale(x, local.x * rr), local.y * rr, y);
     si.dp_du = v3_select(m_gt(r, f_set(0)), si.dp_du, x);
+    // dp_dv = 2 pi r (-sin phi, cos phi)
+    si.dp_dv = v3_scale(v3_madd(v3_scale(y, local.x), -local.y, x), f_set(TWO_PI));
     if (flags & SHAPE_FLIP_NORMALS) {
         si.ng = v3_neg(si.ng);
     }

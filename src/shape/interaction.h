@@ -11,6 +11,7 @@ typedef struct Interaction {
     Frame sh;   // shading frame
     Vec2 uv;
     Vec3 dp_du; // unnormalised tangent that the frame is built on
+    Vec3 dp_dv;
 } Interaction;
 
 KFN Vec3 theta_v3(const SceneView *scene, Int at) {

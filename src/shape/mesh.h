@@ -16,6 +16,7 @@ KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hi
     si.ng = v3_normalize(v3_cross(e1, e2));
     si.uv = (Vec2){hit->u, hit->v};
     si.dp_du = e1;
+    si.dp_dv = e2;
     if (flags & SHAPE_HAS_UVS) {
         Int uvs = SHAPE_FIELD(scene, hit->shape, uvs);
         Float u[3], v[3];
@@ -25,13 +26,15 @@ KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hi
         }
         si.uv.x = w * u[0] + hit->u * u[1] + hit->v * u[2];
         si.uv.y = w * v[0] + hit->u * v[1] + hit->v * v[2];
-        // [e1 e2] = [dp_du dp_dv] J, solved for dp_du
+        // [e1 e2] = [dp_du dp_dv] J, solved for the tangents
         Float du1 = u[1] - u[0], du2 = u[2] - u[0], dv1 = v[1] - v[0], dv2 = v[2] - v[0];
         Float det = du1 * dv2 - dv1 * du2;
         Mask usable = m_gt(f_abs(det), f_set(1e-20f));
         Float r = 1.0f / f_select(usable, det, f_set(1));
         Vec3 t = v3_scale(v3_madd(v3_scale(e1, dv2), -dv1, e2), r);
         si.dp_du = v3_select(usable, t, e1);
+        t = v3_scale(v3_madd(v3_scale(e2, du1), -du2, e1), r);
+        si.dp_dv = v3_select(usable, t, e2);
     }
     Vec3 n = si.ng;
     if (flags & SHAPE_HAS_NORMALS) {

@@ -48,6 +48,10 @@ KFN Interaction sphere_interaction(const SceneView *scene, int32_t flags, const 
     // dp_du = 2 pi (-y, x, 0) in the sphere's frame, back to the world through the transposed rotation
     Vec3 x = table_v3(scene, at + 4), y = table_v3(scene, at + 7);
     si.dp_du = v3_scale(v3_madd(v3_scale(x, -local.y), local.x, y), TWO_PI * radius);
+    // dp_dv = pi (z cos phi, z sin phi, -r), with r the distance from the axis
+    Float r = f_sqrt(local.x * local.x + local.y * local.y), zr = local.z * f_safe_rcp(r);
+    Vec3 along = v3_madd(v3_scale(x, local.x * zr), local.y * zr, y);
+    si.dp_dv = v3_scale(v3_madd(along, -r, table_v3(scene, at + 10)), PI * radius);
     if (flags & SHAPE_FLIP_NORMALS) {
         si.ng = v3_neg(si.ng);
     }

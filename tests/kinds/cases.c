@@ -28,6 +28,12 @@ static double random_value(Random *r, const ParamDesc *p) {
     case PARAM_METAL_ETA:
     case PARAM_METAL_K:
         return metal_value(r);
+    case PARAM_NORMAL:
+        return uniform(r);
+    case PARAM_HEIGHT:
+        return between(r, -0.3, 0.3);
+    case PARAM_HEIGHT_SCALE:
+        return between(r, -2, 2);
     default: {
         double low = (double)p->low, high = isinf(p->high) ? low + 5 : (double)p->high, x = uniform(r);
         return x < 0.15 ? low : x < 0.3 ? high : between(r, low, high);
@@ -62,7 +68,8 @@ static int add_to_uv(KindCase *c, Random *r) {
 }
 
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured) {
-    bool colour = p->type == PARAM_SPEC || p->type == PARAM_METAL_ETA || p->type == PARAM_METAL_K;
+    bool colour = p->type == PARAM_SPEC || p->type == PARAM_METAL_ETA || p->type == PARAM_METAL_K ||
+                  p->type == PARAM_NORMAL;
     int id = c->texture_count++;
     assert_true(c->texture_count <= CASE_TEXTURES);
     TextureNode t = {.kind = TEXTURE_CONSTANT, .to_uv = -1, .width = 1, .height = 1, .channels = colour ? 3 : 1};
@@ -152,6 +159,9 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
     static const char *const deltas[] = {"conductor", "dielectric", "thindielectric", "plastic"};
     const BsdfKind *k = rey_bsdf_kinds + kind;
     *c = (KindCase){.coat_eta = -1, .coat_alpha = -1};
+    const double surface[6] = {between(r, 0.5, 2), between(r, -1, 1), uniform(r) < 0.2 ? -1 : between(r, 0.5, 2),
+                               between(r, -0.5, 0.5), between(r, -0.5, 0.5), 1};
+    memcpy(c->surface, surface, sizeof surface);
     c->root = add_bsdf(c, r, kind, variant, textured, true);
     bool sides = k->most_children > k->fewest_children; // one function per side: each scatters on one side only
     int children = k->fewest_children + below(r, k->most_children - k->fewest_children + 1);
@@ -334,6 +344,15 @@ void random_direction(Random *r, double v[3]) {
     v[0] = s * cos(phi);
     v[1] = s * sin(phi);
     v[2] = z;
+}
+
+bool case_turns(const KindCase *c) {
+    const BsdfKind *k = rey_bsdf_kinds + c->bsdfs[c->root].kind;
+    bool turns = false;
+    for (int i = 0; i < k->param_count; i++) {
+        turns |= k->params[i].type == PARAM_NORMAL || k->params[i].type == PARAM_HEIGHT;
+    }
+    return turns;
 }
 
 void case_print(const KindCase *c, const Query *q) {

@@ -41,6 +41,8 @@ void case_update_light(KindCase *c);
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured);
 // Sets all values of a parameter of the root; names that it does not have are passed over.
 void case_set(KindCase *c, const char *name, double value);
+// Whether the function turns the shading normal.
+bool case_turns(const KindCase *c);
 // Describes a failing case on standard error.
 void case_print(const KindCase *c, const Query *q);
 

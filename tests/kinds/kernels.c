@@ -74,6 +74,14 @@ static void view_make(const KindCase *c, View *v) {
     s->bounds_radius = 10;
 }
 
+static BsdfSurface surface_make(const KindCase *c) {
+    real s[6];
+    for (int i = 0; i < 6; i++) {
+        s[i] = (real)c->surface[i];
+    }
+    return (BsdfSurface){f_set(s[0]), f_set(s[1]), f_set(s[2]), v3(f_set(s[3]), f_set(s[4]), f_set(s[5]))};
+}
+
 static Sink sink_make(View *v, const KindCase *c, double *gradient, const double *tangent) {
     for (int i = 0; tangent && i < c->theta_count; i++) {
         v->tangent[i] = (float)tangent[i];
@@ -130,7 +138,8 @@ static void run_eval(const KindCase *c, int n, const Query *q, double (*f)[3], d
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
         Int lobe = gather_lobe(q, first, n);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
+        BsdfSurface surface = surface_make(c);
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
         Spec value = bsdf_eval(&call, wi, wo, lobe);
         Float density = pdf ? bsdf_pdf(&call, wi, wo, lobe) : f_set(0);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
@@ -155,7 +164,8 @@ static void run_sample(const KindCase *c, int n, Draw *d) {
         GATHER(u1, d[AT(lane)].u1);
         GATHER(u2.x, d[AT(lane)].u2[0]);
         GATHER(u2.y, d[AT(lane)].u2[1]);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
+        BsdfSurface surface = surface_make(c);
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
         BsdfSample s = bsdf_sample(&call, wi, u1, u2);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             Draw *to = d + first + lane;
@@ -185,8 +195,11 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
         GATHER3(wo, q[AT(lane)].wo);
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor};
+        BsdfSurface surface = surface_make(c);
+        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
         Mask m = m_first_n(n - first);
+        BsdfSurface ds = {f_set(0), f_set(0), f_set(0), v3_zero()};
+        call.dsurface = &ds;
         sink.derivative = f_set(0);
         bsdf_adj(&call, wi, wo, gather_lobe(q, first, n), spec_zero_unless(m, gather_df(a, first, n)), &sink, m, &dwi,
                  &dwo, &duv);
@@ -194,6 +207,7 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
             Adjoint *to = a + first + lane;
             put3(to->dwi, dwi, lane);
             put3(to->dwo, dwo, lane);
+            put3(to->dsurface, v3(ds.ux, ds.vx, ds.vy), lane);
             to->duv[0] = (double)f_lane(duv.x, lane);
             to->duv[1] = (double)f_lane(duv.y, lane);
             to->forward = (double)f_lane(sink.derivative, lane);

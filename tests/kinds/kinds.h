@@ -28,6 +28,7 @@ typedef struct KindCase {
     int32_t coat_eta, coat_alpha; // theta entries that the table depends on, -1 = the table is fixed
     double coat_base[2];          // their values when the table was made
     double floor;
+    double surface[6]; // dp_du and dp_dv in the shading frame: ux, vx, vy; the geometric normal
 } KindCase;
 
 typedef struct Query {
@@ -44,7 +45,7 @@ typedef struct Draw {
 // Adjoint of one query: df in; the others out.
 typedef struct Adjoint {
     double df[3];
-    double dwi[3], dwo[3], duv[2];
+    double dwi[3], dwo[3], duv[2], dsurface[3];
     double forward; // along `tangent`
 } Adjoint;
 

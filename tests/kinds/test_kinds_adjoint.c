@@ -28,18 +28,22 @@ static double difference(const KindCase *c, const Query *q, const double df[3], 
     return sum / (12 * h);
 }
 
-// By how much values change when directions and uv move by a few roundings: narrow lobes amplify those.
-static double rounding_noise(const KindCase *c, const Query *q, const double df[3], Random *r) {
+// By how much values change when directions, uv and surface move by a few roundings: narrow lobes amplify those.
+static double rounding_noise(KindCase *c, const Query *q, const double df[3], Random *r) {
     double value = objective(c, q, df), noise = 1e-14 * fabs(value);
     for (int i = 0; i < 12; i++) {
         Query moved = *q;
+        double surface[3];
+        memcpy(surface, c->surface, sizeof surface);
         for (int k = 0; k < 3; k++) {
+            c->surface[k] *= 1 + between(r, -1e-15, 1e-15);
             moved.wi[k] *= 1 + between(r, -1e-15, 1e-15);
             moved.wo[k] *= 1 + between(r, -1e-15, 1e-15);
         }
         moved.uv[0] += between(r, -1e-15, 1e-15);
         moved.uv[1] += between(r, -1e-15, 1e-15);
         noise = fmax(noise, 12 * fabs(objective(c, &moved, df) - value));
+        memcpy(c->surface, surface, sizeof surface);
     }
     return noise;
 }
@@ -120,10 +124,12 @@ static int check_query(KindCase *c, Random *r, double *largest) {
     }
     struct { double *x, d; } others[] = {{&q.wi[0], a.dwi[0]}, {&q.wi[1], a.dwi[1]}, {&q.wi[2], a.dwi[2]},
                                          {&q.wo[0], a.dwo[0]}, {&q.wo[1], a.dwo[1]}, {&q.wo[2], a.dwo[2]},
-                                         {&q.uv[0], a.duv[0]}, {&q.uv[1], a.duv[1]}};
+                                         {&q.uv[0], a.duv[0]}, {&q.uv[1], a.duv[1]},
+                                         {&c->surface[0], a.dsurface[0]}, {&c->surface[1], a.dsurface[1]},
+                                         {&c->surface[2], a.dsurface[2]}};
     for (int i = 0; i < COUNT_OF(others); i++) {
         if (!matches(c, &q, a.df, others[i].x, others[i].d, -INFINITY, INFINITY, rounding)) {
-            print_error("%.1s[%d]: ", i < 3 ? "i" : i < 6 ? "o" : "uv", i < 6 ? i % 3 : i - 6);
+            print_error("%s[%d]: ", i < 3 ? "wi" : i < 6 ? "wo" : i < 8 ? "uv" : "surface", i < 6 ? i % 3 : (i - 6) % 2);
             failures++;
         }
     }
