@@ -80,8 +80,9 @@ enum {
         int slot = 0;                                                                                                  \
         PARAMS(SCATTER_FIELD) UNUSED(adjoint), UNUSED(node), UNUSED(slot), UNUSED(sink), UNUSED(m), UNUSED(duv);       \
     }
-#define BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference) DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
-#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, child, reference)                       \
+#define BSDF_LEAF(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, reference)                                        \
+    DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
+#define BSDF_ADAPTER(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, fewest, most, child, reference)                \
     DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)
 #include "bsdf/kinds.inl"
 #undef BSDF_LEAF

@@ -10,22 +10,22 @@
 #define CONFIG_ROW(field, value, choices, text) {#field, value, choices, text},
 
 // A zeroed last row keeps the arrays of kinds without parameters well-formed.
-#define BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference)                                               \
+#define BSDF_LEAF(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, reference)                                        \
     static const ParamDesc prefix##_params[] = {PARAMS(PARAM_ROW){PARAM_REAL, NULL, 0, 0, 0, NULL, NULL}};             \
     static const ConfigDesc prefix##_configs[] = {CONFIG(CONFIG_ROW){NULL, 0, NULL, NULL}};
-#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, child, reference)                       \
-    BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference)
+#define BSDF_ADAPTER(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, fewest, most, child, reference)                \
+    BSDF_LEAF(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, reference)
 #include "bsdf/kinds.inl"
 #undef BSDF_LEAF
 #undef BSDF_ADAPTER
 
 const BsdfKind rey_bsdf_kinds[] = {
-#define BSDF_LEAF(ENUM, prefix, Record, name, PARAMS, CONFIG, reference)                                               \
+#define BSDF_LEAF(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, reference)                                        \
     {name, prefix##_params, COUNT_OF(prefix##_params) - 1, prefix##_configs, COUNT_OF(prefix##_configs) - 1, 0, 0,     \
-     NULL, false, reference},
-#define BSDF_ADAPTER(ENUM, prefix, Record, name, PARAMS, CONFIG, fewest, most, child, reference)                       \
+     NULL, false, sides, reference},
+#define BSDF_ADAPTER(ENUM, prefix, Record, name, sides, PARAMS, CONFIG, fewest, most, child, reference)                \
     {name, prefix##_params, COUNT_OF(prefix##_params) - 1, prefix##_configs, COUNT_OF(prefix##_configs) - 1, fewest,   \
-     most, child, true, reference},
+     most, child, true, sides, reference},
 #include "bsdf/kinds.inl"
 #undef BSDF_LEAF
 #undef BSDF_ADAPTER

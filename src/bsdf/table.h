@@ -4,6 +4,8 @@
 
 #include "scene/kind.h"
 
+enum { REFLECTS, TRANSMITS };
+
 typedef struct BsdfKind {
     const char *name;
     const ParamDesc *params;
@@ -13,6 +15,7 @@ typedef struct BsdfKind {
     int fewest_children, most_children;
     const char *child; // name of the children in parameter paths; numbered when there can be several
     bool adapter;
+    bool transmits; // by itself, not through its children
     const char *reference;
 } BsdfKind;
 

@@ -4,7 +4,9 @@
 #include "bsdf/call.h"
 #include "bsdf/null.h"
 
-KIND_RECORD(Twosided, NO_PARAMS, NO_CONFIG)
+#define TWOSIDED_CONFIG(C)                                                                                             \
+    C(allow_transmission, 0, "false|true", "accept functions that let light through")
+KIND_RECORD(Twosided, NO_PARAMS, TWOSIDED_CONFIG)
 
 KFN Vec3 v3_flip_z(Mask flip, Vec3 v) { return v3(v.x, v.y, f_select(flip, -v.z, v.z)); }
 

@@ -255,7 +255,9 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         snprintf(child, sizeof child, "%s%s", kind->child, kind->most_children > 1 ? number : "");
         build_join(name, path, child);
         TRY(build_bsdf(b, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), i)->node, name, &bsdf->child[i]));
-        bsdf->surface |= ARRAY_AT(b->scene->build.bsdfs, BsdfNode, bsdf->child[i]).surface;
+        const BsdfNode *nested = &ARRAY_AT(b->scene->build.bsdfs, BsdfNode, bsdf->child[i]);
+        bsdf->surface |= nested->surface;
+        bsdf->transmits |= nested->transmits;
     }
     return REY_OK;
 }
@@ -314,8 +316,14 @@ rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t 
     TRY(build_slots(b, node, kind, path, &bsdf));
     for (int i = 0; i < kind->config_count; i++) {
         TRY(build_config(b, node, &kind->configs[i], &bsdf.config[i]));
+        bsdf.transmits |= strcmp(kind->configs[i].name, "transmits") == 0 && bsdf.config[i] != 0;
     }
+    bsdf.transmits |= kind->transmits;
     TRY(build_children(b, node, kind, path, &bsdf));
+    if (strcmp(kind->name, "twosided") == 0 && bsdf.transmits && !bsdf.config[0]) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
+                            "a bsdf inside 'twosided' lets light through; 'allow_transmission' accepts that");
+    }
     TRY(add_bsdf(b, index, bsdf, out));
     node->built = *out;
     TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));

@@ -28,6 +28,7 @@ typedef struct BsdfNode {
     int32_t config[MAX_CONFIG];  // uniform switches, in the order of the kind's configuration list
     int32_t child[MAX_CHILDREN]; // nested functions, -1 = none
     int32_t table;               // first derived value in `tables`, -1 = none
+    int32_t transmits;           // host only: lets light through, itself or in a child
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
 } BsdfNode;
 
