@@ -274,15 +274,16 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     return next_count + m_count(m);
 }
 
-// Hands the parameterisation of the surface to functions that ask for it.
-KFN void call_surface(BsdfCall *call, const Interaction *si, BsdfSurface *surface) {
-    if (call->scene->bsdfs[call->node].surface) {
-        surface->ux = v3_dot(si->sh.s, si->dp_du);
-        surface->vx = v3_dot(si->sh.s, si->dp_dv);
-        surface->vy = v3_dot(si->sh.t, si->dp_dv);
-        surface->ng = frame_to_local(&si->sh, si->ng);
-        call->surface = surface;
-    }
+// The parameterisation of the surface, for functions that ask for it. It looks at the surface again, so that nothing of
+// this is computed for all the others.
+static NOINLINE void find_surface(const SceneView *scene, const Group *group, const Hit *hit, BsdfSurface *surface,
+                                  Vec3 *dp_dv) {
+    Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, hit);
+    surface->ux = v3_dot(si.sh.s, si.dp_du);
+    surface->vx = v3_dot(si.sh.s, si.dp_dv);
+    surface->vy = v3_dot(si.sh.t, si.dp_dv);
+    surface->ng = frame_to_local(&si.sh, si.ng);
+    *dp_dv = si.dp_dv;
 }
 
 // Emission, light sampling and scattering of lanes that share a group.
@@ -314,7 +315,11 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
     SampleKey key = slot_key(t, v.slot);
     BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor, NULL, NULL};
     BsdfSurface surface;
-    call_surface(&call, &si, &surface);
+    Vec3 dp_dv;
+    if (scene->bsdfs[group->bsdf].surface) {
+        find_surface(scene, group, &v.hit, &surface, &dp_dv);
+        call.surface = &surface;
+    }
     if (scene->emitters_count > 0) {
         connect_lights(t, &v, &si, &call, wi, &key, bounce, record);
     }

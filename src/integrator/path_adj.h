@@ -69,6 +69,7 @@ typedef struct SurfaceSweep {
     Interaction si;
     BsdfCall call;
     BsdfSurface surface;
+    Vec3 dp_dv;
     const EmitterRecord *emitter;
     const Group *group;
 } SurfaceSweep;
@@ -197,8 +198,10 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
         // wi = to_local(-d)
         frame_to_local_adj(&s->si.sh, v3_neg(s->d), dwi, &dframe, &unused);
         // ux = s . dp_du, vx = s . dp_dv, vy = t . dp_dv
-        v3_acc(&dframe.s, v3_madd(v3_scale(s->si.dp_du, dsurface.ux), dsurface.vx, s->si.dp_dv));
-        v3_acc(&dframe.t, v3_scale(s->si.dp_dv, dsurface.vy));
+        if (call.surface) {
+            v3_acc(&dframe.s, v3_madd(v3_scale(s->si.dp_du, dsurface.ux), dsurface.vx, s->dp_dv));
+            v3_acc(&dframe.t, v3_scale(s->dp_dv, dsurface.vy));
+        }
         mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &dframe, sink, s->m);
     }
 }
@@ -223,7 +226,10 @@ static void path_backward(Tracer *t) {
         }
         SurfaceSweep s = surface_load(t, batch);
         s.call.uv.hit = &s.hit;
-        call_surface(&s.call, &s.si, &s.surface);
+        if (t->scene->bsdfs[s.group->bsdf].surface) {
+            find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
+            s.call.surface = &s.surface;
+        }
         Spec l = surface_primal(t, &s);
         Mask finite = s.m & m_finite(spec_sum(l));
         for (int c = 0; c < drives(t); c++) {
