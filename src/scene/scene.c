@@ -23,7 +23,7 @@ int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int6
         return -1;
     }
     size_t first = array->count;
-    return rey_array_push(scene->ctx, array, item_bytes, (size_t)n) || n == 0 ? (int32_t)first : -1;
+    return n == 0 || rey_array_push(scene->ctx, array, item_bytes, (size_t)n) ? (int32_t)first : -1;
 }
 
 rey_result rey_scene_freeze(rey_scene *scene) {
