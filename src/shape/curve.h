@@ -36,6 +36,11 @@ KFN Vec2 curve_uv(const SceneView *scene, const Hit *hit, Vec3 tangent, Vec3 rad
     return (Vec2){angle * INV_TWO_PI, (f_from_i(hit->prim) + hit->u) / segments};
 }
 
+// From the derivative along one segment to that along all of them, which v counts.
+KFN Vec3 curve_along(const SceneView *scene, const Hit *hit, Vec3 d) {
+    return v3_scale(d, f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count)));
+}
+
 KFN Interaction curve_finish(int32_t flags, Interaction si) {
     if (flags & SHAPE_FLIP_NORMALS) {
         si.ng = v3_neg(si.ng);
@@ -61,6 +66,7 @@ KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const
     si.p = v3_madd(p.c, p.r, e);
     si.uv = curve_uv(scene, hit, tangent, e);
     si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
+    si.dp_dv = curve_along(scene, hit, v3_madd(v3_scale(tangent, stretch), p.r1, e));
     return curve_finish(flags, si);
 }
 
@@ -83,5 +89,6 @@ KFN Interaction linear_interaction(const SceneView *scene, int32_t flags, const 
     Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));
     si.uv = curve_uv(scene, hit, tangent, e);
     si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
+    si.dp_dv = curve_along(scene, hit, v3_madd(p.c1, p.r1, e));
     return curve_finish(flags, si);
 }

@@ -23,8 +23,9 @@ KFN Interaction instance_interaction(const SceneView *scene, const Hit *hit, con
     Interaction si = *local;
     si.p = pose_to_world(scene, at, local->p);
     si.ng = pose_normal(scene, at, local->ng);
-    Vec3 d = local->dp_du;
-    si.dp_du = v3(v3_dot(table_v3(scene, at), d), v3_dot(table_v3(scene, at + 4), d), v3_dot(table_v3(scene, at + 8), d));
+    Vec3 x = table_v3(scene, at), y = table_v3(scene, at + 4), z = table_v3(scene, at + 8);
+    si.dp_du = v3(v3_dot(x, local->dp_du), v3_dot(y, local->dp_du), v3_dot(z, local->dp_du));
+    si.dp_dv = v3(v3_dot(x, local->dp_dv), v3_dot(y, local->dp_dv), v3_dot(z, local->dp_dv));
     si.sh = frame_from_tangent(pose_normal(scene, at, local->sh.n), si.dp_du);
     return si;
 }

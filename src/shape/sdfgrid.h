@@ -183,6 +183,7 @@ KFN Interaction sdfgrid_interaction(const SceneView *scene, int32_t flags, const
     si.uv = (Vec2){f_set(0), f_set(0)};
     si.sh = frame_from_normal(shading);
     si.dp_du = si.sh.s;
+    si.dp_dv = si.sh.t;
     return si;
 }
 

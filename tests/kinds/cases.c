@@ -159,9 +159,6 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
     static const char *const deltas[] = {"conductor", "dielectric", "thindielectric", "plastic"};
     const BsdfKind *k = rey_bsdf_kinds + kind;
     *c = (KindCase){.coat_eta = -1, .coat_alpha = -1};
-    const double surface[6] = {between(r, 0.5, 2), between(r, -1, 1), uniform(r) < 0.2 ? -1 : between(r, 0.5, 2),
-                               between(r, -0.5, 0.5), between(r, -0.5, 0.5), 1};
-    memcpy(c->surface, surface, sizeof surface);
     c->root = add_bsdf(c, r, kind, variant, textured, true);
     bool sides = k->most_children > k->fewest_children; // one function per side: each scatters on one side only
     int children = k->fewest_children + below(r, k->most_children - k->fewest_children + 1);
@@ -174,6 +171,10 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured) {
         int child = add_bsdf(c, r, rey_bsdf_kind_find(name), below(r, 4), textured, false);
         c->bsdfs[c->root].child[i] = child;
     }
+    Random own = {r->state + 1}; // the other kinds keep their cases
+    const double surface[6] = {between(&own, 0.5, 2), between(&own, -1, 1), uniform(&own) < 0.2 ? -1 : 1.3,
+                               between(&own, -0.5, 0.5), between(&own, -0.5, 0.5), 1};
+    memcpy(c->surface, surface, sizeof surface);
 }
 
 void case_set(KindCase *c, const char *name, double value) {

@@ -36,7 +36,7 @@ static double rounding_noise(KindCase *c, const Query *q, const double df[3], Ra
         double surface[3];
         memcpy(surface, c->surface, sizeof surface);
         for (int k = 0; k < 3; k++) {
-            c->surface[k] *= 1 + between(r, -1e-15, 1e-15);
+            c->surface[k] *= case_turns(c) ? 1 + between(r, -1e-15, 1e-15) : 1;
             moved.wi[k] *= 1 + between(r, -1e-15, 1e-15);
             moved.wo[k] *= 1 + between(r, -1e-15, 1e-15);
         }
