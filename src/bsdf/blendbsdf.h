@@ -63,8 +63,7 @@ KFN void blendbsdf_adj(const BsdfCall *call, const BlendBsdf *p, Vec3 wi, Vec3 w
     Float w = blendbsdf_weight(p);
     // f = (1 - w) first + w second
     Spec slope = spec_sub(blendbsdf_child_eval(call, 1, wi, wo, lobe), blendbsdf_child_eval(call, 0, wi, wo, lobe));
-    Mask inside = m_ge(p->weight, f_set(0)) & m_le(p->weight, f_set(1));
-    dp->weight = dp->weight + f_zero_unless(inside, spec_dot(df, slope));
+    dp->weight = dp->weight + f_zero_unless(share_inside(p->weight), spec_dot(df, slope));
     for (int child = 0; child < 2; child++) {
         Mask mine = m & lobe_in_child(lobe, child);
         if (m_any(mine)) {

@@ -40,7 +40,6 @@ KFN void mask_adj(const BsdfCall *call, const MaskBsdf *p, Vec3 wi, Vec3 wo, Int
     BsdfCall child = bsdf_child(call, 0);
     // f = o nested + (1 - o) [null]
     Float d = spec_dot(df, bsdf_eval(&child, wi, wo, lobe)) - f_zero_unless(mi_eq(lobe, i_set(LOBE_NULL)), spec_sum(df));
-    Mask inside = m_ge(p->opacity, f_set(0)) & m_le(p->opacity, f_set(1));
-    dp->opacity = dp->opacity + f_zero_unless(inside, d);
+    dp->opacity = dp->opacity + f_zero_unless(share_inside(p->opacity), d);
     bsdf_adj(&child, wi, wo, lobe, spec_scale(df, o), sink, m, dwi, dwo, duv);
 }
