@@ -63,10 +63,10 @@ static const char *escaped(const char *text, char out[1024]) {
     return out;
 }
 
-static void write_matrix(Writer *w, int depth, const char *name, const float *m, int numbers) {
+static void write_matrix(Writer *w, int depth, const char *name, const float m[16]) {
     char text[512];
     size_t n = 0;
-    for (int i = 0; i < numbers; i++) {
+    for (int i = 0; i < 16; i++) {
         n += (size_t)snprintf(text + n, sizeof text - n, "%s%.9g", i ? " " : "", (double)m[i]);
     }
     line(w, depth, "<transform name=\"%s\"><matrix value=\"%s\"/></transform>", name, text);
@@ -151,7 +151,7 @@ static void write_property(Writer *w, int depth, const rey_xml_property *p) {
         for (int i = 0; i < 16; i++) {
             m[i] = (float)p->matrix[i];
         }
-        write_matrix(w, depth, p->name, m, 16);
+        write_matrix(w, depth, p->name, m);
         break;
     default:
         break; // spectra become constants
@@ -262,13 +262,13 @@ static rey_result write_shape_parts(Writer *w, int depth, const rey_xml_node *no
     if (is_file_mesh(node)) {
         return write_mesh(w, depth, shape);
     }
-    write_matrix(w, depth, "to_world", theta(w, shape->to_world), 16);
+    write_matrix(w, depth, "to_world", theta(w, shape->to_world));
     return strcmp(node->type, "sdfgrid") == 0 ? write_grid(w, depth, shape) : REY_OK;
 }
 
 static void write_sensor_parts(Writer *w, int depth, const SensorRecord *s) {
     const float *principal = theta(w, s->principal);
-    write_matrix(w, depth, "to_world", theta(w, s->to_world), 16);
+    write_matrix(w, depth, "to_world", theta(w, s->to_world));
     line(w, depth, "<float name=\"fov\" value=\"%.9g\"/>", (double)*theta(w, s->fov));
     line(w, depth, "<float name=\"principal_point_offset_x\" value=\"%.9g\"/>", (double)principal[0]);
     line(w, depth, "<float name=\"principal_point_offset_y\" value=\"%.9g\"/>", (double)principal[1]);
@@ -283,7 +283,7 @@ static rey_result write_emitter_parts(Writer *w, int depth, const rey_xml_node *
         const float *p = theta(w, e->position);
         line(w, depth, "<point name=\"position\" value=\"%.9g %.9g %.9g\"/>", (double)p[0], (double)p[1], (double)p[2]);
     } else if (e->kind == EMITTER_ENVMAP) {
-        write_matrix(w, depth, "to_world", theta(w, e->to_world), 16);
+        write_matrix(w, depth, "to_world", theta(w, e->to_world));
         return write_picture(w, depth, e->slot, "environment");
     }
     return REY_OK;
@@ -292,7 +292,9 @@ static rey_result write_emitter_parts(Writer *w, int depth, const rey_xml_node *
 static rey_result write_texture_parts(Writer *w, int depth, const rey_xml_node *node) {
     const TextureNode *t = node->built >= 0 ? w->scene->view.textures + node->built : NULL;
     if (t && t->to_uv >= 0) {
-        write_matrix(w, depth, "to_uv", theta(w, t->to_uv), 9);
+        const float *m = theta(w, t->to_uv); // as 4 x 4: readers drop the translation of a matrix of nine numbers
+        const float pose[16] = {m[0], m[1], 0, m[2], m[3], m[4], 0, m[5], 0, 0, 1, 0, 0, 0, 0, 1};
+        write_matrix(w, depth, "to_uv", pose);
     }
     if (t && t->kind == TEXTURE_BITMAP) {
         line(w, depth, "<boolean name=\"raw\" value=\"true\"/>");
@@ -355,7 +357,7 @@ static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, con
     if (shape) {
         TRY(write_shape_parts(w, depth + 1, node, shape));
     } else if (node->tag == REY_XML_SHAPE && strcmp(node->type, "instance") == 0) {
-        write_matrix(w, depth + 1, "to_world", theta(w, w->scene->view.instances[node->built].to_world), 16);
+        write_matrix(w, depth + 1, "to_world", theta(w, w->scene->view.instances[node->built].to_world));
     } else if (node->tag == REY_XML_SENSOR) {
         write_sensor_parts(w, depth + 1, w->scene->view.sensors + node->built);
     } else if (node->tag == REY_XML_EMITTER) {

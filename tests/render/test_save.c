@@ -1,0 +1,141 @@
+// test_save.c: a scene that is saved and loaded again renders the same picture, bit for bit.
+#include "io/image.h"
+#include "reynolds/reynolds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { NUMBERS = 24 * 24 * 3 };
+
+typedef struct Fixture {
+    rey_context *ctx;
+    char folder[64], texels[128], sky[128];
+} Fixture;
+
+static int set_up(void **state) {
+    Fixture *f = calloc(1, sizeof *f);
+    float texels[4 * 3 * 3], sky[8 * 5 * 3];
+    for (int i = 0; i < 4 * 3 * 3; i++) {
+        texels[i] = 0.2f + (float)(i * 7 % 36) / 60;
+    }
+    for (int i = 0; i < 8 * 5 * 3; i++) {
+        sky[i] = 0.1f + (float)(i * 11 % 120) / 200;
+    }
+    if (!f || rey_context_create(NULL, &f->ctx)) {
+        return 1;
+    }
+    snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_save_XXXXXX");
+    if (!mkdtemp(f->folder)) {
+        return 1;
+    }
+    snprintf(f->texels, sizeof f->texels, "%s/texels.exr", f->folder);
+    snprintf(f->sky, sizeof f->sky, "%s/sky.exr", f->folder);
+    *state = f;
+    return rey_exr_write(f->ctx, f->texels, texels, 4, 3, 3, NULL) || rey_exr_write(f->ctx, f->sky, sky, 8, 5, 3, NULL);
+}
+
+static int tear_down(void **state) {
+    Fixture *f = *state;
+    char command[128];
+    snprintf(command, sizeof command, "rm -r %s", f->folder);
+    int status = system(command);
+    rey_context_destroy(f->ctx);
+    free(f);
+    return status;
+}
+
+static rey_scene *load(Fixture *f, const char *path, int define_count) {
+    rey_define defines[] = {{"texels", f->texels}, {"sky", f->sky}};
+    rey_scene *scene = NULL;
+    if (rey_scene_load(f->ctx, path, defines, define_count, &scene)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    return scene;
+}
+
+static void render(Fixture *f, rey_scene *scene, float picture[NUMBERS]) {
+    rey_render_def def = rey_default_render_def();
+    int width, height;
+    def.spp = 4;
+    assert_int_equal(rey_scene_film_size(scene, 0, &width, &height), REY_OK);
+    assert_int_equal(width * height * 3, NUMBERS);
+    if (rey_render(scene, &def, picture, NULL)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+}
+
+static void expect_same(Fixture *f, const char *path, int define_count) {
+    static float before[NUMBERS], after[NUMBERS];
+    char copy[128];
+    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+    rey_scene *scene = load(f, path, define_count);
+    render(f, scene, before);
+    if (rey_scene_save(scene, copy)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    rey_scene_destroy(scene);
+    scene = load(f, copy, 0);
+    render(f, scene, after);
+    rey_scene_destroy(scene);
+    assert_memory_equal(before, after, sizeof before);
+}
+
+static void rooms_come_back(void **state) {
+    Fixture *f = *state;
+    expect_same(f, RENDER_DIR "/materials.xml", 2);
+    expect_same(f, RENDER_DIR "/shapes.xml", 0);
+    expect_same(f, RENDER_DIR "/principled.xml", 2);
+}
+
+// A frontal wall and a mesh; what stands in %s differs from case to case.
+static void expect_wall_same(Fixture *f, const char *texture, const char *mesh) {
+    char path[128];
+    snprintf(path, sizeof path, "%s/wall.xml", f->folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file,
+            "<scene version=\"3.0.0\"><integrator type=\"path\"/><sensor type=\"perspective\">"
+            "<transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
+            "<film type=\"hdrfilm\"><integer name=\"width\" value=\"24\"/><integer name=\"height\" value=\"24\"/></film>"
+            "</sensor><emitter type=\"constant\"/><shape type=\"rectangle\"><bsdf type=\"diffuse\">%s</bsdf></shape>"
+            "<shape type=\"ply\"><string name=\"filename\" value=\"" RENDER_DIR "/quilt.ply\"/>%s</shape></scene>",
+            texture, mesh);
+    assert_int_equal(fclose(file), 0);
+    expect_same(f, path, 0);
+}
+
+static void texture_poses_come_back(void **state) {
+    static const char pose[] = "<transform name=\"to_uv\"><matrix value=\"3 0.5 0 0.3  -0.2 2 0 0.6  0 0 1 0  0 0 0 1\"/>"
+                               "</transform></texture>";
+    Fixture *f = *state;
+    char text[512];
+    snprintf(text, sizeof text, "<texture type=\"checkerboard\" name=\"reflectance\">%s", pose);
+    expect_wall_same(f, text, "");
+    snprintf(text, sizeof text, "<texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" value=\"%s\"/>%s",
+             f->texels, pose);
+    expect_wall_same(f, text, "");
+}
+
+static void mesh_flags_come_back(void **state) {
+    Fixture *f = *state;
+    expect_wall_same(f, "", "<boolean name=\"face_normals\" value=\"true\"/>");
+    expect_wall_same(f, "", "<boolean name=\"face_normals\" value=\"false\"/>");
+    expect_wall_same(f, "", "<boolean name=\"flip_normals\" value=\"true\"/><bsdf type=\"diffuse\"/>");
+    expect_wall_same(f, "", "<boolean name=\"flip_tex_coords\" value=\"true\"/>"
+                            "<transform name=\"to_world\"><scale x=\"-1\" y=\"0.5\"/></transform>");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rooms_come_back),
+        cmocka_unit_test(texture_poses_come_back),
+        cmocka_unit_test(mesh_flags_come_back),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
