@@ -8,7 +8,7 @@ rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *
     if (!ctx || !path || !out || (define_count && !defines)) {
         return REY_ERROR_ARGUMENT;
     }
-    rey_result result = rey_mitsuba_load(ctx, path, defines, define_count, out);
+    rey_result result = rey_mitsuba_load(ctx, path, defines, define_count, false, out);
     if (result == REY_OK) {
         result = rey_scene_update(*out);
     }

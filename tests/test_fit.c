@@ -356,6 +356,31 @@ static void test_damaged_checkpoint(void **state) {
     rey_free(f->ctx, bytes);
 }
 
+// Defines are for the job's scene; a truth that is wrong loses neither the recovered scene nor the report.
+static void test_truth_loses_nothing(void **state) {
+    Fixture *f = *state;
+    FitResult result;
+    const char *sets[] = {f->target_set, "defines.alpha=0.3", "iterations=2", "report_spp=4", "truth.scene=truth.xml"};
+    char folder[128];
+    snprintf(folder, sizeof folder, "%s/t", f->folder);
+    FitDef def = {.job_path = JOB, .overrides = sets, .override_count = COUNT_OF(sets), .output = folder};
+    if (rey_fit(f->ctx, &def, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    assert_non_null(ARRAY_AT(result.rows, FitRow, 0).truth);
+    rey_fit_result_free(&result);
+
+    sets[4] = "truth.scene=nowhere.xml";
+    snprintf(folder, sizeof folder, "%s/u", f->folder);
+    assert_int_equal(rey_fit(f->ctx, &def, &result), REY_ERROR_IO);
+    assert_non_null(strstr(rey_error(f->ctx), "nowhere.xml"));
+    assert_non_null(result.scene);
+    assert_non_null(result.report);
+    assert_int_equal(access(result.scene, R_OK), 0);
+    assert_int_equal(access(result.report, R_OK), 0);
+    rey_fit_result_free(&result);
+}
+
 static void test_fit_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
@@ -392,6 +417,7 @@ int main(void) {
         cmocka_unit_test(test_fit_recovers),
         cmocka_unit_test(test_fit_resumes),
         cmocka_unit_test(test_damaged_checkpoint),
+        cmocka_unit_test(test_truth_loses_nothing),
         cmocka_unit_test(test_fit_errors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

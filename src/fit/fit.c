@@ -390,9 +390,22 @@ static rey_result finish(Fit *fit, FitResult *out) {
     if (!result) {
         result = rey_fit_table(fit, out);
     }
-    if (!result && fit->job.report_spp) {
+    if (result) {
+        return result;
+    }
+    // A truth that cannot be opened is an error, and the report of what was found is written all the same.
+    char *wrong = NULL;
+    rey_result judged = rey_fit_judge(fit, out);
+    if (judged) {
+        wrong = rey_strdup(fit->ctx, rey_error(fit->ctx));
+    }
+    if (fit->job.report_spp && judged != REY_ERROR_CANCELLED) {
         result = rey_report_write(fit, out);
     }
+    if (judged && !result) {
+        result = wrong ? rey_fail(fit->ctx, judged, "%s", wrong) : judged;
+    }
+    rey_free(fit->ctx, wrong);
     return result;
 }
 

@@ -92,5 +92,7 @@ rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count);
 rey_result rey_metrics_image(Fit *fit, int view, const float *image);
 void rey_metrics_close(Fit *fit);
 
-// Fills result->rows; opens the truth when the job names one, which nothing does before.
+// Fills result->rows with starts and found values.
 rey_result rey_fit_table(Fit *fit, FitResult *result);
+// Adds truths and errors to the rows; opens the truth when the job names one, which nothing does before.
+rey_result rey_fit_judge(Fit *fit, FitResult *result);

@@ -1,6 +1,8 @@
 // table.c: the final table: truth, start, found and error of every unknown. The truth is opened here, after the
 // optimisation is over, and nowhere else.
 #include "fit/fit.h"
+#include "io/mitsuba.h"
+#include "render/update.h"
 
 #include <math.h>
 #include <string.h>
@@ -15,7 +17,7 @@ static float *copy_floats(rey_context *ctx, const float *values, int64_t count) 
     return copy;
 }
 
-static rey_result add_rows(Fit *fit, FitResult *result) {
+rey_result rey_fit_table(Fit *fit, FitResult *result) {
     const Unknowns *u = &fit->unknowns;
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
@@ -115,16 +117,21 @@ static rey_result check_films(Fit *fit, const rey_scene *truth) {
     return REY_OK;
 }
 
-rey_result rey_fit_table(Fit *fit, FitResult *out) {
-    rey_result result = add_rows(fit, out);
-    if (result || !fit->job.truth_scene) {
-        return result;
+// The job's defines are those of its scene: the truth need not use them.
+static rey_result load_truth(Fit *fit, rey_scene **out) {
+    const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
+    rey_result result = path ? rey_mitsuba_load(fit->ctx, path, fit->job.defines, fit->job.define_count, true, out)
+                             : REY_ERROR_MEMORY;
+    return result ? result : rey_scene_update(*out);
+}
+
+rey_result rey_fit_judge(Fit *fit, FitResult *out) {
+    if (!fit->job.truth_scene) {
+        return REY_OK;
     }
     rey_scene *truth = NULL;
-    const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
     float *ones = rey_alloc_array(fit->ctx, (size_t)fit->largest, sizeof *ones);
-    result = path && ones ? rey_scene_load(fit->ctx, path, fit->job.defines, fit->job.define_count, &truth)
-                          : REY_ERROR_MEMORY;
+    rey_result result = ones ? load_truth(fit, &truth) : REY_ERROR_MEMORY;
     for (int64_t i = 0; ones && i < fit->largest; i++) {
         ones[i] = 1;
     }

@@ -181,7 +181,7 @@ static void source_free(void *document) {
     rey_free(source->ctx, source);
 }
 
-rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, bool spare,
                             rey_scene **out) {
     Builder b = {.ctx = ctx, .collection = -1};
     *out = NULL;
@@ -192,7 +192,7 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         b.source->ctx = ctx;
         b.scene->document = b.source;
         b.scene->document_free = source_free;
-        result = rey_xml_read(ctx, path, defines, define_count, &b.source->document);
+        result = (spare ? rey_xml_read_spare : rey_xml_read)(ctx, path, defines, define_count, &b.source->document);
     }
     if (result == REY_OK) {
         result = build_scene(&b);

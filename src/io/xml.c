@@ -225,17 +225,17 @@ static rey_result read_document(XmlReader *reader, const char *path, const char 
     if (!result) {
         result = rey_xml_resolve_references(reader);
     }
-    if (!result) {
+    if (!result && !reader->spare_defines) {
         result = rey_xml_check_defines(reader, at);
     }
     rey_free(reader->ctx, loaded);
     return result;
 }
 
-rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *text, size_t bytes,
-                               const rey_define *defines, int define_count, rey_xml_document **out) {
+static rey_result read_scene(rey_context *ctx, const char *path, const char *text, size_t bytes,
+                             const rey_define *defines, int define_count, bool spare, rey_xml_document **out) {
     *out = NULL;
-    XmlReader reader = {.ctx = ctx, .document = rey_alloc(ctx, sizeof(rey_xml_document))};
+    XmlReader reader = {.ctx = ctx, .document = rey_alloc(ctx, sizeof(rey_xml_document)), .spare_defines = spare};
     if (!reader.document) {
         return REY_ERROR_MEMORY;
     }
@@ -255,7 +255,17 @@ rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *t
 
 rey_result rey_xml_read(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                         rey_xml_document **out) {
-    return rey_xml_read_memory(ctx, path, NULL, 0, defines, define_count, out);
+    return read_scene(ctx, path, NULL, 0, defines, define_count, false, out);
+}
+
+rey_result rey_xml_read_spare(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                              rey_xml_document **out) {
+    return read_scene(ctx, path, NULL, 0, defines, define_count, true, out);
+}
+
+rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *text, size_t bytes,
+                               const rey_define *defines, int define_count, rey_xml_document **out) {
+    return read_scene(ctx, path, text, bytes, defines, define_count, false, out);
 }
 
 // ---- access ------------------------------------------------------------------------------------------------------

@@ -101,6 +101,9 @@ enum {
 // with the content), REY_ERROR_MEMORY.
 rey_result rey_xml_read(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                         rey_xml_document **out);
+// The same; defines that the scene never uses are no error.
+rey_result rey_xml_read_spare(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                              rey_xml_document **out);
 // The same from memory; path names the text in messages, and its folder is where files are looked up.
 rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *text, size_t bytes,
                                const rey_define *defines, int define_count, rey_xml_document **out);

@@ -85,6 +85,7 @@ typedef struct XmlReader {
     XmlFile *file;     // innermost
     int file_count;
     size_t bytes_read, substituted;
+    bool spare_defines; // the caller's defines may go unused
 } XmlReader;
 
 // ---- grammar (xml_grammar.c) and elements (xml_element.c) --------------------------------------------------------
