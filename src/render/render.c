@@ -248,7 +248,7 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
                             "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
                             rey_term_name(bit), info.why, interior ? ". --terms interior gives the part that does" : "");
         }
-        if (!interior) {
+        if (missing && !interior) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
