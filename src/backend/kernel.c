@@ -42,8 +42,11 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     int32_t x0 = job->x - job->border, y0 = job->y - job->border;
     int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
     for (int32_t i = 0; i < count; i++) {
-        double l[SPEC_N] = {(double)t->ws.lx[i], (double)t->ws.ly[i], (double)t->ws.lz[i]};
-        double sum = l[0] + l[1] + l[2];
+        double l[SPEC_N], sum = 0;
+        for (int c = 0; c < SPEC_N; c++) {
+            l[c] = (double)t->ws.radiance[c][i];
+            sum += l[c];
+        }
         if (!(sum - sum == 0)) {
             job->nonfinite++;
             continue;
@@ -94,9 +97,9 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
                 delta[k % SPEC_N] += wx[k / SPEC_N] * wy[j] * row[k];
             }
         }
-        t->ws.ax[i] = delta[0];
-        t->ws.ay[i] = delta[1];
-        t->ws.az[i] = delta[2];
+        for (int c = 0; c < SPEC_N; c++) {
+            t->ws.adjoint[c][i] = delta[c];
+        }
     }
 }
 
@@ -117,9 +120,8 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);
         }
-        real *const sums[] = {t->ws.lx, t->ws.ly, t->ws.lz};
-        for (int c = 0; c < COUNT_OF(sums); c++) {
-            memset(sums[c], 0, (size_t)count * sizeof(real));
+        for (int c = 0; c < SPEC_N; c++) {
+            memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
         }
         path_backward(t);
     }

@@ -36,17 +36,13 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count) {
     v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
     v.d = LOAD_V3(*p, dx, dy, dz, v.at);
     v.origin = LOAD_V3(*p, px, py, pz, v.at);
-    v.beta = spec_of(LOAD_V3(*p, bx, by, bz, v.at));
+    v.beta = spec_gather(p->beta, v.at);
     v.pdf = real_gather(p->pdf, v.at);
     return v;
 }
 
 // Adds radiance to the slots' sums. Slots are distinct within a batch.
-KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) {
-    f_scatter_add(t->ws.lx, slot, l.c[0], m);
-    f_scatter_add(t->ws.ly, slot, l.c[1], m);
-    f_scatter_add(t->ws.lz, slot, l.c[2], m);
-}
+KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) { spec_scatter_add(t->ws.radiance, slot, l, m); }
 
 // Claims LANES record entries for a batch; -1 when there is no room.
 KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count) {
@@ -74,13 +70,9 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis) {
     f_store(r->dx + at, v->d.x);
     f_store(r->dy + at, v->d.y);
     f_store(r->dz + at, v->d.z);
-    f_store(r->bx + at, v->beta.c[0]);
-    f_store(r->by + at, v->beta.c[1]);
-    f_store(r->bz + at, v->beta.c[2]);
     f_store(r->mis + at, mis);
-    f_store(r->ltx + at, f_set(0));
-    f_store(r->lty + at, f_set(0));
-    f_store(r->ltz + at, f_set(0));
+    spec_store(r->beta, at, v->beta);
+    spec_store(r->light_weight, at, spec_zero());
     f_store(r->sw + at, f_set(0));
 }
 
@@ -191,9 +183,7 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     f_compress(q->dy + at, d.y, m);
     f_compress(q->dz + at, d.z, m);
     f_compress(q->tmax + at, length * (1.0f - 9e-4f), m);
-    f_compress(q->lx + at, l.c[0], m);
-    f_compress(q->ly + at, l.c[1], m);
-    f_compress(q->lz + at, l.c[2], m);
+    spec_compress(q->radiance, at, l, m);
     i_compress(q->slot + at, v->slot, m);
     i_compress(q->record + at, i_iota() + record, m);
     t->shadow_count += m_count(m);
@@ -207,10 +197,8 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
         f_store(r->lu + record, s.uv.x);
         f_store(r->lv + record, s.uv.y);
         f_store(r->ldist + record, s.distance);
-        Float w = f_zero_unless(m, weight);
-        f_store(r->ltx + record, w); // times the transmittance, once it is known
-        f_store(r->lty + record, w);
-        f_store(r->ltz + record, w);
+        // Times the transmittance, once it is known.
+        spec_store(r->light_weight, record, spec_set(f_zero_unless(m, weight)));
     }
 }
 
@@ -255,9 +243,7 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     f_compress(next->py + next_count, si->p.y, m);
     f_compress(next->pz + next_count, si->p.z, m);
     f_compress(next->tmax + next_count, f_set(INFINITY), m);
-    f_compress(next->bx + next_count, beta.c[0], m);
-    f_compress(next->by + next_count, beta.c[1], m);
-    f_compress(next->bz + next_count, beta.c[2], m);
+    spec_compress(next->beta, next_count, beta, m);
     f_compress(next->eta2 + next_count, eta2, m);
     f_compress(next->roulette + next_count, roulette, m);
     f_compress(next->pdf + next_count, f_select(mi_eq(s.lobe, i_set(LOBE_SMOOTH)), pdf, f_set(-1)), m);
@@ -355,16 +341,13 @@ static void shadow_stage(Tracer *t) {
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
         Spec transmittance = trace_transmittance(t->scene, &ray, m);
-        Spec l = spec_of(v3(f_load(q->lx + k), f_load(q->ly + k), f_load(q->lz + k)));
+        Spec l = spec_load(q->radiance, k);
         Mask open = m & m_gt(spec_max(transmittance), f_set(0));
         slot_add(t, i_load(q->slot + k), spec_mul(l, transmittance), open);
         if (t->derivative) {
             Int record = i_select(m, i_load(q->record + k), i_set(0));
-            Records *r = &t->ws.records;
-            real *const weights[SPEC_N] = {r->ltx, r->lty, r->ltz};
-            for (int c = 0; c < SPEC_N; c++) {
-                f_scatter(weights[c], record, real_gather(weights[c], record) * transmittance.c[c], m);
-            }
+            real *const *weights = t->ws.records.light_weight;
+            spec_scatter(weights, record, spec_mul(spec_gather(weights, record), transmittance), m);
         }
     }
     t->job->rays += t->shadow_count;

@@ -14,7 +14,7 @@ KFN Vec3 record_v3(const real *x, const real *y, const real *z, int32_t at) {
 // The adjoint of one slot: in reverse mode the film's, in forward mode channel by channel 1.
 KFN Spec slot_adjoint(const Tracer *t, Int slot, int channel) {
     if (t->job->mode == MODE_REVERSE) {
-        return spec_of(LOAD_V3(t->ws, ax, ay, az, slot));
+        return spec_gather(t->ws.adjoint, slot);
     }
     Spec delta = spec_zero();
     delta.c[channel] = f_set(1);
@@ -24,8 +24,7 @@ KFN Spec slot_adjoint(const Tracer *t, Int slot, int channel) {
 // Forward mode: moves what the sink gathered to the slots' derivative of one channel.
 KFN void forward_flush(Tracer *t, Sink *sink, Int slot, int channel, Mask m) {
     if (t->job->mode == MODE_FORWARD) {
-        real *const sums[SPEC_N] = {t->ws.lx, t->ws.ly, t->ws.lz};
-        f_scatter_add(sums[channel], slot, sink->derivative, m & m_finite(sink->derivative));
+        f_scatter_add(t->ws.radiance[channel], slot, sink->derivative, m & m_finite(sink->derivative));
         sink->derivative = f_set(0);
     }
 }
@@ -39,16 +38,14 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     Mask m = m_first_n(batch->count);
     Int slot = i_select(m, i_load(r->slot + at), i_set(0));
     Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
-    Spec beta = spec_of(record_v3(r->bx, r->by, r->bz, at));
+    Spec beta = spec_load(r->beta, at);
     Float mis = f_load(r->mis + at);
     Vec2 uv = {f_set(0), f_set(0)};
     if (e->kind == EMITTER_ENVMAP) {
         uv = envmap_uv(t->scene, e, d);
     }
     Spec l = spec_scale(emitter_eval(t->scene, e, texcoord(uv, NULL), f_set(1)), mis);
-    f_scatter(t->ws.sx, slot, l.c[0], m);
-    f_scatter(t->ws.sy, slot, l.c[1], m);
-    f_scatter(t->ws.sz, slot, l.c[2], m);
+    spec_scatter(t->ws.suffix, slot, l, m);
     for (int c = 0; c < drives(t); c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
@@ -116,10 +113,10 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.hit.v = f_load(r->v + at);
     s.hit.p = record_v3(r->px, r->py, r->pz, at);
     s.d = record_v3(r->dx, r->dy, r->dz, at);
-    s.beta = spec_of(record_v3(r->bx, r->by, r->bz, at));
+    s.beta = spec_load(r->beta, at);
     s.mis = f_load(r->mis + at);
-    s.suffix = spec_of(LOAD_V3(t->ws, sx, sy, sz, s.slot));
-    s.light_weight = spec_of(record_v3(r->ltx, r->lty, r->ltz, at));
+    s.suffix = spec_gather(t->ws.suffix, s.slot);
+    s.light_weight = spec_load(r->light_weight, at);
     s.scatter_weight = f_load(r->sw + at);
     s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
     s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
@@ -236,8 +233,6 @@ static void path_backward(Tracer *t) {
             surface_adj(t, &s, spec_zero_unless(finite, slot_adjoint(t, s.slot, c)), &sink);
             forward_flush(t, &sink, s.slot, c, s.m);
         }
-        f_scatter(t->ws.sx, s.slot, f_zero_unless(finite, l.c[0]), s.m);
-        f_scatter(t->ws.sy, s.slot, f_zero_unless(finite, l.c[1]), s.m);
-        f_scatter(t->ws.sz, s.slot, f_zero_unless(finite, l.c[2]), s.m);
+        spec_scatter(t->ws.suffix, s.slot, spec_zero_unless(finite, l), s.m);
     }
 }

@@ -43,23 +43,7 @@ KFN SampleKey slot_key(const Tracer *t, Int slot) {
     return key;
 }
 
-KFN Float real_gather(const real *base, Int index) {
-#if LANES == 1
-    return base[index];
-#else
-    return f_gather(base, index);
-#endif
-}
-
 #define LOAD_V3(a, x, y, z, i) v3(real_gather((a).x, i), real_gather((a).y, i), real_gather((a).z, i))
-
-KFN Spec spec_of(Vec3 v) {
-    Spec s;
-    s.c[0] = v.x;
-    s.c[1] = v.y;
-    s.c[2] = v.z;
-    return s;
-}
 
 // ---- camera ------------------------------------------------------------------------------------------------------
 
@@ -97,17 +81,14 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         f_store(p->py + i, ray.o.y);
         f_store(p->pz + i, ray.o.z);
         f_store(p->tmax + i, ray.tmax);
-        real *const ones[] = {p->bx, p->by, p->bz, p->eta2, p->roulette};
-        for (int k = 0; k < COUNT_OF(ones); k++) {
-            f_store(ones[k] + i, f_set(1));
-        }
+        spec_store(p->beta, i, spec_set(f_set(1)));
+        f_store(p->eta2 + i, f_set(1));
+        f_store(p->roulette + i, f_set(1));
         f_store(p->pdf + i, f_set(-1));
         i_store(p->slot + i, slot);
         i_store(p->medium + i, i_set(t->sensor->medium));
-        real *const zeros[] = {t->ws.lx, t->ws.ly, t->ws.lz, t->ws.sx, t->ws.sy, t->ws.sz};
-        for (int k = 0; k < COUNT_OF(zeros); k++) {
-            f_store(zeros[k] + i, f_set(0));
-        }
+        spec_store(t->ws.radiance, i, spec_zero());
+        spec_store(t->ws.suffix, i, spec_zero());
     }
     t->active = count;
     t->current = 0;

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "integrator/job.h"
-#include "math/lanes.h"
+#include "math/spec_rows.h"
 
 enum {
     CHUNK = 2048,              // paths per chunk in pictures
@@ -15,31 +15,35 @@ enum {
 
 // A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot.
 #define PATH_FLOATS(F)                                                                                                 \
-    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(bx) F(by) F(bz) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz)
+    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz)
+#define PATH_SPECS(S) S(beta)
 #define PATH_INTS(I) I(slot) I(medium)
 
 // A shadow ray: ray, what it brings if nothing is in the way, whom.
-#define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(lx) F(ly) F(lz)
+#define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)
+#define SHADOW_SPECS(S) S(radiance)
 #define SHADOW_INTS(I) I(slot) I(record)
 
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
 // the light sample (direction, where the light's texture was read, distance, transmittance over density),
 // the sampled direction (world) and 1 / (density x survival).
 #define RECORD_FLOATS(F)                                                                                               \
-    F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(bx) F(by) F(bz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist)     \
-    F(ltx) F(lty) F(ltz) F(wox) F(woy) F(woz) F(sw)
+    F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
+    F(sw)
+#define RECORD_SPECS(S) S(beta) S(light_weight)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe)
 
 #define DECLARE_FLOAT(name) real *name;
+#define DECLARE_SPEC(name) SpecRows name;
 #define DECLARE_INT(name) int32_t *name;
 typedef struct Paths {
-    PATH_FLOATS(DECLARE_FLOAT) PATH_INTS(DECLARE_INT)
+    PATH_FLOATS(DECLARE_FLOAT) PATH_SPECS(DECLARE_SPEC) PATH_INTS(DECLARE_INT)
 } Paths;
 typedef struct Shadows {
-    SHADOW_FLOATS(DECLARE_FLOAT) SHADOW_INTS(DECLARE_INT)
+    SHADOW_FLOATS(DECLARE_FLOAT) SHADOW_SPECS(DECLARE_SPEC) SHADOW_INTS(DECLARE_INT)
 } Shadows;
 typedef struct Records {
-    RECORD_FLOATS(DECLARE_FLOAT) RECORD_INTS(DECLARE_INT)
+    RECORD_FLOATS(DECLARE_FLOAT) RECORD_SPECS(DECLARE_SPEC) RECORD_INTS(DECLARE_INT)
 } Records;
 
 // Tags of path vertices.
@@ -60,8 +64,10 @@ typedef struct Workspace {
     // per ray of the current bounce
     int32_t *hit_shape, *hit_prim, *hit_instance, *hit_group, *order;
     real *hit_u, *hit_v, *hit_x, *hit_y, *hit_z;
-    // per slot: radiance (or derivative), film position, pixel and sample numbers, adjoint, suffix radiance
-    real *lx, *ly, *lz, *film_x, *film_y, *ax, *ay, *az, *sx, *sy, *sz;
+    // per slot: radiance (or derivative), film's adjoint, radiance of the path behind a vertex, film position, pixel and
+    // sample numbers
+    SpecRows radiance, adjoint, suffix;
+    real *film_x, *film_y;
     int32_t *pixel, *sample;
 } Workspace;
 
@@ -79,15 +85,28 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
         (pointer) = block ? (void *)(block + at) : NULL;                                                               \
         at += ((count) * sizeof *(pointer) + 63) / 64 * 64;                                                            \
     }
+#define CARVE_SPEC(rows, count)                                                                                        \
+    for (int c = 0; c < SPEC_N; c++) {                                                                                 \
+        CARVE((rows)[c], count)                                                                                        \
+    }
 #define CARVE_PATH(name) CARVE(ws->paths[i].name, n)
+#define CARVE_PATH_SPEC(name) CARVE_SPEC(ws->paths[i].name, n)
     for (int i = 0; i < 2; i++) {
-        PATH_FLOATS(CARVE_PATH) PATH_INTS(CARVE_PATH)
+        PATH_FLOATS(CARVE_PATH)
+        PATH_SPECS(CARVE_PATH_SPEC)
+        PATH_INTS(CARVE_PATH)
     }
 #define CARVE_SHADOW(name) CARVE(ws->shadows.name, n)
-    SHADOW_FLOATS(CARVE_SHADOW) SHADOW_INTS(CARVE_SHADOW)
+#define CARVE_SHADOW_SPEC(name) CARVE_SPEC(ws->shadows.name, n)
+    SHADOW_FLOATS(CARVE_SHADOW)
+    SHADOW_SPECS(CARVE_SHADOW_SPEC)
+    SHADOW_INTS(CARVE_SHADOW)
     if (derivative) {
 #define CARVE_RECORD(name) CARVE(ws->records.name, m)
-        RECORD_FLOATS(CARVE_RECORD) RECORD_INTS(CARVE_RECORD)
+#define CARVE_RECORD_SPEC(name) CARVE_SPEC(ws->records.name, m)
+        RECORD_FLOATS(CARVE_RECORD)
+        RECORD_SPECS(CARVE_RECORD_SPEC)
+        RECORD_INTS(CARVE_RECORD)
         CARVE(ws->batches, (size_t)ws->batch_capacity)
     }
     CARVE(ws->hit_shape, n)
@@ -100,11 +119,11 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE(ws->hit_x, n)
     CARVE(ws->hit_y, n)
     CARVE(ws->hit_z, n)
-    real **const slots[] = {&ws->lx, &ws->ly, &ws->lz, &ws->film_x, &ws->film_y, &ws->ax,
-                            &ws->ay, &ws->az, &ws->sx, &ws->sy,     &ws->sz};
-    for (int i = 0; i < COUNT_OF(slots); i++) {
-        CARVE(*slots[i], n)
-    }
+    CARVE_SPEC(ws->radiance, n)
+    CARVE_SPEC(ws->adjoint, n)
+    CARVE_SPEC(ws->suffix, n)
+    CARVE(ws->film_x, n)
+    CARVE(ws->film_y, n)
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
     return at;
