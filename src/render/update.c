@@ -11,6 +11,7 @@
 rey_result rey_scene_update(rey_scene *scene) {
     SceneView *view = &scene->view;
     rey_result result = REY_OK;
+    rey_scene_mark_changes(scene);
     if (!scene->dirty) {
         return REY_OK;
     }

@@ -115,7 +115,10 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
     }
     memmove(scene->view.theta + p->theta, values, (size_t)count * sizeof *values);
     p->version++;
-    scene->dirty = true;
+    return REY_OK;
+}
+
+static void mark_change(rey_scene *scene, const Param *p) {
     if (p->texture >= 0) {
         texture_changed(scene, p->texture);
     }
@@ -129,7 +132,17 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
     if (p->emitter >= 0) {
         scene->dirty_emitters[p->emitter] = 1;
     }
-    return REY_OK;
+}
+
+void rey_scene_mark_changes(rey_scene *scene) {
+    for (size_t i = 0; i < scene->params.count; i++) {
+        Param *p = &ARRAY_AT(scene->params, Param, i);
+        if (p->version != p->built) {
+            mark_change(scene, p);
+            p->built = p->version;
+            scene->dirty = true;
+        }
+    }
 }
 
 rey_result rey_param_set(rey_scene *scene, int param, const float *values, int64_t count) {

@@ -125,7 +125,8 @@ typedef struct Param {
     int32_t geometry;         // shape whose geometry follows, -1 = none
     int32_t instance;         // instance whose pose this is, -1 = none
     int32_t emitter;          // emitter whose pose this is, -1 = none
-    uint32_t version;         // counts changes
+    uint32_t version;         // counts changes of the values
+    uint32_t built;           // the version that derived data was built from
 } Param;
 #define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
 
@@ -165,5 +166,7 @@ rey_result rey_scene_freeze(rey_scene *scene);
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);
-// Writes a parameter's values after checking them, and notes what has to be rebuilt.
+// Writes a parameter's values after checking them, and counts its version up.
 rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count);
+// Marks the derived data of every parameter whose version is not the one that it was built from.
+void rey_scene_mark_changes(rey_scene *scene);
