@@ -7,8 +7,7 @@
 #include "math/spec_rows.h"
 
 enum {
-    CHUNK = 2048,              // paths per chunk in pictures
-    CHUNK_ADJOINT = 512,       // paths per chunk in derivatives, so that their records stay in the cache
+    CHUNK = 2048,              // paths per chunk
     RECORDS_PER_PATH = 64,     // a chunk that needs more is run again in halves
     MAX_BOUNCES = 1 << 20
 };
@@ -75,9 +74,9 @@ typedef struct Workspace {
 static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
     size_t at = 0;
     bool derivative = mode != MODE_PRIMAL;
-    ws->chunk = derivative ? CHUNK_ADJOINT : CHUNK;
+    ws->chunk = CHUNK;
     size_t n = (size_t)ws->chunk + 2 * LANES;
-    ws->record_capacity = derivative ? CHUNK_ADJOINT * RECORDS_PER_PATH : 0;
+    ws->record_capacity = derivative ? CHUNK * RECORDS_PER_PATH : 0;
     ws->batch_capacity = derivative ? ws->record_capacity / 8 : 0;
     size_t m = (size_t)ws->record_capacity + 2 * LANES;
 #define CARVE(pointer, count)                                                                                          \
