@@ -24,13 +24,13 @@ def main():
     parser.add_argument("--folder", default="build/bench")
     options = parser.parse_args()
     reynolds = os.path.abspath(options.reynolds)
-    print("%-10s %10s %10s %8s %8s %8s %8s %8s %8s %9s %8s" % (
+    print("%-11s %10s %10s %8s %8s %8s %8s %8s %8s %9s %8s" % (
         "scene", "Mpaths/s", "Mrays/s", "embree", "w16/w1", "w8/w1", "2t/1t", "rev/pri", "fwd/pri", "start ms", "MB"))
-    for name, (path, spp) in scenes.make(options.folder).items():
-        param = "metal.alpha.value" if name != "cornell" else "white.reflectance.value"
-        out = os.path.join(options.folder, "out.exr")
-        render = ["render", path, "-o", out, "--spp", str(spp)]
-        grad = ["grad", path, "--param", param, "--spp", str(spp)]
+    for name, scene in scenes.make(options.folder).items():
+        path = scene.path
+        settings = ["--spp", "16"] + [x for k, v in scene.defines.items() for x in ("-D", "%s=%s" % (k, v))]
+        render = ["render", path, "-o", os.path.join(options.folder, "out.exr")] + settings
+        grad = ["grad", path, "--param", scene.parameters[0]] + settings
         commands = {"w16": render, "w8": render + ["--lanes", "8"], "w1": render + ["--lanes", "1"],
                     "one": render + ["-t", "1"], "reverse": grad + ["--mode", "reverse", "--adjoint", "1"],
                     "forward": grad}
@@ -45,7 +45,7 @@ def main():
         median = {key: statistics.median(r["seconds"] for r in rows) for key, rows in results.items()}
         first = results["w16"][0]
         rate = first["paths"] / median["w16"] / 1e6
-        print("%-10s %10.2f %10.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %9.0f %8.0f" % (
+        print("%-11s %10.2f %10.2f %8.2f %8.2f %8.2f %8.2f %8.2f %8.2f %9.0f %8.0f" % (
             name, rate, first["rays"] / median["w16"] / 1e6,
             statistics.median(r["trace_share"] for r in results["w16"]), median["w1"] / median["w16"],
             median["w1"] / median["w8"], median["one"] / median["w16"], median["reverse"] / median["w16"],

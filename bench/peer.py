@@ -1,8 +1,9 @@
 """Reynolds beside Mitsuba 3 (llvm_ad_rgb): the same scenes, depths and roulette, in turn; the peer warmed up and at its
-best sample count per call. A ratio is printed only when both pictures agree within their noise."""
+best sample count per call. A ratio is printed only when both pictures agree within their noise.
+
+usage: peer.py [REYNOLDS [SCENE...]]"""
 import json
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -13,13 +14,18 @@ import numpy as np
 import scenes
 
 REPEATS = 3
+SIZE = 512
+SPP = 16
+FOLDER = "build/bench"
 REYNOLDS = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build/bin/reynolds")
+ROW = "%-11s %-34s %12s %12s %8s"
 
 COLD = """
 import mitsuba as mi
 mi.set_variant('llvm_ad_rgb')
-scene = mi.load_file('%s')
-mi.util.write_bitmap('%s', mi.render(scene, spp=16))
+scene = mi.load_file('%s', **%r)
+mi.util.write_bitmap('%s', mi.render(scene, spp=%d))
+print([line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')][0])
 """
 
 
@@ -27,10 +33,26 @@ def reynolds(*arguments):
     return json.loads(subprocess.run([REYNOLDS, *arguments, "--json"], check=True, capture_output=True, text=True).stdout)
 
 
+def defines(scene):
+    return [x for k, v in scene.defines.items() for x in ("-D", "%s=%s" % (k, v))]
+
+
 def timed(function):
     start = time.time()
     function()
     return time.time() - start
+
+
+def best(function):
+    function(0)
+    return min(timed(lambda s=s: function(s)) for s in range(1, REPEATS + 1))
+
+
+def process(command, kilobytes):
+    """Wall seconds of a process, and its peak memory [MB], which `kilobytes` finds in its output."""
+    start = time.time()
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return time.time() - start, kilobytes(output) / 1e3
 
 
 def agree(ours, theirs):
@@ -40,88 +62,138 @@ def agree(ours, theirs):
     return abs(ours.mean() / theirs.mean() - 1) < 0.01 and near.mean() > 0.95
 
 
+def error(image, reference):
+    """Mean squared error relative to the picture, without the worst 0.1 % of pixels."""
+    e = np.sort((((image - reference) ** 2).sum(2) / ((reference ** 2).sum(2) + 1e-4)).ravel())
+    return e[:int(0.999 * e.size)].mean()
+
+
+class Pair:
+    """One scene in both programs."""
+
+    def __init__(self, mi, dr, name, scene):
+        self.mi, self.dr, self.name, self.scene = mi, dr, name, scene
+        self.loaded = mi.load_file(scene.path, **scene.defines)
+        self.out = os.path.join(FOLDER, "ours.npy")
+        self.same = True
+
+    def row(self, what, theirs, ours):
+        ratio = "%.2f" % (ours / theirs) if self.same else "differs"
+        print(ROW % (self.name, what, "%.2f" % theirs, "%.2f" % ours, ratio), flush=True)
+
+    def render(self, spp, seed):
+        image = self.mi.render(self.loaded, spp=spp, seed=seed)
+        self.dr.eval(image)
+        self.dr.sync_thread()
+        return image
+
+    def ours(self, spp, seed, *more):
+        result = reynolds("render", self.scene.path, *defines(self.scene), "-o", self.out, "--spp", str(spp), "--seed",
+                          str(seed), *more)
+        return result, np.load(self.out)
+
+    def primal(self):
+        rate = 0
+        for spp in (SPP, 4 * SPP):
+            rate = max(rate, SIZE * SIZE * spp / best(lambda s: self.render(spp, s)) / 1e6)
+            self.dr.flush_malloc_cache()
+        mine = statistics.median(self.ours(SPP, s)[0]["paths_per_second"] / 1e6 for s in range(REPEATS))
+        self.same = agree(self.ours(64, 9)[1], np.array(self.render(64, 9))[..., :3])
+        self.row("primal [Mpaths/s]", rate, mine)
+
+    def equal_error(self):
+        reference = sum(self.ours(1024, s, "--sampler", "sobol")[1] for s in (101, 102)) / 2
+        spp = 64
+        seconds = best(lambda s: self.render(spp, s))
+        theirs = error(np.array(self.render(spp, 5))[..., :3], reference) * seconds
+        results = [self.ours(spp, s, "--sampler", "sobol") for s in range(REPEATS)]
+        mine = statistics.median(r["seconds"] for r, _ in results) * statistics.mean(error(i, reference) for _, i in results)
+        self.row("1 / (error x time)", 1 / theirs, 1 / mine)
+
+    def gradients(self):
+        mi, dr = self.mi, self.dr
+        parameters = mi.traverse(self.loaded)
+        keys = [k for k in self.scene.parameters if k in parameters]
+        integrator = mi.load_dict({"type": "prb", "max_depth": 8, "rr_depth": 5})
+        for k in keys:
+            dr.enable_grad(parameters[k])
+        parameters.update()
+        ones = dr.ones(mi.TensorXf, (SIZE, SIZE, 3))
+
+        def finish():
+            dr.eval(*[dr.grad(parameters[k]) for k in keys])
+            dr.sync_thread()
+            for k in keys:
+                dr.set_grad(parameters[k], 0)
+
+        def backward(seed):
+            integrator.render_backward(self.loaded, parameters, ones, seed=seed, spp=SPP)
+            finish()
+
+        def both(seed):
+            dr.backward(dr.sum(mi.render(self.loaded, parameters, integrator=integrator, spp=SPP, spp_grad=SPP, seed=seed),
+                               axis=None))
+            finish()
+
+        def forward(seed):
+            for k in keys:
+                dr.set_grad(parameters[k], 1)
+            dr.eval(integrator.render_forward(self.loaded, parameters, seed=seed, spp=SPP))
+            dr.sync_thread()
+
+        paths = SIZE * SIZE * SPP / 1e6
+        arguments = [x for k in keys for x in ("--param", k)] + ["--spp", str(SPP)] + defines(self.scene)
+        grads = [reynolds("grad", self.scene.path, *arguments, "--mode", "reverse", "--adjoint", "1") for _ in range(REPEATS)]
+        reverse = statistics.median(g["paths"] / g["seconds"] for g in grads) / 1e6
+        grads = [reynolds("grad", self.scene.path, *arguments) for _ in range(REPEATS)]
+        mine = statistics.median(g["paths"] / g["seconds"] for g in grads) / 1e6
+        picture = statistics.median(self.ours(SPP, s)[0]["paths_per_second"] / 1e6 for s in range(REPEATS))
+        self.row("reverse, adjoint given [Mpaths/s]", paths / best(backward), reverse)
+        self.row("picture, then reverse [Mpaths/s]", paths / best(both), 1 / (1 / picture + 1 / reverse))
+        self.row("forward [Mpaths/s]", paths / best(forward), mine)
+        for k in keys:
+            dr.disable_grad(parameters[k])
+
+    def cold(self):
+        """A process from nothing to a 256 x 256 picture: what a user waits for, and the memory that it takes."""
+        size = 256
+        path = os.path.join(FOLDER, "cold.xml") if not self.scene.defines else self.scene.path
+        settings = {k: str(size) if k in ("width", "height") else v for k, v in self.scene.defines.items()}
+        if not settings:
+            with open(self.scene.path) as f:
+                text = f.read()
+            for side in ("width", "height"):
+                text = text.replace('name="%s" value="%d"' % (side, SIZE), 'name="%s" value="%d"' % (side, size))
+            with open(path, "w") as f:
+                f.write(text)
+        code = COLD % (path, settings, os.path.join(FOLDER, "peer.exr"), SPP)
+        scene = scenes.Scene(path, settings, [])
+        command = [REYNOLDS, "render", path, *defines(scene), "--spp", str(SPP), "-o", os.path.join(FOLDER, "ours.exr"), "--json"]
+        theirs = [process([sys.executable, "-c", code], lambda text: 1.024 * float(text.split()[-1])) for _ in range(REPEATS)]
+        mine = [process(command, lambda text: 1e3 * json.loads(text)["peak_rss_mb"]) for _ in range(REPEATS)]
+        seconds = [statistics.median(x[0] for x in runs) for runs in (theirs, mine)]
+        memory = [statistics.median(x[1] for x in runs) for runs in (theirs, mine)]
+        self.row("cold process [1/s], %.2f s and %.2f s" % tuple(seconds), 1 / seconds[0], 1 / seconds[1])
+        print(ROW % (self.name, "its peak memory [MB]", "%.0f" % memory[0], "%.0f" % memory[1],
+                     "%.2f" % (memory[0] / memory[1])), flush=True)
+
+
 def main():
     import mitsuba as mi
     mi.set_variant("llvm_ad_rgb")
     import drjit as dr
-    folder = "build/bench"
-    print("Mitsuba %s against Reynolds, %d threads" % (mi.__version__, os.cpu_count()))
-    print("%-10s %-28s %12s %12s %8s" % ("scene", "what", "peer Mp/s", "ours Mp/s", "ratio"))
-    for name, (path, _) in scenes.make(folder).items():
-        if name == "million":
-            continue  # its sky is a NumPy array, which the peer does not read
-        scene = mi.load_file(path)
-        pixels = 512 * 512
-
-        def render(spp, seed):
-            image = mi.render(scene, spp=spp, seed=seed)
-            dr.eval(image)
-            dr.sync_thread()
-            return image
-
-        best = 0
-        for spp in (16, 64):
-            render(spp, 0)
-            best = max(best, max(pixels * spp / timed(lambda s=s: render(spp, s)) / 1e6 for s in range(1, 4)))
-            dr.flush_malloc_cache()
-        out = os.path.join(folder, "ours.npy")
-        ours = statistics.median(reynolds("render", path, "-o", out, "--spp", "16")["paths_per_second"] / 1e6
-                                 for _ in range(REPEATS))
-        theirs = np.array(render(64, 9))[..., :3]
-        reynolds("render", path, "-o", out, "--spp", "64", "--seed", "9")
-        same = agree(np.load(out), theirs)
-        print("%-10s %-28s %12.2f %12.2f %8s" % (name, "primal", best, ours, "%.2f" % (ours / best) if same else "differs"))
-
-        # Reverse mode with respect to all albedos (or the roughness), and forward with respect to a roughness.
-        parameters = mi.traverse(scene)
-        keys = [k for k in parameters.keys() if k.endswith("reflectance.value") and k.split(".")[0] in ("white", "red", "green")]
-        alpha = [k for k in parameters.keys() if k.endswith("alpha.value")]
-        integrator = mi.load_dict({"type": "prb", "max_depth": 8, "rr_depth": 5})
-        for what, chosen in (("reverse, albedos", keys if name == "cornell" else []), ("reverse, roughness", alpha)):
-            if not chosen:
-                continue
-            for k in chosen:
-                dr.enable_grad(parameters[k])
-            parameters.update()
-
-            def reverse(seed):
-                for k in chosen:
-                    dr.set_grad(parameters[k], 0)
-                image = mi.render(scene, parameters, integrator=integrator, spp=16, spp_grad=16, seed=seed)
-                dr.backward(dr.sum(image, axis=None))
-                dr.eval(*[dr.grad(parameters[k]) for k in chosen])
-                dr.sync_thread()
-
-            def primal(seed):
-                with dr.suspend_grad():
-                    image = mi.render(scene, integrator=integrator, spp=16, seed=seed)
-                    dr.eval(image)
-                    dr.sync_thread()
-
-            reverse(0)
-            primal(0)
-            # The render call above runs a primal pass first; only the derivative's own time counts for the peer.
-            seconds = min(timed(lambda s=s: reverse(s)) for s in range(1, 4)) - min(timed(lambda s=s: primal(s)) for s in range(1, 4))
-            rate = pixels * 16 / max(seconds, 1e-3) / 1e6
-            arguments = [x for k in chosen for x in ("--param", k)]
-            grads = [reynolds("grad", path, *arguments, "--mode", "reverse", "--adjoint", "1", "--spp", "16")
-                     for _ in range(REPEATS)]
-            mine = statistics.median(g["paths"] / g["seconds"] for g in grads) / 1e6
-            print("%-10s %-28s %12.2f %12.2f %8.2f" % (name, what, rate, mine, mine / rate))
-            for k in chosen:
-                dr.disable_grad(parameters[k])
-
-    path = os.path.join(folder, "cold.xml")
-    with open(os.path.join(folder, "box_70k.xml")) as f:
-        text = f.read().replace('name="width" value="512"', 'name="width" value="256"')
-    with open(path, "w") as f:
-        f.write(text.replace('name="height" value="512"', 'name="height" value="256"'))
-    code = COLD % (path, os.path.join(folder, "peer.exr"))
-    peer = statistics.median(timed(lambda: subprocess.run([sys.executable, "-c", code], check=True)) for _ in range(REPEATS))
-    ours = statistics.median(timed(lambda: subprocess.run([REYNOLDS, "render", path, "-o", os.path.join(folder, "ours.exr")],
-                                                          check=True, capture_output=True)) for _ in range(REPEATS))
-    print("%-10s %-28s %11.2fs %11.2fs %8.2f" % ("box+70k", "cold process, 256 x 256 x 16", peer, ours, peer / ours))
-    print("peak memory: peer %.0f MB" % (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+    print("Mitsuba %s beside Reynolds, %d threads; a ratio above 1 is in favour of Reynolds" % (mi.__version__, os.cpu_count()))
+    print(ROW % ("scene", "what", "peer", "ours", "ratio"))
+    for name, scene in scenes.make(FOLDER).items():
+        if len(sys.argv) > 2 and name not in sys.argv[2:]:
+            continue
+        pair = Pair(mi, dr, name, scene)
+        pair.primal()
+        pair.equal_error()
+        pair.gradients()
+        pair.cold()
+        del pair
+        dr.flush_malloc_cache()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
-"""The benchmark scenes: Cornell box, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky."""
+"""The benchmark scenes: Cornell box, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky, 16
+principled spheres under a sky, a forest of 100,000 instances, and the matpreview scene of the conformance folder."""
+import collections
 import importlib.util
 import math
 import os
+import random
 import struct
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -12,7 +15,7 @@ spec.loader.exec_module(assets)
 HEAD = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="5"/></integrator>
 <sensor type="perspective"><float name="fov" value="39.3"/><float name="near_clip" value="%(near)g"/><float name="far_clip" value="5000"/>
-<transform name="to_world"><lookat origin="%(origin)s" target="%(target)s" up="0, 1, 0"/></transform>
+<transform name="to_world"><lookat origin="%(origin)s" target="%(target)s" up="%(up)s"/></transform>
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
 <film type="hdrfilm"><integer name="width" value="%(size)d"/><integer name="height" value="%(size)d"/><rfilter type="box"/></film></sensor>
 """
@@ -24,6 +27,10 @@ WALLS = """<bsdf type="diffuse" id="white"><rgb name="reflectance" value="0.725 
 <shape type="obj"><string name="filename" value="light.obj"/><bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
 <emitter type="area"><rgb name="radiance" value="18 15 9"/></emitter></shape>
 """
+SKY = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
+# The sky above scenes whose ground is z = 0.
+SKY_Z = ('<emitter type="envmap"><string name="filename" value="sky.exr"/>'
+         '<transform name="to_world"><rotate x="1" angle="90"/></transform></emitter>')
 METAL = """<bsdf type="roughconductor" id="metal"><rgb name="eta" value="0.2 0.92 1.1"/><rgb name="k" value="3.9 2.45 2.14"/>
 <string name="distribution" value="ggx"/><float name="alpha" value="0.2"/></bsdf>
 """
@@ -48,8 +55,68 @@ def write_blob(path, rows, columns, centre, radius):
                 f.write(struct.pack("<B3iB3i", 3, a, a + columns, b, 3, b, a + columns, b + columns))
 
 
+def write_tree(path):
+    """A conifer of 240 triangles: six cones of 20 sides."""
+    sides, cones = 20, 6
+    with open(path, "w") as f:
+        for c in range(cones):
+            base, radius = 0.15 * c, 0.35 * (1 - c / (cones + 1))
+            f.write("v 0 0 %g\n" % (base + 0.3))
+            for i in range(sides):
+                phi = 2 * math.pi * i / sides
+                f.write("v %g %g %g\n" % (radius * math.cos(phi), radius * math.sin(phi), base))
+        for c in range(cones):
+            first = c * (sides + 1) + 1
+            for i in range(sides):
+                f.write("f %d %d %d\n" % (first, first + 1 + i, first + 1 + (i + 1) % sides))
+                f.write("f %d %d %d\n" % (first, first + 1 + (i + 1) % sides, first + 1 + i))
+
+
+def spheres():
+    """A 4 x 4 board of spheres; every parameter of `principled` varies over it."""
+    text = ['<shape type="rectangle"><transform name="to_world"><scale value="12"/></transform>'
+            '<bsdf type="diffuse"><rgb name="reflectance" value="0.4"/></bsdf></shape>']
+    rng = random.Random(5)
+    for i in range(16):
+        row, column = divmod(i, 4)
+        numbers = {"roughness": 0.1 + 0.2 * row, "metallic": column / 3, "specular": 0.5, "clearcoat": rng.random(),
+                   "clearcoat_gloss": rng.random(), "sheen": rng.random(), "anisotropic": 0.8 * rng.random(),
+                   "spec_tint": rng.random()}
+        text.append('<shape type="sphere"><point name="center" x="%g" y="%g" z="1"/><float name="radius" value="0.9"/>'
+                    '<bsdf type="principled" id="ball%d"><rgb name="base_color" value="%g, %g, %g"/>%s</bsdf></shape>' % (
+                        2 * column - 3, 2 * row - 3, i, rng.random(), rng.random(), rng.random(),
+                        "".join('<float name="%s" value="%g"/>' % x for x in numbers.items())))
+    return "\n".join(text) + SKY_Z
+
+
+def forest(count=100000):
+    rng = random.Random(7)
+    side = math.sqrt(count)
+    text = ['<shape type="rectangle"><transform name="to_world"><scale value="%g"/></transform>'
+            '<bsdf type="diffuse"><rgb name="reflectance" value="0.3, 0.25, 0.2"/></bsdf></shape>' % side,
+            '<shape type="shapegroup" id="tree"><shape type="obj"><string name="filename" value="tree.obj"/>'
+            '<boolean name="face_normals" value="true"/><bsdf type="diffuse" id="leaf">'
+            '<rgb name="reflectance" value="0.15, 0.4, 0.1"/></bsdf></shape></shape>']
+    for _ in range(count):
+        text.append('<shape type="instance"><ref id="tree"/><transform name="to_world"><rotate z="1" angle="%.1f"/>'
+                    '<scale value="%.3f"/><translate x="%.3f" y="%.3f"/></transform></shape>' % (
+                        360 * rng.random(), 0.6 + 0.8 * rng.random(), side * (rng.random() - 0.5), side * (rng.random() - 0.5)))
+    return "\n".join(text) + SKY_Z
+
+
+# path and definitions of a scene, and what its derivatives are taken with respect to.
+Scene = collections.namedtuple("Scene", "path defines parameters")
+
+
+def conformance():
+    here = os.environ.get("REYNOLDS_CONFORMANCE_DIR", os.path.join(HERE, "../../shared/conformance"))
+    path = os.path.join(here, "data/scenes/matpreview/matpreview.xml")
+    return {"matpreview": Scene(path, {"max_depth": "8", "width": "512", "height": "512"},
+                                ["bsdf-matpreview.diffuse_reflectance.value"])} if os.path.exists(path) else {}
+
+
 def make(folder):
-    """Writes the scenes; returns {name: (path, spp)}."""
+    """Writes the scenes; returns {name: Scene}."""
     os.makedirs(folder, exist_ok=True)
     for name, quad in assets.QUADS.items():
         assets.write_obj(os.path.join(folder, name + ".obj"), [quad])
@@ -57,21 +124,26 @@ def make(folder):
     write_blob(os.path.join(folder, "blob70k.ply"), 186, 188, (300, 170, 280), 140)
     if not os.path.exists(os.path.join(folder, "blob1m.ply")):
         write_blob(os.path.join(folder, "blob1m.ply"), 700, 714, (0, 0, 0), 1)
-    assets.write_npy(os.path.join(folder, "sky.npy"), 256, 512, assets.environment(__import__("random").Random(3)))
-    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "near": 10}
+    write_tree(os.path.join(folder, "tree.obj"))
+    assets.write_exr(os.path.join(folder, "sky.exr"), 256, 512, assets.environment(random.Random(3)))
+    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "up": "0, 1, 0", "near": 10, "depth": 8, "size": 512}
+    board = dict(box, origin="0, -13, 9", target="0, 0, 0.3", up="0, 0, 1", near=0.01)
     scenes = {
-        "cornell": (dict(box, depth=8, size=512), WALLS + '<shape type="obj"><string name="filename" value="block.obj"/>'
-                    '<boolean name="face_normals" value="true"/><ref id="white"/></shape>', 16),
-        "box+70k": (dict(box, depth=8, size=512), WALLS + METAL + '<shape type="ply">'
-                    '<string name="filename" value="blob70k.ply"/><ref id="metal"/></shape>', 16),
-        "million": (dict(origin="0, 1, -4", target="0, 0, 0", near=0.01, depth=8, size=512), METAL +
-                    '<shape type="ply"><string name="filename" value="blob1m.ply"/><ref id="metal"/></shape>'
-                    '<emitter type="envmap"><string name="filename" value="sky.npy"/></emitter>', 16),
+        "cornell": (box, WALLS + '<shape type="obj"><string name="filename" value="block.obj"/>'
+                    '<boolean name="face_normals" value="true"/><ref id="white"/></shape>',
+                    [c + ".reflectance.value" for c in ("white", "red", "green")]),
+        "box+70k": (box, WALLS + METAL + '<shape type="ply"><string name="filename" value="blob70k.ply"/>'
+                    '<ref id="metal"/></shape>', ["metal.alpha.value"]),
+        "million": (dict(box, origin="0, 1, -4", target="0, 0, 0", near=0.01), METAL + '<shape type="ply">'
+                    '<string name="filename" value="blob1m.ply"/><ref id="metal"/></shape>' + SKY, ["metal.alpha.value"]),
+        "spheres": (board, spheres(), ["ball%d.roughness.value" % i for i in range(16)]),
+        "forest": (dict(board, origin="0, -60, 12", target="0, 0, 0"), forest(), ["leaf.reflectance.value"]),
     }
-    paths = {}
-    for name, (head, body, spp) in scenes.items():
+    made = {}
+    for name, (head, body, parameters) in scenes.items():
         path = os.path.join(folder, name.replace("+", "_") + ".xml")
         with open(path, "w") as f:
             f.write(HEAD % head + body + "\n</scene>\n")
-        paths[name] = (path, spp)
-    return paths
+        made[name] = Scene(path, {}, parameters)
+    made.update(conformance())
+    return made
