@@ -102,7 +102,7 @@ class Pair:
         self.row("primal [Mpaths/s]", rate, mine)
 
     def equal_error(self):
-        reference = sum(self.ours(1024, s, "--sampler", "sobol")[1] for s in (101, 102)) / 2
+        reference = sum(self.ours(256, s, "--sampler", "sobol")[1] for s in (101, 102)) / 2
         spp = 64
         seconds = best(lambda s: self.render(spp, s))
         theirs = error(np.array(self.render(spp, 5))[..., :3], reference) * seconds

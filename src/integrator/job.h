@@ -5,6 +5,9 @@
 
 enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD };
 
+// What of a group depends on the selected parameters.
+enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2 };
+
 typedef struct PathJob {
     const SceneView *scene;
     int32_t sensor, mode;
@@ -21,6 +24,8 @@ typedef struct PathJob {
     const float *tangent;
     const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at;
     bool any_normals, any_attributes;
+    const int32_t *live;          // per group: LIVE_ mask
+    bool live_lights;             // some emitter depends on the selection
     // Asked before each chunk of paths: false ends the job early. May be null.
     bool (*go_on)(void *user);
     void *user;

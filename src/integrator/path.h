@@ -56,7 +56,7 @@ KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count) {
     return first;
 }
 
-KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis) {
+KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec emission) {
     Records *r = &t->ws.records;
     i_store(r->shape + at, v->hit.shape);
     i_store(r->prim + at, v->hit.prim);
@@ -73,6 +73,8 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis) {
     f_store(r->mis + at, mis);
     spec_store(r->beta, at, v->beta);
     spec_store(r->light_weight, at, spec_zero());
+    spec_store(r->local, at, emission);
+    spec_store(r->weight, at, spec_zero());
     f_store(r->sw + at, f_set(0));
 }
 
@@ -93,13 +95,14 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
         pdf = envmap_pdf(scene, e, uv);
     }
     Float mis = f_select(m_lt(v.pdf, f_set(0)), f_set(1), power_heuristic(v.pdf, pdf * e->weight));
-    Spec l = emitter_eval(scene, e, texcoord(uv, NULL), f_set(1));
-    slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), v.m);
-    if (t->derivative) {
-        int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
-        if (at >= 0) {
-            record_vertex(t, at, &v, mis);
-        }
+    Spec l = spec_scale(emitter_eval(scene, e, texcoord(uv, NULL), f_set(1)), mis);
+    if (!t->derivative) {
+        slot_add(t, v.slot, spec_mul(v.beta, l), v.m);
+        return;
+    }
+    int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
+    if (at >= 0) {
+        record_vertex(t, at, &v, mis, l);
     }
 }
 
@@ -166,7 +169,8 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     Float pdf = s.pdf * choice;
     Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(pdf, scatter_pdf));
     Float weight = mis * f_safe_rcp(pdf);
-    Spec l = spec_scale(spec_mul(spec_mul(v->beta, f), radiance), weight);
+    Spec l = spec_scale(spec_mul(f, radiance), weight);
+    l = t->derivative ? l : spec_mul(v->beta, l);
     // A derivative may be non-zero where the value is 0, wherever scattering has a positive density.
     Mask useful = t->derivative ? m_gt(scatter_pdf, f_set(0)) | m_gt(spec_max(f), f_set(0)) : m_gt(spec_max(l), f_set(0));
     Mask m = v->m & s.valid & useful & m_gt(weight, f_set(0));
@@ -255,6 +259,7 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
         f_store(r->woy + record, d.y);
         f_store(r->woz + record, d.z);
         f_store(r->sw + record, f_zero_unless(m, rcp));
+        spec_store(r->weight, record, spec_zero_unless(m, spec_scale(f, rcp)));
         i_store(r->lobe + record, s.lobe);
     }
     return next_count + m_count(m);
@@ -280,12 +285,15 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
     Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &v.hit);
     Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
     Float mis = f_set(0);
+    Spec emission = spec_zero();
     if (group->emitter >= 0) {
         const EmitterRecord *e = scene->emitters + group->emitter;
         Mask lit = v.m & m_gt(wi.z, f_set(0));
         mis = f_zero_unless(lit, emission_weight(t, e, &v, &si));
-        Spec l = emitter_eval(scene, e, texcoord(si.uv, &v.hit), f_set(1));
-        slot_add(t, v.slot, spec_scale(spec_mul(v.beta, l), mis), lit);
+        emission = spec_zero_unless(lit, spec_scale(emitter_eval(scene, e, texcoord(si.uv, &v.hit), f_set(1)), mis));
+        if (!t->derivative) {
+            slot_add(t, v.slot, spec_mul(v.beta, emission), lit);
+        }
     }
     int32_t record = -1;
     if (t->derivative) {
@@ -293,7 +301,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         if (record < 0) {
             return next_count;
         }
-        record_vertex(t, record, &v, mis);
+        record_vertex(t, record, &v, mis, emission);
     }
     if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth) {
         return next_count;
@@ -341,14 +349,16 @@ static void shadow_stage(Tracer *t) {
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
         Spec transmittance = trace_transmittance(t->scene, &ray, m);
-        Spec l = spec_load(q->radiance, k);
+        Spec l = spec_mul(spec_load(q->radiance, k), transmittance);
         Mask open = m & m_gt(spec_max(transmittance), f_set(0));
-        slot_add(t, i_load(q->slot + k), spec_mul(l, transmittance), open);
-        if (t->derivative) {
-            Int record = i_select(m, i_load(q->record + k), i_set(0));
-            real *const *weights = t->ws.records.light_weight;
-            spec_scatter(weights, record, spec_mul(spec_gather(weights, record), transmittance), m);
+        if (!t->derivative) {
+            slot_add(t, i_load(q->slot + k), l, open);
+            continue;
         }
+        Int record = i_select(m, i_load(q->record + k), i_set(0));
+        const Records *r = &t->ws.records;
+        spec_scatter_add(r->local, record, l, open);
+        spec_scatter(r->light_weight, record, spec_mul(spec_gather(r->light_weight, record), transmittance), m);
     }
     t->job->rays += t->shadow_count;
     t->job->trace_seconds += stage_seconds() - start;

@@ -44,9 +44,8 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     if (e->kind == EMITTER_ENVMAP) {
         uv = envmap_uv(t->scene, e, d);
     }
-    Spec l = spec_scale(emitter_eval(t->scene, e, texcoord(uv, NULL), f_set(1)), mis);
-    spec_scatter(t->ws.suffix, slot, l, m);
-    for (int c = 0; c < drives(t); c++) {
+    spec_scatter(t->ws.suffix, slot, spec_load(r->local, at), m);
+    for (int c = 0; c < drives(t) && t->job->live_lights; c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
         emitter_adj(t->scene, e, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl), sink, m);
@@ -58,7 +57,7 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
 typedef struct SurfaceSweep {
     Mask m, lit, connected, scattered;
     Int slot, light, light_prim, lobe;
-    Spec beta, suffix, light_weight, light_value, f_light, f_scatter, emission;
+    Spec beta, suffix, light_weight, light_value, f_light;
     Float mis, scatter_weight, light_distance;
     Vec2 light_uv;
     Vec3 d, wi, light_d, wo_d, wl, wo;
@@ -99,12 +98,13 @@ KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim
     }
 }
 
-KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
+KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
     const Records *r = &t->ws.records;
     int32_t at = batch->first;
     SurfaceSweep s;
     s.m = m_first_n(batch->count);
-    s.slot = i_select(s.m, i_load(r->slot + at), i_set(0));
+    s.slot = slot;
+    s.suffix = suffix;
     s.group = t->scene->groups + batch->group;
     s.hit.shape = i_load(r->shape + at);
     s.hit.prim = i_load(r->prim + at);
@@ -115,7 +115,6 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     s.d = record_v3(r->dx, r->dy, r->dz, at);
     s.beta = spec_load(r->beta, at);
     s.mis = f_load(r->mis + at);
-    s.suffix = spec_gather(t->ws.suffix, s.slot);
     s.light_weight = spec_load(r->light_weight, at);
     s.scatter_weight = f_load(r->sw + at);
     s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
@@ -139,29 +138,22 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch) {
     return s;
 }
 
-// The vertex's outgoing radiance, from the parts that the adjoint needs as well.
-KFN Spec surface_primal(const Tracer *t, SurfaceSweep *s) {
-    Spec l = spec_zero();
+// The factors of the vertex's radiance that its adjoint needs.
+KFN void surface_values(const Tracer *t, SurfaceSweep *s, int32_t live) {
     s->lit = s->m & m_gt(s->mis, f_set(0));
-    if (s->emitter) {
-        s->emission = emitter_eval(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1));
-        l = spec_zero_unless(s->lit, spec_scale(s->emission, s->mis));
-    }
-    s->f_light = s->f_scatter = s->light_value = spec_zero();
+    s->f_light = s->light_value = spec_zero();
     if (m_any(s->connected)) {
-        s->f_light = spec_zero_unless(s->connected, bsdf_eval(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH)));
-        s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
-        spec_acc(&l, spec_mul(spec_mul(s->f_light, s->light_value), s->light_weight));
+        if (t->job->live_lights) {
+            s->f_light = spec_zero_unless(s->connected, bsdf_eval(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH)));
+        }
+        if (live & LIVE_SCATTERING) {
+            s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
+        }
     }
-    if (m_any(s->scattered)) {
-        s->f_scatter = spec_zero_unless(s->scattered, bsdf_eval(&s->call, s->wi, s->wo, s->lobe));
-        spec_acc(&l, spec_scale(spec_mul(s->f_scatter, s->suffix), s->scatter_weight));
-    }
-    return l;
 }
 
-// Adjoint of surface_primal for one delta.
-KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *sink) {
+// Adjoint of the vertex's outgoing radiance for one delta, by what of the vertex is live.
+KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec delta, Sink *sink) {
     Spec weight = spec_mul(delta, s->beta);
     Vec3 dwi = v3_zero();
     Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
@@ -169,7 +161,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
     BsdfCall call = s->call;
     BsdfSurface dsurface = {f_set(0), f_set(0), f_set(0), v3_zero()};
     call.dsurface = call.surface && sink->any_normals ? &dsurface : NULL;
-    if (s->emitter) {
+    if (live & LIVE_EMISSION) {
         // L += w_e Le
         emitter_adj(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
                     spec_zero_unless(s->lit, spec_scale(weight, s->mis)), sink, s->lit);
@@ -178,13 +170,17 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
         // L += f Le (T w_l)
         Vec3 dwl = v3_zero();
         Spec both = spec_mul(weight, s->light_weight);
-        Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
-        bsdf_adj(&call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
-        lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                   spec_mul(both, s->f_light), sink);
-        frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
+        if (live & LIVE_SCATTERING) {
+            Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
+            bsdf_adj(&call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
+            frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
+        }
+        if (t->job->live_lights) {
+            lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
+                       spec_mul(both, s->f_light), sink);
+        }
     }
-    if (m_any(s->scattered)) {
+    if ((live & LIVE_SCATTERING) && m_any(s->scattered)) {
         // L += f w_s L_next
         Vec3 dwo = v3_zero();
         Spec df = spec_zero_unless(s->scattered, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
@@ -206,6 +202,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, Spec delta, Sink *s
 // Sweeps the chunk's records from the last vertex to the first.
 static void path_backward(Tracer *t) {
     PathJob *job = t->job;
+    const Records *r = &t->ws.records;
     Sink sink = {.gradient = job->gradient,
                  .tangent = job->tangent,
                  .texture_at = job->texture_at,
@@ -221,18 +218,27 @@ static void path_backward(Tracer *t) {
             escape_adj(t, &sink, batch);
             continue;
         }
-        SurfaceSweep s = surface_load(t, batch);
+        Mask m = m_first_n(batch->count);
+        Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
+        Spec suffix = spec_gather(t->ws.suffix, slot);
+        // L = local + weight L_next
+        Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
+        Mask finite = m & m_finite(spec_sum(l));
+        spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
+        int32_t live = job->live[batch->group];
+        if (!live && !job->live_lights) {
+            continue;
+        }
+        SurfaceSweep s = surface_load(t, batch, slot, suffix);
         s.call.uv.hit = &s.hit;
         if (t->scene->bsdfs[s.group->bsdf].surface) {
             find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
             s.call.surface = &s.surface;
         }
-        Spec l = surface_primal(t, &s);
-        Mask finite = s.m & m_finite(spec_sum(l));
+        surface_values(t, &s, live);
         for (int c = 0; c < drives(t); c++) {
-            surface_adj(t, &s, spec_zero_unless(finite, slot_adjoint(t, s.slot, c)), &sink);
-            forward_flush(t, &sink, s.slot, c, s.m);
+            surface_adj(t, &s, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), &sink);
+            forward_flush(t, &sink, slot, c, m);
         }
-        spec_scatter(t->ws.suffix, s.slot, spec_zero_unless(finite, l), s.m);
     }
 }

@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "math/rng.h"
 #include "render/film.h"
+#include "render/live.h"
 #include "render/update.h"
 
 #include <pthread.h>
@@ -30,7 +31,7 @@ typedef struct Render {
     double *gradients;     // reverse: one per shard
     int64_t gradient_size;
     double *columns, *rows;
-    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, live
     float *adjoint;
     rey_stats stats;
     double done, total;    // progress
@@ -265,7 +266,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
     int64_t textures = view->textures_count, shapes = view->shapes_count;
     enum { PAD = 16 };
-    int64_t n = 2 * textures + shapes + view->attributes_count + PAD;
+    int64_t n = 2 * textures + shapes + view->attributes_count + view->groups_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
@@ -299,6 +300,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.to_uv_at = to_uv_at;
     r->job.normals_at = normals_at;
     r->job.attribute_at = attribute_at;
+    rey_live_groups(view, &r->job, attribute_at + view->attributes_count);
     return REY_OK;
 }
 
