@@ -203,6 +203,7 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
         f_store(r->ldist + record, s.distance);
         // Times the transmittance, once it is known.
         spec_store(r->light_weight, record, spec_set(f_zero_unless(m, weight)));
+        spec_store(r->light_f, record, f);
     }
 }
 

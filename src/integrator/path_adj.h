@@ -116,7 +116,9 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.beta = spec_load(r->beta, at);
     s.mis = f_load(r->mis + at);
     s.light_weight = spec_load(r->light_weight, at);
+    s.f_light = spec_load(r->light_f, at);
     s.scatter_weight = f_load(r->sw + at);
+    s.lit = s.m & m_gt(s.mis, f_set(0));
     s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
     s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
     s.light = i_load(r->light + at);
@@ -136,20 +138,6 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
     s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
     return s;
-}
-
-// The factors of the vertex's radiance that its adjoint needs.
-KFN void surface_values(const Tracer *t, SurfaceSweep *s, int32_t live) {
-    s->lit = s->m & m_gt(s->mis, f_set(0));
-    s->f_light = s->light_value = spec_zero();
-    if (m_any(s->connected)) {
-        if (t->job->live_lights) {
-            s->f_light = spec_zero_unless(s->connected, bsdf_eval(&s->call, s->wi, s->wl, i_set(LOBE_SMOOTH)));
-        }
-        if (live & LIVE_SCATTERING) {
-            s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
-        }
-    }
 }
 
 // Adjoint of the vertex's outgoing radiance for one delta, by what of the vertex is live.
@@ -177,7 +165,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
         }
         if (t->job->live_lights) {
             lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                       spec_mul(both, s->f_light), sink);
+                       spec_zero_unless(s->connected, spec_mul(both, s->f_light)), sink);
         }
     }
     if ((live & LIVE_SCATTERING) && m_any(s->scattered)) {
@@ -235,7 +223,9 @@ static void path_backward(Tracer *t) {
             find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
             s.call.surface = &s.surface;
         }
-        surface_values(t, &s, live);
+        if (live & LIVE_SCATTERING) {
+            s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+        }
         for (int c = 0; c < drives(t); c++) {
             surface_adj(t, &s, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), &sink);
             forward_flush(t, &sink, slot, c, m);

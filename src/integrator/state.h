@@ -24,13 +24,14 @@ enum {
 #define SHADOW_INTS(I) I(slot) I(record)
 
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
-// the light sample (direction, where the light's texture was read, distance, transmittance over density),
+// the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the
+// scattering function),
 // the sampled direction (world) and 1 / (density x survival). Radiance leaving the vertex is local + weight x radiance
 // arriving along the sampled direction.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw)
-#define RECORD_SPECS(S) S(beta) S(light_weight) S(local) S(weight)
+#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe)
 
 #define DECLARE_FLOAT(name) real *name;
