@@ -155,6 +155,9 @@ static void print_info(const Session *s) {
             printf("sensor %-10d %d x %d pixels\n", i, width, height);
         }
     }
+    for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
+        printf("note: %s\n", rey_scene_note(s->scene, i));
+    }
 }
 
 static void print_info_json(const Session *s) {
@@ -184,6 +187,11 @@ static void print_info_json(const Session *s) {
         json_integer(&json, NULL, width);
         json_integer(&json, NULL, height);
         json_array_end(&json);
+    }
+    json_array_end(&json);
+    json_array(&json, "notes");
+    for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
+        json_string(&json, NULL, rey_scene_note(s->scene, i));
     }
     json_array_end(&json);
     json_object_end(&json);

@@ -37,6 +37,14 @@ int rey_scene_sensor_count(const rey_scene *scene) {
     return (int)scene->view.sensors_count;
 }
 
+int rey_scene_note_count(const rey_scene *scene) {
+    return (int)scene->notes.count;
+}
+
+const char *rey_scene_note(const rey_scene *scene, int note) {
+    return note >= 0 && note < (int)scene->notes.count ? ARRAY_AT(scene->notes, char *, note) : NULL;
+}
+
 void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info) {
     const SceneView *v = &scene->view;
     *info = (rey_scene_info){.shapes = v->shapes_count,

@@ -54,7 +54,8 @@ typedef struct rey_scene rey_scene;
 
 typedef struct rey_context_def {
     size_t size;     /* sizeof(rey_context_def), set by rey_default_context_def */
-    int threads;     /* worker threads, 0 (default) = as many as the affinity mask and cgroup quota allow */
+    int threads;     /* worker threads, 0 (default) = as many as the affinity mask and cgroup quota allow; more than
+                        4 for each of those (16 at least) cost memory and help nobody, so that fewer run */
     int lanes;       /* SIMD width of the kernels: 1, 8, 16; 0 (default) = the widest this machine runs */
     void *(*alloc)(void *user, size_t bytes, size_t alignment); /* default: the C library's */
     void (*release)(void *user, void *memory);                  /* frees what alloc returned */
@@ -105,6 +106,11 @@ typedef struct rey_scene_info {
     const char *integrator;  /* name of the integrator that runs */
 } rey_scene_info;
 REY_API void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info);
+
+/* What a user should know about how the scene was read: plugins that another one stands for, and the like. */
+REY_API int rey_scene_note_count(const rey_scene *scene);
+/* One note, "FILE:LINE: text"; null when there is no such note. Lives as long as the scene. */
+REY_API const char *rey_scene_note(const rey_scene *scene, int note);
 
 /* ---- parameters ---------------------------------------------------------------------------------------- */
 

@@ -2,6 +2,7 @@
 // few big walls around dense meshes and is the form wanted for meshes that change.
 #include "accel/accel.h"
 
+#include "base/parallel.h"
 #include "shape/shape.h"
 
 #include <embree3/rtcore.h>
@@ -260,7 +261,8 @@ static void set_bounds(rey_scene *scene) {
 
 static rey_result accel_create(rey_scene *scene) {
     char options[64];
-    snprintf(options, sizeof options, "threads=%d", scene->ctx->def.threads);
+    int available = rey_available_threads(), asked = scene->ctx->def.threads;
+    snprintf(options, sizeof options, "threads=%d", asked < available ? asked : available);
     scene->accel_free = accel_free;
     scene->embree_device = rtcNewDevice(options);
     if (!scene->embree_device) {

@@ -37,9 +37,7 @@ rey_result rey_context_create(const rey_context_def *def, rey_context **out) {
     if ((d.lanes != 1 && d.lanes != 8 && d.lanes != 16) || d.lanes > widest) {
         return REY_ERROR_UNSUPPORTED;
     }
-    if (d.threads == 0) {
-        d.threads = rey_available_threads();
-    }
+    d.threads = rey_useful_threads(d.threads);
     rey_context *ctx = d.alloc(d.user, sizeof *ctx, 64);
     if (!ctx) {
         return REY_ERROR_MEMORY;

@@ -77,6 +77,14 @@ int rey_available_threads(void) {
     return threads < 1 ? 1 : threads > MAX_THREADS ? MAX_THREADS : threads;
 }
 
+int rey_useful_threads(int asked) {
+    enum { MOST_PER_PROCESSOR = 4, FEWEST = 16 };
+    int available = rey_available_threads();
+    int most = available * MOST_PER_PROCESSOR < FEWEST ? FEWEST : available * MOST_PER_PROCESSOR;
+    most = most > MAX_THREADS ? MAX_THREADS : most;
+    return asked <= 0 ? available : asked > most ? most : asked;
+}
+
 int rey_widest_lanes(void) {
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {

@@ -109,4 +109,5 @@ rey_result build_instance(Builder *b, rey_xml_node *node, const char *path);
 // shape: of an area light, else -1.
 rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out);
 rey_result build_sensor(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_sampler(Builder *b, rey_xml_node *node, SensorRecord *s);
 rey_result build_integrator(Builder *b, rey_xml_node *node);

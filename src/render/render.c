@@ -105,7 +105,7 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
     rey_film_norms(&r->plan, r->columns, r->rows);
     r->job.workspace_bytes =
         r->backend->workspace_bytes(mode) + ((size_t)scene->view.groups_count + 3) * sizeof(int32_t);
-    for (int i = 0; i < ctx->def.threads; i++) {
+    for (int i = 0; i < ctx->def.threads && i < r->tiles; i++) {
         r->workspaces[i] = rey_alloc(ctx, r->job.workspace_bytes);
         if (!r->workspaces[i]) {
             return REY_ERROR_MEMORY;

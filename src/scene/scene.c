@@ -1,6 +1,8 @@
 // scene.c: life cycle of the flat scene: growing arrays while loading, one arena afterwards.
 #include "scene/scene.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 rey_result rey_scene_new(rey_context *ctx, rey_scene **out) {
@@ -24,6 +26,26 @@ int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int6
     }
     size_t first = array->count;
     return n == 0 || rey_array_push(scene->ctx, array, item_bytes, (size_t)n) ? (int32_t)first : -1;
+}
+
+rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) {
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    for (size_t i = 0; i < scene->notes.count; i++) {
+        if (strcmp(ARRAY_AT(scene->notes, char *, i), text) == 0) {
+            return REY_OK;
+        }
+    }
+    char *copy = rey_strdup(scene->ctx, text), **note = rey_array_push(scene->ctx, &scene->notes, sizeof *note, 1);
+    if (note) {
+        *note = copy;
+    } else {
+        rey_free(scene->ctx, copy);
+    }
+    return copy && note ? REY_OK : REY_ERROR_MEMORY;
 }
 
 rey_result rey_scene_freeze(rey_scene *scene) {
@@ -77,6 +99,10 @@ void rey_scene_destroy(rey_scene *scene) {
     for (size_t i = 0; i < scene->aliases.count; i++) {
         rey_free(ctx, ARRAY_AT(scene->aliases, Alias, i).name);
     }
+    for (size_t i = 0; i < scene->notes.count; i++) {
+        rey_free(ctx, ARRAY_AT(scene->notes, char *, i));
+    }
+    rey_array_free(ctx, &scene->notes);
     rey_array_free(ctx, &scene->params);
     rey_array_free(ctx, &scene->aliases);
     rey_free(ctx, scene->arena);

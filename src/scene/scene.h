@@ -139,6 +139,7 @@ struct rey_scene {
     rey_context *ctx;
     SceneView view;
     Array params, aliases;
+    Array notes;              // of char *: what a user should know about how the scene was read
     // Loading: each array grows by itself; rey_scene_freeze moves all into the arena.
     struct {
 #define ARRAY(type, name, comment) Array name;
@@ -163,6 +164,8 @@ rey_result rey_scene_new(rey_context *ctx, rey_scene **out);
 int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n);
 // Moves the build arrays into the arena; theta never moves from here on.
 rey_result rey_scene_freeze(rey_scene *scene);
+// Records something that a user should know about how the scene was read; once, however often it is said.
+rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);

@@ -1,0 +1,100 @@
+// Integrators and samplers as scenes write them: what is taken, what is refused and in which words, and what the scene's
+// notes say about it.
+#include "reynolds/reynolds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char path[64];
+
+static rey_result load(rey_context *ctx, const char *integrator, const char *sampler, rey_scene **scene) {
+    snprintf(path, sizeof path, "/tmp/reynolds_integrators_%ld.xml", (long)getpid());
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f,
+            "<scene version='3.0.0'>\n%s\n<sensor type='perspective'>\n%s\n<film type='hdrfilm'><integer name='width' "
+            "value='4'/><integer name='height' value='4'/></film></sensor>\n<shape type='sphere'/></scene>\n",
+            integrator, sampler);
+    assert_int_equal(fclose(f), 0);
+    rey_result result = rey_scene_load(ctx, path, NULL, 0, scene);
+    unlink(path);
+    return result;
+}
+
+typedef struct Case {
+    const char *text;
+    rey_result result;
+    const char *words; // of the message, or of the only note; "" = no note
+} Case;
+
+static void check_cases(bool samplers, const Case *cases, size_t count) {
+    rey_context *ctx;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (size_t i = 0; i < count; i++) {
+        rey_scene *scene = NULL;
+        rey_result result = samplers ? load(ctx, "<integrator type='path'/>", cases[i].text, &scene)
+                                     : load(ctx, cases[i].text, "", &scene);
+        const char *words = result ? rey_error(ctx) : rey_scene_note_count(scene) ? rey_scene_note(scene, 0) : "";
+        if (result != cases[i].result || !strstr(words, cases[i].words) || (!*cases[i].words && *words)) {
+            fail_msg("%s: result %d, '%s', expected %d, '%s'", cases[i].text, (int)result, result ? rey_error(ctx) : words,
+                     (int)cases[i].result, cases[i].words);
+        }
+        assert_null(scene ? rey_scene_note(scene, rey_scene_note_count(scene)) : NULL);
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
+}
+
+static void test_samplers(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"", REY_OK, ""},
+        {"<sampler type='independent'><integer name='sample_count' value='9'/><integer name='seed' value='3'/></sampler>",
+         REY_OK, ""},
+        {"<sampler type='stratified'><integer name='sample_count' value='10'/><boolean name='jitter' value='false'/>"
+         "</sampler>",
+         REY_OK, "takes the place of 'stratified': it is stratified for any sample count, and uses 10"},
+        {"<sampler type='multijitter'><integer name='seed' value='7'/><boolean name='jitter' value='true'/></sampler>",
+         REY_OK, ":4: the sampler 'sobol' (Owen-scrambled points) takes the place of 'multijitter'"},
+        {"<sampler type='orthogonal'><integer name='strength' value='3'/><boolean name='jitter' value='false'/></sampler>",
+         REY_OK, "'orthogonal'"},
+        {"<sampler type='ldsampler'><integer name='sample_count' value='64'/></sampler>", REY_OK, "'ldsampler'"},
+        {"<sampler type='ldsampler'><boolean name='jitter' value='true'/></sampler>", REY_ERROR_SCENE, "jitter"},
+        {"<sampler type='independent'><boolean name='jitter' value='true'/></sampler>", REY_ERROR_SCENE, "jitter"},
+        {"<sampler type='stratified'><integer name='strength' value='2'/></sampler>", REY_ERROR_SCENE, "strength"},
+        {"<sampler type='orthogonal'><integer name='strength' value='0'/></sampler>", REY_ERROR_SCENE, "strength"},
+        {"<sampler type='multijiter'/>", REY_ERROR_SCENE, "did you mean 'multijitter'?"},
+        {"<sampler type='stratified'><integer name='sample_count' value='0'/></sampler>", REY_ERROR_SCENE, "sample_count"},
+    };
+    check_cases(true, cases, sizeof cases / sizeof *cases);
+}
+
+// Far more threads than processors: as many run as make sense.
+static void test_threads(void **state) {
+    (void)state;
+    rey_context_def def = rey_default_context_def();
+    rey_context *ctx;
+    assert_int_equal(rey_context_create(&def, &ctx), REY_OK);
+    int available = rey_threads(ctx);
+    rey_context_destroy(ctx);
+    def.threads = 4096;
+    assert_int_equal(rey_context_create(&def, &ctx), REY_OK);
+    assert_true(rey_threads(ctx) >= available && rey_threads(ctx) <= (4 * available < 16 ? 16 : 4 * available));
+    rey_context_destroy(ctx);
+    def.threads = 7;
+    assert_int_equal(rey_context_create(&def, &ctx), REY_OK);
+    assert_int_equal(rey_threads(ctx), 7);
+    rey_context_destroy(ctx);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_samplers), cmocka_unit_test(test_threads)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
