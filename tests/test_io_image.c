@@ -333,6 +333,33 @@ static void test_round_trips(void **state) {
     rey_context_destroy(ctx);
 }
 
+// Rows of noise that compresses a little: some of their streams are exactly as long as the raw rows, which readers would
+// take for raw data if they were written.
+static void test_exr_barely_compressible(void **state) {
+    UNUSED(state);
+    enum { WIDEST = 24 };
+    static const char path[] = "test_io_image_noise.exr";
+    rey_context *ctx = context();
+    float data[WIDEST * 3];
+    uint32_t random = 1;
+    for (int round = 0; round < 250; round++) {
+        int width = 1 + round % WIDEST, noisy = round / WIDEST * 3;
+        for (int i = 0; i < width * 3; i++) {
+            random = random * 1664525u + 1013904223u;
+            data[i] = (int)(random >> 16) % 30 < noisy ? (float)(random >> 8) / 16777216.0f : 0.5f;
+        }
+        rey_image image;
+        assert_int_equal(rey_exr_write(ctx, path, data, width, 1, 3, NULL), REY_OK);
+        if (rey_image_read(ctx, path, &image) != REY_OK) {
+            fail_msg("round %d: %s", round, rey_error(ctx));
+        }
+        assert_memory_equal(image.data, data, (size_t)width * 3 * sizeof *data);
+        rey_image_free(ctx, &image);
+    }
+    unlink(path);
+    rey_context_destroy(ctx);
+}
+
 /* ---- what must be refused ------------------------------------------------------------------------------------- */
 
 static void make_sort(int sort) {
@@ -420,6 +447,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exr_types),   cmocka_unit_test(test_png_types), cmocka_unit_test(test_jpeg_types),
         cmocka_unit_test(test_raw_types),   cmocka_unit_test(test_round_trips), cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_wrong_magic), cmocka_unit_test(test_huge_counts)};
+        cmocka_unit_test(test_wrong_magic), cmocka_unit_test(test_huge_counts),
+        cmocka_unit_test(test_exr_barely_compressible)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

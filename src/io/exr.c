@@ -239,9 +239,24 @@ static void sort_channels(int channels, const char *const *names, int order[EXR_
     }
 }
 
+typedef struct Compression {
+    exr_result_t (*core)(exr_encode_pipeline_t *pipeline);
+} Compression;
+
+// Readers take a chunk that is as long as its raw data for raw data, which a compressed stream can be by chance:
+// OpenEXR 3.1 writes such streams all the same (its issue 2306). They are replaced by the raw data.
+static exr_result_t compress_chunk(exr_encode_pipeline_t *pipeline) {
+    exr_result_t code = ((const Compression *)pipeline->encoding_user_data)->core(pipeline);
+    if (code == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes) {
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    }
+    return code;
+}
+
 static exr_result_t write_chunks(exr_context_t file, const float *data, int width, int height, int channels,
                                  const int *order) {
     exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    Compression compression;
     int32_t lines;
     exr_result_t code = exr_get_scanlines_per_chunk(file, 0, &lines);
     for (int y = 0; y < height && code == EXR_ERR_SUCCESS; y += lines) {
@@ -261,6 +276,9 @@ static exr_result_t write_chunks(exr_context_t file, const float *data, int widt
         }
         if (code == EXR_ERR_SUCCESS && y == 0) {
             code = exr_encoding_choose_default_routines(file, 0, &pipeline);
+            compression.core = pipeline.compress_fn;
+            pipeline.compress_fn = compress_chunk;
+            pipeline.encoding_user_data = &compression;
         }
         code = code == EXR_ERR_SUCCESS ? exr_encoding_run(file, 0, &pipeline) : code;
     }
