@@ -19,7 +19,7 @@ setup:
 	@sh scripts/setup.sh $(PACKAGES)
 
 demo: all
-	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml
+	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
 test: all
 	@cd $(BUILD) && ctest --output-on-failure

@@ -52,7 +52,7 @@ typedef struct Options {
     int terms;           // REY_TERM_* bits, 0 = all that are needed
     bool reverse;        // --mode reverse
     const char *adjoint; // number or file name
-    bool resume, json;
+    bool resume, overwrite, json;
     rey_define *defines; // -D
     char **define_names; // copies of their names, owned
     int define_count;
@@ -106,7 +106,8 @@ typedef struct Session {
     Progress progress;
 } Session;
 
-// Creates the context only (context_open) or the context and the scene too. On failure it has reported already,
+// Creates the context only (context_open) or the context and the scene too, after a look at whether the output can be
+// written. On failure it has reported already,
 // *session is closed, and the exit status is returned; EXIT_OK otherwise.
 int cli_context_open(const Options *options, Session *session);
 int cli_session_open(const Options *options, const char *label, Session *session);
@@ -152,13 +153,11 @@ int cli_direction_terms(const rey_scene *scene, const Direction *direction); // 
 /* ---- images -------------------------------------------------------------------------------------------- */
 
 typedef enum ImageFormat { IMAGE_EXR, IMAGE_PNG, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
-ImageFormat cli_image_format(const char *path); // "-" is EXR on standard output
+ImageFormat cli_image_format(const char *path); // "-" is EXR on standard output, /dev/null takes it too
 
 // Reads an RGB image of any format that the library knows; *rgb is freed with rey_free. Words in the context on
 // failure.
 rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb);
-// EXIT_OK when an image can go to path: known ending and a folder that exists. Reports otherwise.
-int cli_check_output(const Options *options, const char *path);
 // Writes height x width x 3 floats by the ending of path. signed_values: PNG becomes blue-white-red over
 // [-scale, scale], and *scale (may be null) tells the scale.
 rey_result cli_write_image(rey_context *ctx, const char *path, const float *image, int width, int height,

@@ -12,7 +12,7 @@
 
 enum { SHOWN_ENTRIES = 3, LINE_SECONDS = 5 };
 
-static volatile sig_atomic_t terminated; // SIGTERM, as batch systems send it before they take the machine away
+static volatile sig_atomic_t terminated; // SIGTERM before a batch system takes the machine away, SIGHUP with a terminal
 
 static void on_terminate(int number) {
     UNUSED(number);
@@ -139,6 +139,7 @@ static int run(const Options *options, Session *session) {
                   .override_count = options->set_count,
                   .output = options->output,
                   .resume = options->resume,
+                  .overwrite = options->overwrite,
                   .seed_given = options->seed_given,
                   .seed = options->seed,
                   .progress = show_progress,
@@ -176,6 +177,10 @@ int cli_fit(int argc, char **argv) {
     struct sigaction action = {.sa_handler = on_terminate, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     sigaction(SIGTERM, &action, NULL);
+    struct sigaction former; // nohup has it ignored
+    if (!sigaction(SIGHUP, NULL, &former) && former.sa_handler != SIG_IGN) {
+        sigaction(SIGHUP, &action, NULL);
+    }
     status = cli_context_open(&options, &session);
     if (!status) {
         status = run(&options, &session);

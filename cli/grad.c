@@ -6,16 +6,15 @@
 #include "cli.h"
 
 #include "base/context.h"
+#include "io/file.h"
 #include "io/image.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
-enum { SETS = 16 };
+enum { SETS = 16, PATH_BYTES = 4096 };
 
 typedef struct Grad {
     Session session;
@@ -117,14 +116,46 @@ static double dot(const double *gradient, const float *tangent, int64_t count) {
     return sum;
 }
 
-// Writes each parameter's gradient as FOLDER/NAME.npy, with the parameter's shape, and FOLDER/gradient.json.
-static rey_result write_gradient(Grad *g, const double *gradient) {
-    rey_context *ctx = g->session.ctx;
+// FOLDER/NAME.npy of the k-th parameter.
+static void gradient_path(const Grad *g, int k, char path[PATH_BYTES]) {
     const char *folder = g->session.options->output;
-    char path[4096];
-    if (mkdir(folder, 0777) && errno != EEXIST) {
-        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", folder, strerror(errno));
+    snprintf(path, PATH_BYTES, "%s/%s.npy", folder, g->direction.names[k]);
+    for (char *c = path + strlen(folder) + 1; *c; c++) {
+        *c = *c == '/' ? '_' : *c; // names are not paths
     }
+}
+
+static rey_result check_gradient_paths(const Grad *g) {
+    char path[PATH_BYTES];
+    rey_result result = REY_OK;
+    for (int k = 0; k < g->direction.count && g->session.options->output && !result; k++) {
+        gradient_path(g, k, path);
+        result = rey_file_check_output(g->session.ctx, path);
+    }
+    return result;
+}
+
+static rey_result write_summary(const Grad *g) {
+    const char *folder = g->session.options->output;
+    char path[PATH_BYTES], *text = NULL;
+    size_t size = 0;
+    snprintf(path, sizeof path, "%s/gradient.json", folder);
+    FILE *file = open_memstream(&text, &size);
+    if (!file) {
+        return rey_fail_memory(g->session.ctx, 0);
+    }
+    write_json(file, g, folder);
+    bool bad = ferror(file) != 0;
+    rey_result result = fclose(file) || bad ? rey_fail_memory(g->session.ctx, size)
+                                            : rey_file_write(g->session.ctx, path, text, size);
+    free(text);
+    return result;
+}
+
+// Writes each parameter's gradient with the parameter's shape, and FOLDER/gradient.json.
+static rey_result write_gradient(const Grad *g, const double *gradient) {
+    rey_context *ctx = g->session.ctx;
+    char path[PATH_BYTES];
     for (int k = 0; k < g->direction.count; k++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(g->session.scene, g->direction.params[k], &info);
@@ -135,24 +166,14 @@ static rey_result write_gradient(Grad *g, const double *gradient) {
         for (int64_t i = 0; i < info.count; i++) {
             values[i] = (float)gradient[g->direction.offsets[k] + i];
         }
-        snprintf(path, sizeof path, "%s/%s.npy", folder, g->direction.names[k]);
-        for (char *c = path + strlen(folder) + 1; *c; c++) {
-            *c = *c == '/' ? '_' : *c; // names are not paths
-        }
+        gradient_path(g, k, path);
         result = rey_npy_write(ctx, path, values, info.shape, info.dims);
         rey_free(ctx, values);
         if (result) {
             return result;
         }
     }
-    snprintf(path, sizeof path, "%s/gradient.json", folder);
-    FILE *file = fopen(path, "w");
-    if (!file) {
-        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
-    }
-    write_json(file, g, folder);
-    bool bad = ferror(file) != 0;
-    return fclose(file) || bad ? rey_fail(ctx, REY_ERROR_IO, "%s: could not be written", path) : REY_OK;
+    return write_summary(g);
 }
 
 static rey_result reverse(Grad *g) {
@@ -161,7 +182,10 @@ static rey_result reverse(Grad *g) {
     float *adjoint = NULL;
     double *gradient = rey_alloc_array(s->ctx, (size_t)size, sizeof *gradient);
     double *set_gradients = rey_alloc_array(s->ctx, (size_t)size, SETS * sizeof *set_gradients);
-    rey_result result = gradient && set_gradients ? read_adjoint(s, &adjoint) : REY_ERROR_MEMORY;
+    rey_result result = gradient && set_gradients ? check_gradient_paths(g) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = read_adjoint(s, &adjoint);
+    }
     if (!result) {
         result = rey_vjp(s->scene, &s->def, cli_direction_selection(&g->direction), adjoint, gradient, set_gradients,
                          &g->stats);
@@ -214,12 +238,7 @@ int cli_grad(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_GRAD, argc, argv, &options, &status)) {
         return status;
     }
-    if (options.output && !options.reverse) {
-        status = cli_check_output(&options, options.output);
-    }
-    if (!status) {
-        status = cli_session_open(&options, "grad", &g.session);
-    }
+    status = cli_session_open(&options, "grad", &g.session);
     if (!status) {
         status = cli_session_direction(&g.session, options.params, options.param_count, &g.direction);
         rey_result result = status ? REY_OK : differentiate(&g);

@@ -14,7 +14,7 @@
 ImageFormat cli_image_format(const char *path) {
     static const char *const endings[] = {".exr", ".png", ".npy"};
     size_t length = strlen(path);
-    if (!strcmp(path, "-")) {
+    if (!strcmp(path, "-") || !strcmp(path, "/dev/null")) {
         return IMAGE_EXR;
     }
     for (int i = 0; i < IMAGE_UNKNOWN; i++) {

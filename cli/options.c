@@ -32,6 +32,7 @@ typedef enum OptionId {
     OPTION_TERMS,
     OPTION_SET,
     OPTION_RESUME,
+    OPTION_OVERWRITE,
     OPTION_JSON,
     OPTION_HELP
 } OptionId;
@@ -54,6 +55,7 @@ static const OptionRow option_rows[] = {
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior)"},
     {OPTION_SET, 0, "set", "key=value", FITS, "change an entry of the job; may be repeated"},
     {OPTION_RESUME, 0, "resume", NULL, FITS, "continue from the last checkpoint"},
+    {OPTION_OVERWRITE, 0, "overwrite", NULL, FITS, "start again where the folder holds another or an unfinished fit"},
     {OPTION_SPP, 0, "spp", "N", RENDERS, "samples per pixel (default: the scene's)"},
     {OPTION_SEED, 0, "seed", "N", RENDERS | FITS, "seed of the random numbers (default 0)"},
     {OPTION_SENSOR, 0, "sensor", "K", RENDERS, "which sensor, from 0"},
@@ -245,6 +247,9 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_RESUME:
         o->resume = true;
         return true;
+    case OPTION_OVERWRITE:
+        o->overwrite = true;
+        return true;
     case OPTION_JSON:
         o->json = true;
         return true;
@@ -370,6 +375,13 @@ static bool check_required(const Options *o) {
         cli_usage_error(c, "--adjoint needs --mode reverse");
     } else if (c == COMMAND_GRAD && o->reverse && o->output && !strcmp(o->output, "-")) {
         cli_usage_error(c, "reverse mode writes a folder, -o - is not one");
+    } else if (c == COMMAND_GRAD && o->reverse && o->output && cli_image_format(o->output) != IMAGE_UNKNOWN) {
+        cli_usage_error(c, "reverse mode writes a folder of .npy files, -o %s names a picture", o->output);
+    } else if ((c == COMMAND_RENDER || (c == COMMAND_GRAD && !o->reverse)) && o->output &&
+               cli_image_format(o->output) == IMAGE_UNKNOWN) {
+        cli_usage_error(c, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
+    } else if (o->resume && o->overwrite) {
+        cli_usage_error(c, "--resume continues and --overwrite starts again: give one of them");
     } else if (c == COMMAND_RENDER && !o->output && !o->json) {
         cli_usage_error(c, "-o OUT is missing");
     } else if (o->json && o->output && !strcmp(o->output, "-")) {

@@ -37,10 +37,7 @@ int cli_render(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_RENDER, argc, argv, &options, &status)) {
         return status;
     }
-    status = options.output ? cli_check_output(&options, options.output) : EXIT_OK;
-    if (!status) {
-        status = cli_session_open(&options, "render", &session);
-    }
+    status = cli_session_open(&options, "render", &session);
     if (!status) {
         rey_stats stats = {0};
         rey_result result = render(&session, &stats);

@@ -3,6 +3,7 @@
 
 #include "base/context.h"
 #include "base/parallel.h"
+#include "io/file.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -10,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
@@ -23,6 +25,8 @@ void cli_catch_interrupts(void) {
     struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
+    action.sa_handler = SIG_IGN; // a write past the limit of file sizes fails, and is reported
+    sigaction(SIGXFSZ, &action, NULL);
 }
 
 bool cli_interrupted(void) {
@@ -112,21 +116,6 @@ int cli_finish_output(void) {
     return EXIT_OK;
 }
 
-int cli_check_output(const Options *options, const char *path) {
-    if (cli_image_format(path) == IMAGE_UNKNOWN) {
-        return cli_usage_error(options->command, "-o: '%s' ends in none of .exr, .png, .npy", path);
-    }
-    char folder[4096] = ".";
-    const char *slash = strrchr(path, '/');
-    if (slash) {
-        snprintf(folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
-    }
-    if (strcmp(path, "-") && access(folder, W_OK)) {
-        return cli_fail(options, "cannot write into %s: %s", folder, strerror(errno));
-    }
-    return EXIT_OK;
-}
-
 int cli_context_open(const Options *options, Session *session) {
     *session = (Session){.options = options};
     rey_context_def def = rey_default_context_def();
@@ -139,9 +128,30 @@ int cli_context_open(const Options *options, Session *session) {
     return result ? cli_fail(options, "%s", rey_result_text(result)) : EXIT_OK;
 }
 
+// Whether what comes out can be written, before the work.
+static rey_result check_output(const Session *s) {
+    const Options *o = s->options;
+    char path[4096];
+    if (!o->output || !strcmp(o->output, "-")) {
+        return REY_OK;
+    }
+    if (!o->reverse) {
+        return rey_file_check_output(s->ctx, o->output);
+    }
+    if (mkdir(o->output, 0777) && errno != EEXIST) {
+        return rey_fail(s->ctx, REY_ERROR_IO, "%s: cannot make this folder: %s", o->output, strerror(errno));
+    }
+    snprintf(path, sizeof path, "%s/gradient.json", o->output);
+    return rey_file_check_output(s->ctx, path);
+}
+
 static rey_result load_scene(Session *s) {
     const Options *o = s->options;
-    rey_result result = rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &s->scene);
+    rey_result result = check_output(s);
+    if (result) {
+        return result;
+    }
+    result = rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &s->scene);
     if (result) {
         return result;
     }

@@ -131,19 +131,25 @@ static rey_result check_job(rey_context *ctx, const char *path, const Checkpoint
     return result;
 }
 
+// The header of an undamaged checkpoint of this job.
+static rey_result read_header(rey_context *ctx, const char *path, const char *flat, const unsigned char *bytes,
+                              size_t size, CheckpointHeader *header) {
+    uint64_t hash;
+    if (size < sizeof *header + sizeof hash || memcmp(bytes, MAGIC, sizeof MAGIC)) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a checkpoint of this version", path);
+    }
+    memcpy(header, bytes, sizeof *header);
+    memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
+    if (!sizes_agree(header, size) || hash != hash_bytes(bytes, size - sizeof hash)) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: damaged checkpoint", path);
+    }
+    return check_job(ctx, path, header, (const char *)bytes + sizeof *header, flat);
+}
+
 static rey_result decode(const char *path, const char *flat, const unsigned char *bytes, size_t size, Unknowns *u,
                          FitState *state) {
     CheckpointHeader header;
-    uint64_t hash;
-    if (size < sizeof header + sizeof hash || memcmp(bytes, MAGIC, sizeof MAGIC)) {
-        return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: not a checkpoint of this version", path);
-    }
-    memcpy(&header, bytes, sizeof header);
-    memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
-    if (!sizes_agree(&header, size) || hash != hash_bytes(bytes, size - sizeof hash)) {
-        return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: damaged checkpoint", path);
-    }
-    rey_result result = check_job(u->ctx, path, &header, (const char *)bytes + sizeof header, flat);
+    rey_result result = read_header(u->ctx, path, flat, bytes, size, &header);
     if (result) {
         return result;
     }
@@ -181,5 +187,18 @@ rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, 
         result = decode(path, flat, bytes, size, u, state);
     }
     rey_free(u->ctx, bytes);
+    return result;
+}
+
+rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *flat, FitState *state) {
+    unsigned char *bytes;
+    size_t size;
+    CheckpointHeader header = {.iteration = 0};
+    rey_result result = rey_file_read(ctx, path, &bytes, &size);
+    if (!result) {
+        result = read_header(ctx, path, flat, bytes, size, &header);
+    }
+    rey_free(ctx, bytes);
+    *state = (FitState){.iteration = (int)header.iteration, .seconds = header.seconds, .converged = header.converged};
     return result;
 }

@@ -21,3 +21,5 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
 
 // Reads one that was written for the same job; names the first key that differs otherwise.
 rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state);
+// The same without the numbers: how far it came.
+rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *flat, FitState *state);

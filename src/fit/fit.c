@@ -9,12 +9,10 @@
 #include "fit/report.h"
 #include "io/file.h"
 
-#include <errno.h>
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum { LOSS_WINDOW = 10 }; // the final loss is a mean over so many iterations
 
@@ -246,23 +244,6 @@ static rey_result optimise(Fit *fit) {
 
 /* ---- opening and closing ------------------------------------------------------------------------------- */
 
-static rey_result make_folder(rey_context *ctx, const char *path) {
-    char part[4096];
-    size_t length = strlen(path);
-    if (length >= sizeof part) {
-        return rey_fail(ctx, REY_ERROR_IO, "%.64s...: path too long", path);
-    }
-    for (size_t i = 1; i <= length; i++) {
-        if (path[i] == '/' || !path[i]) {
-            snprintf(part, sizeof part, "%.*s", (int)i, path);
-            if (mkdir(part, 0777) && errno != EEXIST) {
-                return rey_fail(ctx, REY_ERROR_IO, "%s: cannot make this folder: %s", part, strerror(errno));
-            }
-        }
-    }
-    return REY_OK;
-}
-
 static rey_result write_resolved(Fit *fit) {
     char *text = NULL, *path = rey_fit_output_path(fit, "job.resolved.yaml");
     rey_result result = path ? rey_job_yaml(&fit->job, &text) : REY_ERROR_MEMORY;
@@ -330,11 +311,11 @@ static rey_result open_fit(Fit *fit) {
         int64_t count = ARRAY_AT(fit->unknowns.items, Unknown, k).count;
         fit->state.history_width += count <= HISTORY_LARGEST ? (int)count : 0;
     }
+    if (!result) {
+        result = rey_fit_folder_open(fit);
+    }
     if (!result && fit->def->resume) {
         result = resume(fit);
-    }
-    if (!result) {
-        result = make_folder(fit->ctx, fit->output);
     }
     if (!result) {
         result = write_resolved(fit);
@@ -346,6 +327,7 @@ static rey_result open_fit(Fit *fit) {
 static void close_fit(Fit *fit) {
     void *blocks[] = {fit->a, fit->b, fit->adjoint_a, fit->adjoint_b, fit->gradient, fit->flat, fit->output};
     rey_metrics_close(fit);
+    rey_fit_folder_close(fit);
     rey_unknowns_free(&fit->unknowns);
     rey_views_free(fit);
     rey_scene_destroy(fit->scene);

@@ -17,6 +17,7 @@ typedef struct FitDef {
     int override_count;
     const char *output; // folder, null = the job's
     bool resume;
+    bool overwrite; // start again where the folder holds another fit, or this one unfinished
     bool seed_given; // seed replaces the job's
     uint32_t seed;
     // Called after every iteration, and while longer calls render; false stops: the iteration is finished, the state
@@ -75,11 +76,15 @@ typedef struct Fit {
     struct TensorBoard *board;
     void *metrics;        // FILE *
     double start_seconds; // clock at which this run started, less the time of earlier runs
+    int lock;             // descriptor of the locked folder + 1, 0 = none
     bool stop;            // the user asked to stop
 } Fit;
 
 // Path of a file in the output folder; freed with rey_free.
 char *rey_fit_output_path(const Fit *fit, const char *name);
+// Makes the folder, locks it against other fits, and refuses to replace an earlier fit unasked.
+rey_result rey_fit_folder_open(Fit *fit);
+void rey_fit_folder_close(Fit *fit);
 // How table and report render a view; the user may cancel.
 rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set, int spp);
 

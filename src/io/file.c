@@ -1,5 +1,5 @@
 // file.c: whole files in and out.
-#define _GNU_SOURCE // mkostemp and the GNU strerror_r
+#define _GNU_SOURCE // the GNU strerror_r
 #include "io/file.h"
 
 #include <errno.h>
@@ -99,48 +99,3 @@ rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **byt
     return result;
 }
 
-static rey_result write_all(rey_context *ctx, const char *path, int file, const unsigned char *bytes, size_t size) {
-    enum { MOST = 1 << 30 };
-    while (size) {
-        ssize_t put = write(file, bytes, size < MOST ? size : MOST);
-        if (put > 0) {
-            bytes += put;
-            size -= (size_t)put;
-        } else if (put == 0 || errno != EINTR) {
-            return fail_errno(ctx, path, "write");
-        }
-    }
-    return fsync(file) == 0 || errno == EINVAL || errno == EROFS ? REY_OK : fail_errno(ctx, path, "write");
-}
-
-rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size) {
-    static const char suffix[] = ".XXXXXX";
-    size_t length = strlen(path);
-    char *temporary = rey_alloc(ctx, length + sizeof suffix);
-    if (!temporary) {
-        return REY_ERROR_MEMORY;
-    }
-    memcpy(temporary, path, length);
-    memcpy(temporary + length, suffix, sizeof suffix);
-    int file = mkostemp(temporary, O_CLOEXEC);
-    rey_result result = file < 0 ? fail_errno(ctx, path, "create") : write_all(ctx, path, file, bytes, size);
-    if (file >= 0) {
-        // mkostemp makes files private; give the modes an ordinary new file, or the replaced file, would have.
-        struct stat status;
-        mode_t mode = stat(path, &status) == 0 ? status.st_mode & 0777 : 0644;
-        if (result == REY_OK && fchmod(file, mode) != 0) {
-            result = fail_errno(ctx, path, "create");
-        }
-        if (close(file) != 0 && result == REY_OK) {
-            result = fail_errno(ctx, path, "write");
-        }
-        if (result == REY_OK && rename(temporary, path) != 0) {
-            result = fail_errno(ctx, path, "replace");
-        }
-        if (result != REY_OK) {
-            unlink(temporary);
-        }
-    }
-    rey_free(ctx, temporary);
-    return result;
-}

@@ -9,5 +9,9 @@
 rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size);
 
 // Writes a file so that path holds either its former content or all of the new: a temporary file beside it is
-// written, flushed to the device and renamed over it. On failure the temporary file is removed.
+// written, flushed to the device and renamed over it. A symbolic link stays one: the file that it leads to is replaced.
+// Devices and pipes are written as they are. On failure the temporary file is removed.
 rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size);
+
+// Whether rey_file_write could write there now, tried with an empty temporary file: asked before long work.
+rey_result rey_file_check_output(rey_context *ctx, const char *path);

@@ -1,76 +1,7 @@
 // test_cli.c: the command as a user runs it: exit statuses, where words and data go, and that its numbers agree.
-#include "json_read.h"
+#include "command.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
-enum { OUTPUT_BYTES = 1 << 17 };
-
-typedef struct Fixture {
-    char folder[64];
-    char out[OUTPUT_BYTES], words[OUTPUT_BYTES]; // of the latest command
-} Fixture;
-
-static int make_folder(void **state) {
-    static Fixture fixture;
-    snprintf(fixture.folder, sizeof fixture.folder, "/tmp/reynolds-test-XXXXXX");
-    *state = &fixture;
-    return !mkdtemp(fixture.folder) || chdir(fixture.folder);
-}
-
-static int remove_folder(void **state) {
-    Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    return chdir("/") || system(command);
-}
-
-static void read_text(const char *path, char *text) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    text[fread(text, 1, OUTPUT_BYTES - 1, file)] = 0;
-    fclose(file);
-}
-
-// Runs `reynolds ARGUMENTS` in the test's folder and returns the exit status; %s in arguments is the scene.
-static int run(Fixture *f, const char *arguments) {
-    char command[4096], filled[2048];
-    snprintf(filled, sizeof filled, arguments, TEST_SCENE);
-    snprintf(command, sizeof command, "'%s' %s >out.txt 2>words.txt", REYNOLDS_COMMAND, filled);
-    int status = system(command);
-    read_text("out.txt", f->out);
-    read_text("words.txt", f->words);
-    if (!WIFEXITED(status)) {
-        return -1;
-    }
-    return WEXITSTATUS(status);
-}
-
-static void expect(Fixture *f, int status, const char *arguments) {
-    int found = run(f, arguments);
-    if (found != status) {
-        print_error("reynolds %s: exit %d, expected %d\n%s\n", arguments, found, status, f->words);
-    }
-    assert_int_equal(found, status);
-}
-
-static JsonNode *run_json(Fixture *f, int status, const char *arguments) {
-    expect(f, status, arguments);
-    JsonNode *node = json_read("out.txt");
-    assert_non_null(node);
-    assert_int_equal(node->kind, JSON_OBJECT);
-    return node;
-}
 
 static void usage_errors_exit_with_two(void **state) {
     Fixture *f = *state;
@@ -93,6 +24,9 @@ static void usage_errors_exit_with_two(void **state) {
                                         "grad %s --param x --mode up",
                                         "grad %s --param x --mode reverse",
                                         "grad %s --param x --mode reverse --adjoint 1 -o -",
+                                        "grad %s --param x --mode reverse --adjoint 1 -o a.npy",
+                                        "grad %s --param x -o folder",
+                                        "fit job.yaml --resume --overwrite",
                                         "grad %s --param x --adjoint 1",
                                         "grad %s --param x --terms nothing",
                                         "grad %s --param red.reflectance.value:ad=1",
@@ -133,7 +67,10 @@ static void failures_exit_with_one(void **state) {
     Fixture *f = *state;
     expect(f, 1, "render missing.xml -o a.exr");
     assert_non_null(strstr(f->words, "missing.xml"));
-    expect(f, 1, "render %s -o /nonexistent/a.exr");
+    expect(f, 1, "render missing.xml -o /nonexistent/a.exr"); // found out before the scene is read
+    assert_non_null(strstr(f->words, "/nonexistent/a.exr"));
+    expect(f, 1, "grad missing.xml --param a --mode reverse --adjoint 1 -o /nonexistent/b");
+    assert_non_null(strstr(f->words, "/nonexistent/b"));
     expect(f, 1, "render %s -o a.exr --sensor 7");
     expect(f, 1, "grad %s --param rad.reflectance.value");
     assert_non_null(strstr(f->words, "red.reflectance.value"));

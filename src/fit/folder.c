@@ -1,0 +1,120 @@
+// folder.c: the folder that a fit writes into: made, locked, and never taken from an earlier fit unasked.
+#include "fit/fit.h"
+#include "io/file.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static rey_result make_folder(rey_context *ctx, const char *path) {
+    char part[4096];
+    size_t length = strlen(path);
+    if (length >= sizeof part) {
+        return rey_fail(ctx, REY_ERROR_IO, "%.64s...: path too long", path);
+    }
+    for (size_t i = 1; i <= length; i++) {
+        if (path[i] == '/' || !path[i]) {
+            snprintf(part, sizeof part, "%.*s", (int)i, path);
+            if (mkdir(part, 0777) && errno != EEXIST) {
+                return rey_fail(ctx, REY_ERROR_IO, "%s: cannot make this folder: %s", part, strerror(errno));
+            }
+        }
+    }
+    return REY_OK;
+}
+
+// The lock is the system's: it ends with the process, however that ends. Some network file systems have none.
+static rey_result lock_folder(Fit *fit) {
+    int folder = open(fit->output, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0) {
+        return rey_fail(fit->ctx, REY_ERROR_IO, "%s: cannot open this folder: %s", fit->output, strerror(errno));
+    }
+    fit->lock = folder + 1;
+    if (flock(folder, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK) {
+        return rey_fail(fit->ctx, REY_ERROR_IO, "%s: another fit is running in this folder, use another -o", fit->output);
+    }
+    return REY_OK;
+}
+
+static rey_result check_outputs(Fit *fit) {
+    static const char *const names[] = {"checkpoint.bin", "job.resolved.yaml", "metrics.jsonl", "recovered.xml",
+                                        "report.html"};
+    rey_result result = REY_OK;
+    for (int i = 0; i < COUNT_OF(names) && !result; i++) {
+        char *path = rey_fit_output_path(fit, names[i]);
+        result = path ? rey_file_check_output(fit->ctx, path) : REY_ERROR_MEMORY;
+        rey_free(fit->ctx, path);
+    }
+    return result;
+}
+
+// A fit that starts again would go on in the event files of the one before.
+static void remove_event_files(const Fit *fit) {
+    DIR *folder = opendir(fit->output);
+    const struct dirent *entry;
+    while (folder && (entry = readdir(folder))) {
+        if (!strncmp(entry->d_name, "events.out.tfevents.", strlen("events.out.tfevents."))) {
+            unlinkat(dirfd(folder), entry->d_name, 0);
+        }
+    }
+    if (folder) {
+        closedir(folder);
+    }
+}
+
+// Whether what the folder holds may be replaced: the finished fit of this very job would come out the same.
+static rey_result check_former(Fit *fit, const char *path) {
+    FitState state;
+    rey_result result = rey_checkpoint_look(fit->ctx, path, fit->flat, &state);
+    if (result == REY_ERROR_MEMORY) {
+        return result;
+    }
+    if (result) {
+        char why[1024];
+        snprintf(why, sizeof why, "%s", rey_error(fit->ctx));
+        return rey_fail(fit->ctx, result, "%s; --overwrite replaces it", why);
+    }
+    if (state.iteration != fit->job.iterations && !state.converged) {
+        bool more = state.iteration < fit->job.iterations;
+        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds %d iterations of this fit; %s--overwrite starts again",
+                        fit->output, state.iteration, more ? "--resume continues, " : "");
+    }
+    return REY_OK;
+}
+
+static rey_result take_over(Fit *fit) {
+    char *path = rey_fit_output_path(fit, "checkpoint.bin");
+    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && access(path, F_OK) == 0) {
+        result = fit->def->overwrite ? REY_OK : check_former(fit, path);
+        if (!result) {
+            remove_event_files(fit);
+            unlink(path); // --resume must not find the former fit's
+        }
+    }
+    rey_free(fit->ctx, path);
+    return result;
+}
+
+rey_result rey_fit_folder_open(Fit *fit) {
+    rey_result result = fit->def->resume ? REY_OK : make_folder(fit->ctx, fit->output);
+    if (!result) {
+        result = lock_folder(fit);
+    }
+    if (!result && !fit->def->resume) {
+        result = take_over(fit);
+    }
+    return result ? result : check_outputs(fit);
+}
+
+void rey_fit_folder_close(Fit *fit) {
+    if (fit->lock) {
+        close(fit->lock - 1);
+    }
+    fit->lock = 0;
+}
