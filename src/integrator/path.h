@@ -6,7 +6,8 @@
 
 #include "bsdf/bsdf.h"
 #include "emitter/emitter.h"
-#include "integrator/stages.h"
+#include "integrator/split.h"
+#include "integrator/walk.h"
 
 // ---- vertices ----------------------------------------------------------------------------------------------------
 
@@ -19,9 +20,10 @@ typedef struct Vertex {
     Vec3 d, origin;  // incoming ray's direction, and the previous vertex
     Spec beta;
     Float pdf;
+    Int depth;       // path segments behind it; the bounce, unless scene->through
 } Vertex;
 
-KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count) {
+KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
     const Workspace *ws = &t->ws;
     const Paths *p = &ws->paths[t->current];
     Vertex v;
@@ -38,6 +40,7 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count) {
     v.origin = LOAD_V3(*p, px, py, pz, v.at);
     v.beta = spec_gather(p->beta, v.at);
     v.pdf = real_gather(p->pdf, v.at);
+    v.depth = t->scene->through ? i_gather(p->depth, v.at) : i_set(bounce);
     return v;
 }
 
@@ -80,6 +83,17 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec e
 
 KFN Float power_heuristic(Float a, Float b) { return a * a * f_safe_rcp(a * a + b * b); }
 
+// Weight of what a scattered ray met, against having sampled it as a light with density light_pdf.
+KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
+    Float pdf = v->pdf;
+    if (t->scene->split) {
+        Split s = split_of(t->scene, (UInt)i_gather(t->ws.sample, v->slot));
+        light_pdf = light_pdf * s.light_pdf;
+        pdf = pdf * s.scatter_pdf;
+    }
+    return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(pdf, light_pdf));
+}
+
 // Paths that left the scene: the environment, weighed against having been sampled as a light.
 static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
     const SceneView *scene = t->scene;
@@ -87,14 +101,17 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
         return;
     }
     const EmitterRecord *e = scene->emitters + scene->environment;
-    Vertex v = vertex_load(t, order, count);
+    Vertex v = vertex_load(t, order, count, bounce);
+    if (scene->through && scene->hide_emitters) {
+        v.m = v.m & mi_lt(i_set(0), v.depth);
+    }
     Vec2 uv = {f_set(0), f_set(0)};
     Float pdf = f_set(INV_FOUR_PI);
     if (e->kind == EMITTER_ENVMAP) {
         uv = envmap_uv(scene, e, v.d);
         pdf = envmap_pdf(scene, e, uv);
     }
-    Float mis = f_select(m_lt(v.pdf, f_set(0)), f_set(1), power_heuristic(v.pdf, pdf * e->weight));
+    Float mis = f_zero_unless(v.m, scattered_weight(t, &v, pdf * e->weight));
     Spec l = spec_scale(emitter_eval(scene, e, texcoord(uv, NULL), f_set(1)), mis);
     if (!t->derivative) {
         slot_add(t, v.slot, spec_mul(v.beta, l), v.m);
@@ -108,8 +125,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
 
 // MIS weight of light that the ray met at an area light, against having sampled that light.
 KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex *v, const Interaction *si) {
-    Float pdf = area_pdf(t->scene, e, v->origin, v->d, si) * e->weight;
-    return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(v->pdf, pdf));
+    return scattered_weight(t, v, area_pdf(t->scene, e, v->origin, v->d, si) * e->weight);
 }
 
 // Chooses an emitter per lane; returns its number and the probability of the choice.
@@ -154,11 +170,27 @@ KFN Mask light_is_delta(const SceneView *scene, Int light) {
     return mi_eq(kind, i_set(EMITTER_POINT));
 }
 
+// The ray to a light: it starts off the surface and aims at the same point, or it would pass or meet the light itself.
+KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
+    ray->o = interaction_offset(si, d);
+    Vec3 to_light = v3_sub(v3_madd(si->p, distance, d), ray->o);
+    Float length = f_sqrt(v3_dot(to_light, to_light));
+    ray->d = v3_scale(to_light, f_safe_rcp(length));
+    ray->tmax = length * (1.0f - 9e-4f);
+}
+
 // Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
 KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
                         const SampleKey *key, int32_t bounce, int32_t record) {
     const SceneView *scene = t->scene;
     Float choice;
+    SampleKey light_key = *key;
+    Split split;
+    if (scene->split) {
+        split = split_of(scene, key->sample);
+        light_key.sample = split.light_sample;
+        key = &light_key;
+    }
     Int light = emitter_choose(scene, rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), &choice);
     Spec radiance;
     LightSample s = light_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
@@ -167,26 +199,35 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     Float scatter_pdf;
     Spec f = bsdf_eval_pdf(call, wi, wo, smooth, &scatter_pdf);
     Float pdf = s.pdf * choice;
-    Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(pdf, scatter_pdf));
+    Float other_pdf = scatter_pdf, own_pdf = pdf;
+    Mask drawn = v->m;
+    if (scene->split) {
+        own_pdf = pdf * split.light_pdf;
+        other_pdf = scatter_pdf * split.scatter_pdf;
+        pdf = pdf * f_safe_rcp(split.light_weight);
+        drawn = drawn & split.light;
+    }
+    if (scene->through && scene->max_depth >= 0) {
+        drawn = drawn & mi_lt(v->depth + 1, i_set(scene->max_depth));
+    }
+    Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(own_pdf, other_pdf));
     Float weight = mis * f_safe_rcp(pdf);
     Spec l = spec_scale(spec_mul(f, radiance), weight);
     l = t->derivative ? l : spec_mul(v->beta, l);
     // A derivative may be non-zero where the value is 0, wherever scattering has a positive density.
     Mask useful = t->derivative ? m_gt(scatter_pdf, f_set(0)) | m_gt(spec_max(f), f_set(0)) : m_gt(spec_max(l), f_set(0));
-    Mask m = v->m & s.valid & useful & m_gt(weight, f_set(0));
+    Mask m = drawn & s.valid & useful & m_gt(weight, f_set(0));
     Shadows *q = &t->ws.shadows;
     int32_t at = t->shadow_count;
-    // The shadow ray starts off the surface and aims at the same point, or it would pass or meet the light itself.
-    Vec3 o = interaction_offset(si, s.d), to_light = v3_sub(v3_madd(si->p, s.distance, s.d), o);
-    Float length = f_sqrt(v3_dot(to_light, to_light));
-    Vec3 d = v3_scale(to_light, f_safe_rcp(length));
-    f_compress(q->ox + at, o.x, m);
-    f_compress(q->oy + at, o.y, m);
-    f_compress(q->oz + at, o.z, m);
-    f_compress(q->dx + at, d.x, m);
-    f_compress(q->dy + at, d.y, m);
-    f_compress(q->dz + at, d.z, m);
-    f_compress(q->tmax + at, length * (1.0f - 9e-4f), m);
+    Ray ray;
+    shadow_ray(si, s.d, s.distance, &ray);
+    f_compress(q->ox + at, ray.o.x, m);
+    f_compress(q->oy + at, ray.o.y, m);
+    f_compress(q->oz + at, ray.o.z, m);
+    f_compress(q->dx + at, ray.d.x, m);
+    f_compress(q->dy + at, ray.d.y, m);
+    f_compress(q->dz + at, ray.d.z, m);
+    f_compress(q->tmax + at, ray.tmax, m);
     spec_compress(q->radiance, at, l, m);
     i_compress(q->slot + at, v->slot, m);
     i_compress(q->record + at, i_iota() + record, m);
@@ -210,17 +251,35 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
 // Samples how the paths go on and appends the survivors to the next bounce's paths; returns their number.
 KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
                           const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
+    const SceneView *scene = t->scene;
     const Paths *p = &t->ws.paths[t->current];
     Paths *next = &t->ws.paths[1 - t->current];
+    SampleKey scatter_key = *key;
+    Split split;
+    if (scene->split) {
+        split = split_of(scene, key->sample);
+        scatter_key.sample = split.scatter_sample;
+        key = &scatter_key;
+    }
     BsdfSample s = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                                rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
     Float pdf;
     Spec f = bsdf_eval_pdf(call, wi, s.wo, s.lobe, &pdf);
     Float rcp = f_safe_rcp(pdf);
+    Mask drawn = v->m;
+    if (scene->split) {
+        rcp = rcp * split.scatter_weight;
+        drawn = drawn & split.scatter;
+    }
     Spec weight = spec_scale(f, rcp);
     Spec beta = spec_mul(v->beta, weight);
     Float eta2 = real_gather(p->eta2, v->at) * s.eta * s.eta;
-    Mask m = v->m & m_gt(pdf, f_set(0)) & m_finite(spec_sum(beta));
+    Mask m = drawn & m_gt(pdf, f_set(0)) & m_finite(spec_sum(beta));
+    Mask passed = m_set(scene->through) & mi_eq(s.lobe & 3, i_set(LOBE_NULL));
+    Int depth = v->depth + i_select(passed, i_set(0), i_set(1));
+    if (scene->through && scene->max_depth >= 0) {
+        m = m & mi_lt(depth, i_set(scene->max_depth));
+    }
     Float roulette = spec_max(beta);
     if (t->derivative) {
         // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
@@ -228,8 +287,11 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     } else {
         m = m & m_gt(roulette, f_set(0));
     }
-    if (bounce + 1 >= t->scene->rr_depth) {
+    if (bounce + 1 >= scene->rr_depth) {
         Float q = f_min(roulette * eta2, f_set(0.95f));
+        if (scene->through) {
+            q = f_select(mi_lt(i_set(scene->rr_depth), depth), q, f_set(1));
+        }
         m = m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
         Float survival = f_safe_rcp(q);
         beta = spec_scale(beta, survival);
@@ -244,14 +306,22 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     f_compress(next->dx + next_count, d.x, m);
     f_compress(next->dy + next_count, d.y, m);
     f_compress(next->dz + next_count, d.z, m);
-    f_compress(next->px + next_count, si->p.x, m);
-    f_compress(next->py + next_count, si->p.y, m);
-    f_compress(next->pz + next_count, si->p.z, m);
+    // Lights are weighed as seen from the last vertex that turned the path.
+    Vec3 origin = si->p;
+    Float density = f_select(mi_eq(s.lobe, i_set(LOBE_SMOOTH)), pdf, f_set(-1));
+    if (scene->through) {
+        origin = v3_select(passed, v->origin, si->p);
+        density = f_select(passed, v->pdf, density);
+        i_compress(next->depth + next_count, depth, m);
+    }
+    f_compress(next->px + next_count, origin.x, m);
+    f_compress(next->py + next_count, origin.y, m);
+    f_compress(next->pz + next_count, origin.z, m);
     f_compress(next->tmax + next_count, f_set(INFINITY), m);
     spec_compress(next->beta, next_count, beta, m);
     f_compress(next->eta2 + next_count, eta2, m);
     f_compress(next->roulette + next_count, roulette, m);
-    f_compress(next->pdf + next_count, f_select(mi_eq(s.lobe, i_set(LOBE_SMOOTH)), pdf, f_set(-1)), m);
+    f_compress(next->pdf + next_count, density, m);
     i_compress(next->slot + next_count, v->slot, m);
     i_compress(next->medium + next_count, i_gather(p->medium, v->at), m);
     if (record >= 0) {
@@ -282,7 +352,7 @@ static NOINLINE void find_surface(const SceneView *scene, const Group *group, co
 static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, const int32_t *order, int32_t count,
                              int32_t bounce, int32_t next_count) {
     const SceneView *scene = t->scene;
-    Vertex v = vertex_load(t, order, count);
+    Vertex v = vertex_load(t, order, count, bounce);
     Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &v.hit);
     Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
     Float mis = f_set(0);
@@ -304,7 +374,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         }
         record_vertex(t, record, &v, mis, emission);
     }
-    if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth) {
+    if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth && !scene->through) {
         return next_count;
     }
     SampleKey key = slot_key(t, v.slot);
@@ -349,7 +419,9 @@ static void shadow_stage(Tracer *t) {
         ray.o = v3(f_load(q->ox + k), f_load(q->oy + k), f_load(q->oz + k));
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
-        Spec transmittance = trace_transmittance(t->scene, &ray, m);
+        Mask blocked;
+        Spec transmittance = t->scene->through ? walk_transmittance(t, ray, m, &blocked, NULL)
+                                               : trace_transmittance(t->scene, &ray, m);
         Spec l = spec_mul(spec_load(q->radiance, k), transmittance);
         Mask open = m & m_gt(spec_max(transmittance), f_set(0));
         if (!t->derivative) {
@@ -359,9 +431,11 @@ static void shadow_stage(Tracer *t) {
         Int record = i_select(m, i_load(q->record + k), i_set(0));
         const Records *r = &t->ws.records;
         spec_scatter_add(r->local, record, l, open);
-        spec_scatter(r->light_weight, record, spec_mul(spec_gather(r->light_weight, record), transmittance), m);
+        // Where the transmittance may change, the sweep finds it again.
+        Spec kept = t->scene->through ? spec_set(f_zero_unless(~blocked, f_set(1))) : transmittance;
+        spec_scatter(r->light_weight, record, spec_mul(spec_gather(r->light_weight, record), kept), m);
     }
-    t->job->rays += t->shadow_count;
+    t->job->rays += t->scene->through ? 0 : t->shadow_count;
     t->job->trace_seconds += stage_seconds() - start;
 }
 
@@ -370,7 +444,7 @@ static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
     int32_t groups = (int32_t)scene->groups_count + 1;
     for (int32_t bounce = 0; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
-        if (scene->max_depth >= 0 && bounce >= scene->max_depth) {
+        if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
         trace_stage(t, bounce);

@@ -187,6 +187,62 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     }
 }
 
+// Accumulates the adjoint dt of a walk's transmittance, the product of what its surfaces let through.
+static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *sink) {
+    const SceneView *scene = t->scene;
+    Spec behind[MOST_SURFACES_IN_A_ROW], after = spec_set(f_set(1)), before = after;
+    for (int32_t i = walk->count - 1; i >= 0; i--) {
+        behind[i] = after;
+        after = spec_select(walk->m[i], spec_mul(after, walk->pass[i]), after);
+    }
+    for (int32_t i = 0; i < walk->count; i++) {
+        // T = before pass behind
+        Spec dpass = spec_zero_unless(walk->m[i], spec_mul(dt, spec_mul(before, behind[i])));
+        Int groups = SHAPE_FIELD(scene, i_max(walk->hit[i].shape, i_set(0)), group);
+        before = spec_select(walk->m[i], spec_mul(before, walk->pass[i]), before);
+        for (Mask left = walk->m[i]; m_any(left);) {
+            int32_t id = i_lane(groups, m_first(left));
+            Mask mine = left & mi_eq(groups, i_set(id));
+            const Group *group = scene->groups + id;
+            left = left & ~mine;
+            if (!(t->job->live[id] & LIVE_SCATTERING)) {
+                continue;
+            }
+            Hit hit = walk_hit(&walk->hit[i], mine);
+            Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &hit);
+            BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &hit), t->floor, NULL, NULL};
+            Vec3 wo = frame_to_local(&si.sh, walk->d), dwi = v3_zero(), dwo = v3_zero(), unused = v3_zero();
+            Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
+            bsdf_adj(&call, v3_neg(wo), wo, i_set(LOBE_NULL), spec_zero_unless(mine, dpass), sink, mine, &dwi, &dwo,
+                     NULL);
+            if (sink->any_normals && group->shape_kind == SHAPE_MESH) {
+                frame_to_local_adj(&si.sh, walk->d, v3_sub(dwo, dwi), &dframe, &unused);
+                mesh_interaction_adj(scene, group->shape_flags, &hit, &si, &dframe, sink, mine);
+            }
+        }
+    }
+}
+
+// Finds the transmittance of the batch's shadow rays again.
+static NOINLINE Spec walk_again(Tracer *t, const SurfaceSweep *s, Walk *walk) {
+    Ray ray;
+    Mask blocked;
+    shadow_ray(&s->si, s->light_d, s->light_distance, &ray);
+    walk->count = 0;
+    walk->d = ray.d;
+    return walk_transmittance(t, ray, s->connected, &blocked, walk);
+}
+
+// Whether shadow rays pass surfaces whose transmittance depends on the selection.
+KFN bool passing_is_live(const Tracer *t) {
+    for (int64_t g = 0; g < t->scene->groups_count && t->scene->through; g++) {
+        if ((t->job->live[g] & LIVE_SCATTERING) && t->scene->bsdfs[t->scene->groups[g].bsdf].transmits) {
+            return true;
+        }
+    }
+    return false;
+}
+
 // Sweeps the chunk's records from the last vertex to the first.
 static void path_backward(Tracer *t) {
     PathJob *job = t->job;
@@ -200,6 +256,8 @@ static void path_backward(Tracer *t) {
                  .any_normals = job->any_normals,
                  .any_attributes = job->any_attributes,
                  .derivative = f_set(0)};
+    bool live_passing = passing_is_live(t);
+    Walk walk;
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
         if (batch->tag == VERTEX_ESCAPED) {
@@ -214,7 +272,7 @@ static void path_backward(Tracer *t) {
         Mask finite = m & m_finite(spec_sum(l));
         spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
         int32_t live = job->live[batch->group];
-        if (!live && !job->live_lights) {
+        if (!live && !job->live_lights && !live_passing) {
             continue;
         }
         SurfaceSweep s = surface_load(t, batch, slot, suffix);
@@ -223,11 +281,21 @@ static void path_backward(Tracer *t) {
             find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
             s.call.surface = &s.surface;
         }
-        if (live & LIVE_SCATTERING) {
+        if ((live & LIVE_SCATTERING) || live_passing) {
             s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
         }
+        Spec unshadowed = s.light_weight;
+        if (t->scene->through) {
+            s.light_weight = spec_mul(unshadowed, walk_again(t, &s, &walk));
+        }
         for (int c = 0; c < drives(t); c++) {
-            surface_adj(t, &s, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), &sink);
+            Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
+            surface_adj(t, &s, live, delta, &sink);
+            if (live_passing) {
+                // L += f Le w_l T
+                Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
+                walk_adj(t, &walk, spec_zero_unless(s.connected, dt), &sink);
+            }
             forward_flush(t, &sink, slot, c, m);
         }
     }

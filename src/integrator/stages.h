@@ -87,6 +87,7 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         f_store(p->pdf + i, f_set(-1));
         i_store(p->slot + i, slot);
         i_store(p->medium + i, i_set(t->sensor->medium));
+        i_store(p->depth + i, i_set(0));
         spec_store(t->ws.radiance, i, spec_zero());
         spec_store(t->ws.suffix, i, spec_zero());
     }
@@ -142,8 +143,9 @@ static void trace_stage(Tracer *t, int32_t bounce) {
         Mask m = m_first_n(t->active - k);
         Ray ray = path_ray(p, k);
         Hit hit = trace_closest(t->scene, &ray, m, bounce == 0);
-        if (bounce == 0 && t->scene->hide_emitters) {
-            hit = trace_past_emitters(t, ray, m, hit);
+        if (t->scene->hide_emitters && (bounce == 0 || t->scene->through)) {
+            Mask seen = t->scene->through ? m & mi_eq(i_load(p->depth + k), i_set(0)) : m;
+            hit = trace_past_emitters(t, ray, seen, hit);
         }
         Mask found = mi_lt(i_set(-1), hit.shape);
         Int group = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), group);

@@ -12,11 +12,12 @@ enum {
     MAX_BOUNCES = 1 << 20
 };
 
-// A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot.
+// A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot, and depth
+// where that is not the bounce (scene->through).
 #define PATH_FLOATS(F)                                                                                                 \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz)
 #define PATH_SPECS(S) S(beta)
-#define PATH_INTS(I) I(slot) I(medium)
+#define PATH_INTS(I) I(slot) I(medium) I(depth)
 
 // A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom.
 #define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)

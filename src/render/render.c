@@ -91,6 +91,13 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
     const SensorRecord *sensor = scene->view.sensors + def->sensor;
     r->def = *def;
     r->def.spp = def->spp ? def->spp : sensor->spp;
+    if (scene->view.split) {
+        if ((int64_t)r->def.spp * scene->view.split > 1 << 24) {
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "%d samples per pixel of %d each, expected up to %d together",
+                            r->def.spp, scene->view.split, 1 << 24);
+        }
+        r->def.spp *= scene->view.split;
+    }
     r->backend = rey_backend_cpu(ctx->def.lanes);
     r->plan = rey_film_plan(sensor);
     r->tiles = r->plan.columns * r->plan.rows;
@@ -306,7 +313,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
 
 // Samples per pixel of one set; spp is rounded up to a multiple of the sets.
 static int32_t set_spp(const Render *r) {
-    return (r->def.spp + r->def.sets - 1) / r->def.sets;
+    int32_t split = r->scene->view.split ? r->scene->view.split : 1;
+    return (r->def.spp / split + r->def.sets - 1) / r->def.sets * split;
 }
 
 static uint32_t set_scramble(const Render *r, int set) {

@@ -28,7 +28,7 @@ typedef struct BsdfNode {
     int32_t config[MAX_CONFIG];  // uniform switches, in the order of the kind's configuration list
     int32_t child[MAX_CHILDREN]; // nested functions, -1 = none
     int32_t table;               // first derived value in `tables`, -1 = none
-    int32_t transmits;           // host only: lets light through, itself or in a child
+    int32_t transmits;           // lets light through, itself or in a child
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
 } BsdfNode;
 
@@ -103,6 +103,10 @@ typedef struct SceneView {
 #undef ARRAY
     int32_t environment;      // emitter index of the constant or envmap light, -1 = none
     int32_t max_depth, rr_depth, hide_emitters;
+    bool through;             // passing a surface undeviated counts in no depth, and shadow rays do it (volpath)
+    // direct: of `split` samples in a row, the first light_samples sample a light and the first scatter_samples the
+    // scattering function; 0 = every sample does both.
+    int32_t split, light_samples, scatter_samples;
     float bounds_centre[3], bounds_half[3], bounds_radius;
     void *embree;             // RTCScene
     int32_t collections;      // number of shapegroups

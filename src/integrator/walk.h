@@ -1,0 +1,83 @@
+// walk.h: shadow rays that surfaces may let through undeviated (holes, absent surfaces, thin glass): the transmittance
+// is the product of the pass-through lobes on the way, found surface by surface, and its adjoint.
+#pragma once
+
+#include "bsdf/bsdf.h"
+#include "integrator/stages.h"
+
+enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be blocked
+
+typedef struct Walk {
+    int32_t count;
+    Vec3 d;
+    Hit hit[MOST_SURFACES_IN_A_ROW];
+    Mask m[MOST_SURFACES_IN_A_ROW];    // lanes that met a surface that may let light through
+    Spec pass[MOST_SURFACES_IN_A_ROW]; // and the share that it lets through
+} Walk;
+
+// The hit, with a shape of this group also in the lanes that hit another one.
+KFN Hit walk_hit(const Hit *hit, Mask mine) {
+    int lane = m_first(mine);
+    Hit safe = *hit;
+    safe.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, lane)));
+    safe.prim = i_select(mine, hit->prim, i_set(i_lane(hit->prim, lane)));
+    safe.instance = i_select(mine, hit->instance, i_set(i_lane(hit->instance, lane)));
+    return safe;
+}
+
+// What the surfaces that the lanes of m hit do to light that passes along d, and where the ray goes on behind them.
+// `may` becomes the lanes whose surface could let light through.
+static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Mask *may) {
+    const SceneView *scene = t->scene;
+    Int groups = SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group);
+    Spec pass = spec_zero();
+    *may = m_set(false);
+    for (Mask left = m; m_any(left);) {
+        int32_t id = i_lane(groups, m_first(left));
+        Mask mine = left & mi_eq(groups, i_set(id));
+        const Group *group = scene->groups + id;
+        left = left & ~mine;
+        if (!scene->bsdfs[group->bsdf].transmits) {
+            continue;
+        }
+        Hit safe = walk_hit(hit, mine);
+        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
+        BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &safe), t->floor, NULL, NULL};
+        Vec3 wo = frame_to_local(&si.sh, d);
+        pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
+        *o = v3_select(mine, interaction_offset(&si, d), *o);
+        *may = *may | mine;
+    }
+    return pass;
+}
+
+// Transmittance of the rays of m. blocked becomes the lanes that no choice of parameters would open; walk may be null.
+static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Mask *blocked, Walk *walk) {
+    Spec transmittance = spec_set(f_zero_unless(m, f_set(1)));
+    Mask left = m;
+    *blocked = m_set(false);
+    for (int32_t i = 0; m_any(left); i++) {
+        Hit hit = trace_closest(t->scene, &ray, left, false);
+        t->job->rays += m_count(left);
+        Vec3 o = ray.o;
+        Mask found = left & mi_lt(i_set(-1), hit.shape), may;
+        if (!m_any(found)) {
+            break;
+        }
+        Spec pass = walk_pass(t, &hit, ray.d, found, &o, &may);
+        may = may & m_set(i < MOST_SURFACES_IN_A_ROW);
+        if (walk && i < MOST_SURFACES_IN_A_ROW) {
+            walk->hit[i] = hit;
+            walk->m[i] = may;
+            walk->pass[i] = pass;
+            walk->count = i + 1;
+        }
+        *blocked = *blocked | (found & ~may);
+        transmittance = spec_select(found, spec_zero_unless(may, spec_mul(transmittance, pass)), transmittance);
+        ray.tmax = ray.tmax - v3_dot(v3_sub(o, ray.o), ray.d);
+        ray.o = o;
+        // A derivative may be non-zero where the product is 0.
+        left = may & m_set(t->derivative) ? may : may & m_gt(spec_max(transmittance), f_set(0));
+    }
+    return transmittance;
+}
