@@ -76,6 +76,29 @@ static void test_samplers(void **state) {
     check_cases(true, cases, sizeof cases / sizeof *cases);
 }
 
+static void test_integrators(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<integrator type='volpath'><integer name='max_depth' value='8'/></integrator>", REY_OK, ""},
+        {"<integrator type='volpathmis'><boolean name='use_spectral_mis' value='false'/></integrator>", REY_OK, ""},
+        {"<integrator type='volpath'><boolean name='use_spectral_mis' value='false'/></integrator>", REY_ERROR_SCENE,
+         "use_spectral_mis"},
+        {"<integrator type='direct'><integer name='shading_samples' value='4'/></integrator>", REY_OK, ""},
+        {"<integrator type='direct'><integer name='shading_samples' value='4'/><integer name='bsdf_samples' value='4'/>"
+         "</integrator>",
+         REY_ERROR_SCENE, "either 'shading_samples' or"},
+        {"<integrator type='direct'><integer name='emitter_samples' value='0'/><integer name='bsdf_samples' value='0'/>"
+         "</integrator>",
+         REY_ERROR_SCENE, "both 0"},
+        {"<integrator type='direct'><integer name='shading_samples' value='0'/></integrator>", REY_ERROR_SCENE,
+         "shading_samples"},
+        {"<integrator type='direct'><integer name='max_depth' value='2'/></integrator>", REY_ERROR_SCENE, "max_depth"},
+        {"<integrator type='moment'/>", REY_ERROR_SCENE, "needs a nested integrator"},
+        {"<integrator type='volpaht'/>", REY_ERROR_SCENE, "did you mean 'volpath'?"},
+    };
+    check_cases(false, cases, sizeof cases / sizeof *cases);
+}
+
 // Far more threads than processors: as many run as make sense.
 static void test_threads(void **state) {
     (void)state;
@@ -95,6 +118,7 @@ static void test_threads(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_samplers), cmocka_unit_test(test_threads)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_samplers), cmocka_unit_test(test_integrators),
+                                       cmocka_unit_test(test_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

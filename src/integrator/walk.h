@@ -77,7 +77,7 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Mask *blocke
         ray.tmax = ray.tmax - v3_dot(v3_sub(o, ray.o), ray.d);
         ray.o = o;
         // A derivative may be non-zero where the product is 0.
-        left = may & m_set(t->derivative) ? may : may & m_gt(spec_max(transmittance), f_set(0));
+        left = t->derivative ? may : may & m_gt(spec_max(transmittance), f_set(0));
     }
     return transmittance;
 }
