@@ -6,7 +6,7 @@ JOBS ?= $(shell nproc)
 PACKAGES = gcc g++ make cmake pkg-config libembree-dev libexpat1-dev libopenexr-dev libpng-dev libjpeg62-turbo-dev \
            zlib1g-dev libyaml-dev libcmocka-dev python3
 
-.PHONY: all setup demo test conformance bench bench-peer check fuzz sanitize tsan install clean
+.PHONY: all setup demo test test-slow conformance bench bench-peer check fuzz sanitize tsan install clean
 
 all: $(BUILD)/CMakeCache.txt
 	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS)
@@ -22,7 +22,11 @@ demo: all
 	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
 test: all
-	@cd $(BUILD) && ctest --output-on-failure
+	@cd $(BUILD) && ctest --output-on-failure -LE slow
+
+# Half an hour and more: the demo's scene from ten seeds.
+test-slow: all
+	@cd $(BUILD) && ctest --verbose -L slow
 
 conformance: all
 	@$(BUILD)/bin/conformance $(CONFORMANCE)
@@ -47,7 +51,7 @@ fuzz:
 sanitize: setup
 	@cmake -S . -B build-asan -DREYNOLDS_SANITIZE=ON > /dev/null
 	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
-	@cd build-asan && ctest --output-on-failure -LE slow
+	@cd build-asan && ctest --output-on-failure -LE 'slow|heavy'
 
 tsan: setup
 	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON > /dev/null

@@ -52,6 +52,53 @@ static void likely_normal(Random *r, const double *alpha, double *m) {
     m[2] = n;
 }
 
+// The functions of numbers.
+static void random_number(int leaf, Random *r, double *x) {
+    switch (leaf) {
+    case LEAF_EXP: x[0] = between(r, -85, 85); break;
+    case LEAF_LOG: x[0] = log_between(r, 1e-37, 1e37); break;
+    case LEAF_SINCOS: x[0] = between(r, -1, 1) * log_between(r, 0.1, 8000); break;
+    case LEAF_ATAN2:
+        x[0] = between(r, -1, 1);
+        x[1] = between(r, -1, 1) * log_between(r, 1e-3, 1e3);
+        break;
+    case LEAF_ACOS: x[0] = between(r, -1, 1); break;
+    case LEAF_ERFINV: x[0] = uniform(r) < 0.5 ? between(r, -1, 1) : 1 - log_between(r, 1e-6, 1); break;
+    default: x[0] = between(r, -5, 5); break; // LEAF_ERF
+    }
+}
+
+// Microfacets: roughness, then directions or random numbers.
+static void random_microfacet(int leaf, Random *r, double *x, double *scale) {
+    x[0] = roughness(r);
+    x[1] = roughness(r);
+    switch (leaf) {
+    case LEAF_SAMPLE_ALL_GGX:
+    case LEAF_SAMPLE_ALL_BECKMANN:
+        x[2] = between(r, 0, 0.999);
+        x[3] = uniform(r);
+        break;
+    case LEAF_D_GGX:
+    case LEAF_D_BECKMANN:
+        scale[0] = x[0];
+        scale[1] = x[1];
+        likely_normal(r, x, x + 2);
+        scale[2] = x[0] * x[4];
+        scale[3] = x[1] * x[4];
+        scale[4] = x[4];
+        break;
+    default:
+        scale[0] = x[0];
+        scale[1] = x[1];
+        direction(r, leaf == LEAF_G1_GGX || leaf == LEAF_G1_BECKMANN ? -1 : 1, x + 2);
+        scale[4] = fabs(x[4]);
+        scale[2] = scale[3] = 0.1;
+        x[5] = between(r, 0.001, 0.999);
+        x[6] = between(r, 0.001, 0.999);
+        break;
+    }
+}
+
 // One random input of a leaf, and for each number the length over which the function varies.
 static void random_input(int leaf, Random *r, double *x, double *scale) {
     for (int j = 0; j < LEAF_MAX; j++) {
@@ -81,40 +128,17 @@ static void random_input(int leaf, Random *r, double *x, double *scale) {
         x[0] = between(r, -0.2, 1.2);
         scale[0] = fabs(1 - x[0]);
         break;
-    case LEAF_EXP: x[0] = between(r, -85, 85); break;
-    case LEAF_LOG: x[0] = log_between(r, 1e-37, 1e37); break;
-    case LEAF_SINCOS: x[0] = between(r, -1, 1) * log_between(r, 0.1, 8000); break;
+    case LEAF_EXP:
+    case LEAF_LOG:
+    case LEAF_SINCOS:
     case LEAF_ATAN2:
-        x[0] = between(r, -1, 1);
-        x[1] = between(r, -1, 1) * log_between(r, 1e-3, 1e3);
-        break;
-    case LEAF_ACOS: x[0] = between(r, -1, 1); break;
-    case LEAF_ERFINV: x[0] = uniform(r) < 0.5 ? between(r, -1, 1) : 1 - log_between(r, 1e-6, 1); break;
-    case LEAF_ERF: x[0] = between(r, -5, 5); break;
-    case LEAF_SAMPLE_ALL_GGX:
-    case LEAF_SAMPLE_ALL_BECKMANN:
-        x[0] = roughness(r);
-        x[1] = roughness(r);
-        x[2] = between(r, 0, 0.999);
-        x[3] = uniform(r);
-        break;
-    case LEAF_D_GGX:
-    case LEAF_D_BECKMANN:
-        scale[0] = x[0] = roughness(r);
-        scale[1] = x[1] = roughness(r);
-        likely_normal(r, x, x + 2);
-        scale[2] = x[0] * x[4];
-        scale[3] = x[1] * x[4];
-        scale[4] = x[4];
+    case LEAF_ACOS:
+    case LEAF_ERFINV:
+    case LEAF_ERF:
+        random_number(leaf, r, x);
         break;
     default:
-        scale[0] = x[0] = roughness(r);
-        scale[1] = x[1] = roughness(r);
-        direction(r, leaf == LEAF_G1_GGX || leaf == LEAF_G1_BECKMANN ? -1 : 1, x + 2);
-        scale[4] = fabs(x[4]);
-        scale[2] = scale[3] = 0.1;
-        x[5] = between(r, 0.001, 0.999);
-        x[6] = between(r, 0.001, 0.999);
+        random_microfacet(leaf, r, x, scale);
         break;
     }
     for (int j = 0; j < LEAF_MAX; j++) {

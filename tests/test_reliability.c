@@ -30,29 +30,41 @@ static const char scene_text[] =
 
 enum { PIXELS = 36, SPP = 2 };
 
-// An allocator that counts and, at one call, fails.
+// An allocator that counts and, at one call, fails. Each block begins with its size.
 typedef struct Meter {
     atomic_long calls, live, fail_at; // fail_at < 0: never
+    atomic_long bytes, most;          // held now, and at most
 } Meter;
+
+enum { BEFORE = 64 };
 
 static void *meter_alloc(void *user, size_t bytes, size_t alignment) {
     Meter *m = user;
     if (atomic_fetch_add(&m->calls, 1) == atomic_load(&m->fail_at)) {
         return NULL;
     }
-    void *memory = aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-    if (memory) {
-        atomic_fetch_add(&m->live, 1);
+    assert_true(alignment <= BEFORE);
+    char *memory = aligned_alloc(BEFORE, (bytes + 2 * BEFORE - 1) / BEFORE * BEFORE);
+    if (!memory) {
+        return NULL;
     }
-    return memory;
+    *(size_t *)(void *)memory = bytes;
+    atomic_fetch_add(&m->live, 1);
+    long held = atomic_fetch_add(&m->bytes, (long)bytes) + (long)bytes;
+    if (held > atomic_load(&m->most)) { // one thread
+        atomic_store(&m->most, held);
+    }
+    return memory + BEFORE;
 }
 
 static void meter_release(void *user, void *memory) {
     Meter *m = user;
     if (memory) {
+        char *block = (char *)memory - BEFORE;
         atomic_fetch_sub(&m->live, 1);
+        atomic_fetch_sub(&m->bytes, (long)*(size_t *)(void *)block);
+        free(block);
     }
-    free(memory);
 }
 
 static char scene_path[64];
@@ -84,8 +96,8 @@ static rey_context *context_with(Meter *m) {
     return ctx;
 }
 
-// Loads, sets a value, renders, and takes a gradient both ways.
-static rey_result whole_round(rey_context *ctx, rey_scene **scene) {
+// Loads, sets a value, renders, and takes a gradient both ways if wanted.
+static rey_result one_round(rey_context *ctx, rey_scene **scene, bool derivatives) {
     float image[PIXELS * 3], values[3] = {0.3f, 0.4f, 0.5f};
     double gradient[3];
     *scene = NULL;
@@ -105,18 +117,20 @@ static rey_result whole_round(rey_context *ctx, rey_scene **scene) {
     if (result == REY_OK) {
         result = rey_render(*scene, &def, image, NULL);
     }
-    if (result == REY_OK) {
+    if (result == REY_OK && derivatives) {
         result = rey_vjp(*scene, &def, selection, image, gradient, NULL, NULL);
     }
-    if (result == REY_OK) {
+    if (result == REY_OK && derivatives) {
         result = rey_jvp(*scene, &def, selection, values, image, NULL, NULL);
     }
     return result;
 }
 
+static rey_result whole_round(rey_context *ctx, rey_scene **scene) { return one_round(ctx, scene, true); }
+
 static void test_failing_allocations(void **state) {
     UNUSED(state);
-    Meter m = {0, 0, -1};
+    Meter m = {.fail_at = -1};
     rey_context *ctx = context_with(&m);
     long base = m.live, start = m.calls;
     rey_scene *scene;
@@ -145,21 +159,28 @@ static void test_failing_allocations(void **state) {
 
 static void test_many_rounds(void **state) {
     UNUSED(state);
-    Meter m = {0, 0, -1};
+    Meter m = {.fail_at = -1};
     rey_context *ctx = context_with(&m);
-    long base = m.live;
-    for (int i = 0; i < 200; i++) {
+    long base = m.live, bytes = m.bytes, most = 0;
+    for (int i = 0; i < 1000; i++) {
         rey_scene *scene;
-        assert_int_equal(whole_round(ctx, &scene), REY_OK);
+        m.most = 0;
+        assert_int_equal(one_round(ctx, &scene, i % 8 == 0), REY_OK);
         rey_scene_destroy(scene);
         assert_int_equal(m.live, base);
+        assert_int_equal(m.bytes, bytes);
+        most = i == 0 ? m.most : most;
+        assert_true(m.most <= most); // no round needs more than the first
     }
     rey_context_destroy(ctx);
+    print_message("1000 rounds, each holding at most %ld bytes\n", most);
+    assert_int_equal(m.live, 0);
+    assert_int_equal(m.bytes, 0);
 }
 
 static void test_absurd_values(void **state) {
     UNUSED(state);
-    Meter m = {0, 0, -1};
+    Meter m = {.fail_at = -1};
     rey_context *ctx = context_with(&m);
     rey_scene *scene;
     assert_int_equal(whole_round(ctx, &scene), REY_OK);
