@@ -49,6 +49,10 @@ static rey_result read_header(rey_context *ctx, const char *name, const unsigned
     *out = (rey_vol){.nx = (int32_t)n[0], .ny = (int32_t)n[1], .nz = (int32_t)n[2], .channels = (int32_t)n[3]};
     for (int k = 0; k < 6; k++) {
         out->box[k] = load_float(bytes + 24 + 4 * k);
+        if (!isfinite(out->box[k])) {
+            *out = (rey_vol){0};
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %d: a corner of the box is not finite", name, 24 + 4 * k);
+        }
     }
     return REY_OK;
 }
