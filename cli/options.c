@@ -196,11 +196,18 @@ static bool parse_set(Options *o, const char *value) {
     return true;
 }
 
+static bool parse_lanes(Options *o, const char *value) {
+    static const char *const widths[] = {"1", "8", "16", NULL};
+    static const int width_values[] = {1, 8, 16};
+    int choice = 0;
+    bool known = parse_choice(o, "--lanes", value, widths, &choice);
+    o->lanes = known ? width_values[choice] : o->lanes;
+    return known;
+}
+
 static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     static const char *const samplers[] = {"independent", "sobol", NULL};
     static const char *const modes[] = {"forward", "reverse", NULL};
-    static const char *const widths[] = {"1", "8", "16", NULL};
-    static const int width_values[] = {1, 8, 16};
     int choice = 0;
     switch (row->id) {
     case OPTION_OUTPUT:
@@ -217,11 +224,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_THREADS:
         return parse_count(o, "--threads", value, 1, 4096, &o->threads);
     case OPTION_LANES:
-        if (!parse_choice(o, "--lanes", value, widths, &choice)) {
-            return false;
-        }
-        o->lanes = width_values[choice];
-        return true;
+        return parse_lanes(o, value);
     case OPTION_SAMPLER:
         if (!parse_choice(o, "--sampler", value, samplers, &choice)) {
             return false;
