@@ -1,73 +1,60 @@
 // update.c: derived data of emitters.
 #include "emitter/update.h"
 
-#include "shape/update.h"
+#include "emitter/emitter.h"
+#include "emitter/table.h"
 
-static double texel_luminance(const float *texel) {
-    return fmax(0, 0.212671 * (double)texel[0] + 0.715160 * (double)texel[1] + 0.072169 * (double)texel[2]);
-}
-
-// Mass of the cell between texel columns x, x + 1 and rows y, y + 1: mean luminance times the sine of its latitude.
-static double cell_mass(const TextureNode *t, const float *texels, int64_t x, int64_t y) {
-    int64_t right = (x + 1) % t->width;
-    double sum = texel_luminance(texels + 3 * (y * t->width + x)) + texel_luminance(texels + 3 * (y * t->width + right)) +
-                 texel_luminance(texels + 3 * ((y + 1) * t->width + x)) +
-                 texel_luminance(texels + 3 * ((y + 1) * t->width + right));
-    return 0.25 * sum;
-}
-
-// The distribution: luminance times sine, with a share for every direction, because the derivative with respect to a
-// black texel is not 0.
-static void envmap_distribution(SceneView *view, const EmitterRecord *e) {
-    const double uniform_share = 0.02;
-    const TextureNode *t = view->textures + e->slot;
-    const float *texels = view->theta + t->theta;
-    int64_t width = t->width, rows = t->height - 1;
-    float *row_cdf = view->tables + e->table + 9, *cell_cdf = row_cdf + rows;
-    double total = 0, sines = 0;
-    for (int64_t y = 0; y < rows; y++) {
-        double sine = sin(3.14159265358979323846 * ((double)y + 0.5) / (double)rows);
-        sines += sine * (double)width;
-        for (int64_t x = 0; x < width; x++) {
-            total += sine * cell_mass(t, texels, x, y);
-        }
-    }
-    double floor = total > 0 ? uniform_share * total / sines : 1;
-    double row_sum = 0, all = total > 0 ? total * (1 + uniform_share) : sines;
-    for (int64_t y = 0; y < rows; y++) {
-        double sine = sin(3.14159265358979323846 * ((double)y + 0.5) / (double)rows);
-        double mass = 0, sum = 0;
-        for (int64_t x = 0; x < width; x++) {
-            mass += cell_mass(t, texels, x, y) + floor;
-        }
-        for (int64_t x = 0; x < width; x++) {
-            sum += cell_mass(t, texels, x, y) + floor;
-            cell_cdf[y * width + x] = x + 1 == width ? 1 : (float)(sum / mass);
-        }
-        row_sum += mass * sine;
-        row_cdf[y] = y + 1 == rows ? 1 : (float)(row_sum / all);
-    }
-}
+enum {
+    SORTS = 64,         // combinations of the flags of shapes
+    SMALLEST_FAMILY = 2 // lights from which on gathering pays
+};
 
 rey_result rey_emitter_update(rey_scene *scene, int32_t id) {
-    SceneView *view = &scene->view;
-    const EmitterRecord *e = view->emitters + id;
-    if (e->kind != EMITTER_ENVMAP) {
-        return REY_OK;
+    const EmitterRecord *e = scene->view.emitters + id;
+    const EmitterKind *kind = rey_emitter_kinds + e->kind;
+    return kind->follow(&scene->view, e)
+               ? REY_OK
+               : rey_fail(scene->ctx, REY_ERROR_SCENE, "to_world of a light of kind %s cannot be inverted", kind->name);
+}
+
+// Lights whose numbers can be gathered belong to one family when kernels treat them alike: the same kind, all textures
+// constant and, for surfaces, a mesh with the same flags. Returns the number of that sort, -1 for the others.
+static int32_t family_sort(const SceneView *view, const EmitterRecord *e) {
+    const EmitterKind *kind = rey_emitter_kinds + e->kind;
+    for (int i = 0; i < kind->param_count; i++) {
+        EmitterParamType type = kind->params[i].type;
+        bool colour = type == EMITTER_PARAM_EMISSION || type == EMITTER_PARAM_COLOUR;
+        const TextureNode *t = view->textures + e->slot[i];
+        if (colour && (t->kind != TEXTURE_CONSTANT || t->channels != 3)) {
+            return -1;
+        }
     }
-    double inverse[12];
-    if (!rey_affine_inverse(view->theta + e->to_world, inverse)) {
-        return rey_fail(scene->ctx, REY_ERROR_SCENE, "an envmap's to_world cannot be inverted");
+    if (kind->form == EMITTER_IS_DELTA) {
+        return e->kind * SORTS;
     }
-    for (int k = 0; k < 9; k++) {
-        view->tables[e->table + k] = (float)inverse[k / 3 * 4 + k % 3];
+    const ShapeRecord *shape = view->shapes + e->shape;
+    bool mesh = kind->form == EMITTER_IS_SURFACE && shape->kind == SHAPE_MESH;
+    return mesh ? e->kind * SORTS + (shape->flags & (SORTS - 1)) : -1;
+}
+
+// A family is named by its first member.
+static void find_families(SceneView *view) {
+    int32_t first[EMITTER_KIND_COUNT * SORTS], count[EMITTER_KIND_COUNT * SORTS] = {0};
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        int32_t sort = family_sort(view, view->emitters + i);
+        if (sort >= 0 && count[sort]++ == 0) {
+            first[sort] = (int32_t)i;
+        }
     }
-    envmap_distribution(view, e);
-    return REY_OK;
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        int32_t sort = family_sort(view, view->emitters + i);
+        view->emitters[i].family = sort >= 0 && count[sort] >= SMALLEST_FAMILY ? first[sort] : -1;
+    }
 }
 
 void rey_emitter_weights(rey_scene *scene) {
     SceneView *view = &scene->view;
+    find_families(view);
     double total = 0, sum = 0;
     view->uniform_emitters = true;
     for (int64_t i = 0; i < view->emitters_count; i++) {

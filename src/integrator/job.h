@@ -22,8 +22,8 @@ typedef struct PathJob {
     const float *adjoint;
     double *gradient;
     const float *tangent;
-    const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at;
-    bool any_normals, any_attributes;
+    const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at, *place_at;
+    bool any_normals, any_attributes, any_places;
     const int32_t *live;          // per group: LIVE_ mask
     bool live_lights;             // some emitter depends on the selection
     // Asked before each chunk of paths: false ends the job early. May be null.

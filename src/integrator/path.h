@@ -5,7 +5,7 @@
 #pragma once
 
 #include "bsdf/bsdf.h"
-#include "emitter/emitter.h"
+#include "emitter/choice.h"
 #include "integrator/split.h"
 #include "integrator/walk.h"
 
@@ -105,13 +105,8 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
     if (scene->through && scene->hide_emitters) {
         v.m = v.m & mi_lt(i_set(0), v.depth);
     }
-    Vec2 uv = {f_set(0), f_set(0)};
-    Float pdf = f_set(INV_FOUR_PI);
-    if (e->kind == EMITTER_ENVMAP) {
-        uv = envmap_uv(scene, e, v.d);
-        pdf = envmap_pdf(scene, e, uv);
-    }
-    Float mis = f_zero_unless(v.m, scattered_weight(t, &v, pdf * e->weight));
+    Vec2 uv = environment_uv(scene, e, v.d);
+    Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, uv) * e->weight));
     Spec l = spec_scale(emitter_eval(scene, e, texcoord(uv, NULL), f_set(1)), mis);
     if (!t->derivative) {
         slot_add(t, v.slot, spec_mul(v.beta, l), v.m);
@@ -125,49 +120,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
 
 // MIS weight of light that the ray met at an area light, against having sampled that light.
 KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex *v, const Interaction *si) {
-    return scattered_weight(t, v, area_pdf(t->scene, e, v->origin, v->d, si) * e->weight);
-}
-
-// Chooses an emitter per lane; returns its number and the probability of the choice.
-KFN Int emitter_choose(const SceneView *scene, Float u, Float *probability) {
-    int32_t n = (int32_t)scene->emitters_count;
-    if (scene->uniform_emitters) {
-        *probability = f_set(1.0f / (real)n);
-        return i_min(i_from_f(u * (real)n), i_set(n - 1));
-    }
-    Float fraction;
-    return cdf_search(scene, i_set(scene->emitter_cdf), n, u, &fraction, probability);
-}
-
-// Samples a light per lane: emitters are uniform in kernels, so each one present in the batch is sampled in turn.
-KFN LightSample light_sample(const SceneView *scene, Int light, Mask m, Vec3 ref, Vec2 u, Spec *radiance) {
-    LightSample s = {v3(f_set(0), f_set(0), f_set(1)), f_set(1), f_set(0), {f_set(0), f_set(0)}, i_set(0), m_set(false)};
-    *radiance = spec_zero();
-    for (Mask left = m; m_any(left);) {
-        int32_t id = i_lane(light, m_first(left));
-        Mask mine = left & mi_eq(light, i_set(id));
-        const EmitterRecord *e = scene->emitters + id;
-        LightSample one = emitter_sample(scene, e, ref, u);
-        Hit hit;
-        Spec l = emitter_eval(scene, e, emitter_texcoord(scene, e, one.uv, one.prim, &hit), one.distance);
-        s.d = v3_select(mine, one.d, s.d);
-        s.distance = f_select(mine, one.distance, s.distance);
-        s.pdf = f_select(mine, one.pdf, s.pdf);
-        s.uv.x = f_select(mine, one.uv.x, s.uv.x);
-        s.uv.y = f_select(mine, one.uv.y, s.uv.y);
-        s.prim = i_select(mine, one.prim, s.prim);
-        s.valid = s.valid | (mine & one.valid);
-        *radiance = spec_select(mine, l, *radiance);
-        left = left & ~mine;
-    }
-    return s;
-}
-
-// Delta lights cannot be met by scattering, so their samples count whole.
-KFN Mask light_is_delta(const SceneView *scene, Int light) {
-    Int kind = i_gather((const int32_t *)scene->emitters, light * (int32_t)(sizeof(EmitterRecord) / 4) +
-                                                              (int32_t)(offsetof(EmitterRecord, kind) / 4));
-    return mi_eq(kind, i_set(EMITTER_POINT));
+    return scattered_weight(t, v, surface_light_pdf(t->scene, e, v->origin, v->d, si) * e->weight);
 }
 
 // The ray to a light: it starts off the surface and aims at the same point, or it would pass or meet the light itself.
@@ -193,7 +146,7 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     }
     Int light = emitter_choose(scene, rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), &choice);
     Spec radiance;
-    LightSample s = light_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
+    LightSample s = lights_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
     Vec3 wo = frame_to_local(&si->sh, s.d);
     Int smooth = i_set(LOBE_SMOOTH);
     Float scatter_pdf;

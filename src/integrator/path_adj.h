@@ -40,15 +40,17 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
     Spec beta = spec_load(r->beta, at);
     Float mis = f_load(r->mis + at);
-    Vec2 uv = {f_set(0), f_set(0)};
-    if (e->kind == EMITTER_ENVMAP) {
-        uv = envmap_uv(t->scene, e, d);
-    }
+    Vec2 uv = environment_uv(t->scene, e, d);
     spec_scatter(t->ws.suffix, slot, spec_load(r->local, at), m);
     for (int c = 0; c < drives(t) && t->job->live_lights; c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
-        emitter_adj(t->scene, e, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl), sink, m);
+        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
+        emitter_adj(t->scene, t->scene->environment, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl),
+                    sink->any_places ? &move : NULL, sink, m);
+        if (sink->any_places) {
+            emitter_move_adj(t->scene, t->scene->environment, v3_zero(), d, f_set(1), &move, sink, m);
+        }
         forward_flush(t, sink, slot, c, m);
     }
 }
@@ -69,34 +71,6 @@ typedef struct SurfaceSweep {
     const EmitterRecord *emitter;
     const Group *group;
 } SurfaceSweep;
-
-// Radiance of each lane's light sample.
-KFN Spec lights_eval(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim, Float distance) {
-    Spec radiance = spec_zero();
-    for (Mask left = m; m_any(left);) {
-        int32_t id = i_lane(light, m_first(left));
-        Mask mine = left & mi_eq(light, i_set(id));
-        const EmitterRecord *e = scene->emitters + id;
-        Hit hit;
-        TexCoord at = emitter_texcoord(scene, e, uv, i_select(mine, prim, i_set(0)), &hit);
-        radiance = spec_select(mine, emitter_eval(scene, e, at, distance), radiance);
-        left = left & ~mine;
-    }
-    return radiance;
-}
-
-KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim, Float distance, Spec dl,
-                    Sink *sink) {
-    for (Mask left = m; m_any(left);) {
-        int32_t id = i_lane(light, m_first(left));
-        Mask mine = left & mi_eq(light, i_set(id));
-        const EmitterRecord *e = scene->emitters + id;
-        Hit hit;
-        TexCoord at = emitter_texcoord(scene, e, uv, i_select(mine, prim, i_set(0)), &hit);
-        emitter_adj(scene, e, at, distance, spec_zero_unless(mine, dl), sink, mine);
-        left = left & ~mine;
-    }
-}
 
 KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
     const Records *r = &t->ws.records;
@@ -151,21 +125,26 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     call.dsurface = call.surface && sink->any_normals ? &dsurface : NULL;
     if (live & LIVE_EMISSION) {
         // L += w_e Le
-        emitter_adj(t->scene, s->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
-                    spec_zero_unless(s->lit, spec_scale(weight, s->mis)), sink, s->lit);
+        emitter_adj(t->scene, s->group->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
+                    spec_zero_unless(s->lit, spec_scale(weight, s->mis)), NULL, sink, s->lit);
     }
     if (m_any(s->connected)) {
         // L += f Le (T w_l)
         Vec3 dwl = v3_zero();
         Spec both = spec_mul(weight, s->light_weight);
+        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
+        if (t->job->live_lights) {
+            lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
+                       spec_zero_unless(s->connected, spec_mul(both, s->f_light)), sink->any_places ? &move : NULL, sink);
+        }
         if (live & LIVE_SCATTERING) {
             Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
             bsdf_adj(&call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
-            frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &unused);
+            // wl = to_local(d)
+            frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &move.d);
         }
-        if (t->job->live_lights) {
-            lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                       spec_zero_unless(s->connected, spec_mul(both, s->f_light)), sink);
+        if (sink->any_places) {
+            lights_move_adj(t->scene, s->light, s->connected, s->si.p, s->light_d, s->light_distance, &move, sink);
         }
     }
     if ((live & LIVE_SCATTERING) && m_any(s->scattered)) {
@@ -253,8 +232,10 @@ static void path_backward(Tracer *t) {
                  .to_uv_at = job->to_uv_at,
                  .normals_at = job->normals_at,
                  .attribute_at = job->attribute_at,
+                 .place_at = job->place_at,
                  .any_normals = job->any_normals,
                  .any_attributes = job->any_attributes,
+                 .any_places = job->any_places,
                  .derivative = f_set(0)};
     bool live_passing = passing_is_live(t);
     Walk walk;

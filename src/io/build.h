@@ -96,6 +96,8 @@ rey_result build_number(Builder *b, float value, int32_t *out);
 // A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.
 rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param param, int32_t *out);
 
+// Horizontal field of view [degrees] of a camera of that aspect, from fov or focal_length.
+rey_result build_field_of_view(Builder *b, rey_xml_node *node, double aspect, double *out);
 rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);

@@ -58,9 +58,9 @@ static bool reads_attributes(const Builder *b, int32_t texture) {
 static void mark_emitters(Builder *b) {
     for (size_t i = 0; i < b->scene->build.emitters.count; i++) {
         EmitterRecord *e = &ARRAY_AT(b->scene->build.emitters, EmitterRecord, i);
-        if (e->kind == EMITTER_AREA) {
+        if (e->shape >= 0) {
             const ShapeRecord *shape = &ARRAY_AT(b->scene->build.shapes, ShapeRecord, e->shape);
-            e->attributes = shape->kind == SHAPE_MESH && reads_attributes(b, e->slot);
+            e->attributes = shape->kind == SHAPE_MESH && reads_attributes(b, e->slot[0]);
         }
     }
 }

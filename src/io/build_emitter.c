@@ -1,5 +1,5 @@
 // build_emitter.c: light sources.
-#include "emitter/update.h"
+#include "emitter/table.h"
 #include "io/build.h"
 #include "io/image.h"
 
@@ -8,48 +8,153 @@
 static const char *const pose_why = "moving a light moves its shadows and its outline";
 
 static const char *emitter_word(void *user, int i) {
-    static const char *const words[] = {"area", "point", "constant", "envmap"};
     UNUSED(user);
-    return i < COUNT_OF(words) ? words[i] : NULL;
+    return i < rey_emitter_kind_count ? rey_emitter_kinds[i].name : NULL;
 }
 
-static rey_result emission_slot(Builder *b, rey_xml_node *node, const char *name, const char *unit, const char *text,
-                                const char *path, int32_t *out) {
-    TextureUse use = {REY_COLOUR_EMISSION, false, 0, INFINITY, unit, text, 0, NULL};
-    char slot[MAX_PATH_NAME];
-    double one = 1;
-    build_join(slot, path, name);
-    return build_slot(b, node, name, use, &one, 1, slot, out);
+// ---- parameters --------------------------------------------------------------------------------------------------
+
+static rey_result colour_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, const char *path, int32_t *out) {
+    rey_colour_use colour = p->type == EMITTER_PARAM_EMISSION ? REY_COLOUR_EMISSION : REY_COLOUR_UNBOUNDED;
+    TextureUse use = {colour, false, p->low, p->high, p->unit, p->text, 0, NULL};
+    double value = (double)p->value;
+    return build_slot(b, node, p->name, use, &value, 1, path, out);
 }
 
-static rey_result build_point(Builder *b, rey_xml_node *node, const char *path, EmitterRecord *e) {
+static rey_result number_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, double value, const char *path,
+                              int32_t *out) {
+    TextureUse use = {REY_COLOUR_UNBOUNDED, true, p->low, p->high, p->unit, p->text, 0, NULL};
+    TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
+    const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+    if (t->kind != TEXTURE_CONSTANT || t->channels != 1) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' of a light must be a number", p->name);
+    }
+    return REY_OK;
+}
+
+static float constant_value(const Builder *b, int32_t texture) {
+    return ARRAY_AT(b->scene->build.theta, float, ARRAY_AT(b->scene->build.textures, TextureNode, texture).theta);
+}
+
+// A number whose default is a fraction of the one before. Where the two agree, what lies between them is a jump.
+static rey_result fraction_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, const char *path, int32_t whole,
+                                int32_t *out) {
+    TRY(number_slot(b, node, p, (double)(p->value * constant_value(b, whole)), path, out));
+    for (size_t i = 0; constant_value(b, *out) >= constant_value(b, whole) && i < b->scene->params.count; i++) {
+        Param *param = &ARRAY_AT(b->scene->params, Param, i);
+        if (param->texture == whole || param->texture == *out) {
+            param->terms |= REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+            param->why = "without a soft edge the border of the beam is a jump";
+        }
+    }
+    return REY_OK;
+}
+
+static rey_result position_slot(Builder *b, rey_xml_node *node, const EmitterParam *row, Param p, const char *path,
+                                int32_t *out) {
     double position[3] = {0, 0, 0}, matrix[16];
-    TRY(emission_slot(b, node, "intensity", "W/sr", "radiant intensity", path, &e->slot));
     if (rey_xml_has(node, "to_world")) {
-        if (rey_xml_has(node, "position")) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'position' or 'to_world' may be given");
+        if (rey_xml_has(node, row->name)) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either '%s' or 'to_world' may be given", row->name);
         }
         TRY(rey_xml_get_transform(b->ctx, node, "to_world", matrix));
         for (int k = 0; k < 3; k++) {
             position[k] = matrix[4 * k + 3];
         }
     }
-    TRY(rey_xml_get_vec3(b->ctx, node, "position", position, position));
-    e->position = rey_scene_append(b->scene, &b->scene->build.theta, sizeof(float), 3);
-    char name[MAX_PATH_NAME];
-    build_join(name, path, "position");
-    Param p = {PARAM_DEFAULTS, .theta = e->position, .count = 3, .dims = 1, .shape = {3}, .unit = "scene units",
-               .description = "position of the light", .terms = REY_TERM_INTERIOR | REY_TERM_INDIRECT, .why = pose_why};
-    if (e->position < 0 || rey_scene_add_param(b->scene, name, p) < 0) {
+    TRY(rey_xml_get_vec3(b->ctx, node, row->name, position, position));
+    *out = rey_scene_append(b->scene, &b->scene->build.theta, sizeof(float), 3);
+    p.theta = *out;
+    p.count = p.shape[0] = 3;
+    p.dims = 1;
+    p.unit = row->unit;
+    p.description = row->text;
+    if (*out < 0 || rey_scene_add_param(b->scene, path, p) < 0) {
         return REY_ERROR_MEMORY;
     }
     for (int k = 0; k < 3; k++) {
-        ARRAY_AT(b->scene->build.theta, float, e->position + k) = (float)position[k];
+        ARRAY_AT(b->scene->build.theta, float, *out + k) = (float)position[k];
     }
     return REY_OK;
 }
 
-// The environment image: RGB, at least 2 columns and 3 rows.
+// A rotation of +z into the direction.
+static rey_result direction_matrix(Builder *b, rey_xml_node *node, double matrix[16]) {
+    double d[3] = {0, 0, 1}, length, z[3], x[3];
+    if (rey_xml_has(node, "to_world")) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'direction' or 'to_world' may be given");
+    }
+    TRY(rey_xml_get_vec3(b->ctx, node, "direction", d, d));
+    length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    if (!(length > 0)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the direction of a light must not be 0");
+    }
+    for (int k = 0; k < 3; k++) {
+        z[k] = d[k] / length;
+    }
+    double sign = z[2] < 0 ? -1 : 1, a = -1 / (sign + z[2]); // [duff2017 listing 3]
+    x[0] = 1 + sign * z[0] * z[0] * a;
+    x[1] = sign * z[0] * z[1] * a;
+    x[2] = -sign * z[0];
+    for (int k = 0; k < 16; k++) {
+        matrix[k] = k == 15;
+    }
+    for (int k = 0; k < 3; k++) {
+        int next = (k + 1) % 3, last = (k + 2) % 3;
+        matrix[4 * k] = x[k];
+        matrix[4 * k + 1] = z[next] * x[last] - z[last] * x[next];
+        matrix[4 * k + 2] = z[k];
+    }
+    return REY_OK;
+}
+
+static rey_result pose_slot(Builder *b, rey_xml_node *node, const EmitterParam *row, Param p, const char *path,
+                            int32_t *out) {
+    double matrix[16];
+    if (row->type == EMITTER_PARAM_AXIS && rey_xml_has(node, "direction")) {
+        TRY(direction_matrix(b, node, matrix));
+    } else {
+        TRY(rey_xml_get_transform(b->ctx, node, "to_world", matrix));
+    }
+    if (row->type == EMITTER_PARAM_SKY) { // what lies beyond the scene casts no shadow of its own
+        p.terms = REY_TERM_INTERIOR;
+        p.why = NULL;
+    }
+    return build_pose(b, matrix, path, p, out);
+}
+
+static rey_result fov_slot(Builder *b, rey_xml_node *node, int32_t picture, int32_t *out) {
+    const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, picture);
+    double aspect = t->kind == TEXTURE_BITMAP ? (double)t->width / t->height : 1, fov;
+    TRY(build_field_of_view(b, node, aspect, &fov));
+    return build_number(b, (float)fov, out);
+}
+
+// ---- environment pictures ----------------------------------------------------------------------------------------
+
+// At least 2 columns and 3 rows: the last ones are repeated.
+static rey_result envmap_pad(Builder *b, rey_image *image) {
+    int width = image->width < 2 ? 2 : image->width, height = image->height < 3 ? 3 : image->height;
+    if (width == image->width && height == image->height) {
+        return REY_OK;
+    }
+    float *data = rey_alloc_array(b->ctx, (size_t)width * (size_t)height * 3, sizeof *data);
+    if (!data) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int64_t i = 0; i < (int64_t)width * height; i++) {
+        int64_t x = i % width < image->width ? i % width : image->width - 1;
+        int64_t y = i / width < image->height ? i / width : image->height - 1;
+        memcpy(data + 3 * i, image->data + 3 * (y * image->width + x), 3 * sizeof *data);
+    }
+    rey_free(b->ctx, image->data);
+    image->data = data;
+    image->width = width;
+    image->height = height;
+    return REY_OK;
+}
+
+// The environment image: RGB, finite, not negative.
 static rey_result envmap_load(Builder *b, rey_xml_node *node, rey_image *image) {
     char *file = NULL;
     TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
@@ -66,56 +171,74 @@ static rey_result envmap_load(Builder *b, rey_xml_node *node, rey_image *image) 
                                 "the environment image has a value that is negative or not finite");
         }
     }
-    if (image->width < 2 || image->height < 3) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED,
-                            "the environment image is %d x %d, at least 2 x 3 pixels are needed", image->width,
-                            image->height);
-    }
-    return REY_OK;
+    return envmap_pad(b, image);
 }
 
-static rey_result envmap_data(Builder *b, rey_xml_node *node, const rey_image *image, const char *path, EmitterRecord *e) {
+static rey_result image_slot(Builder *b, rey_xml_node *node, const EmitterParam *row, const char *path, int32_t *out) {
     rey_scene *scene = b->scene;
-    int64_t count = (int64_t)image->width * image->height * 3;
-    int32_t at = rey_scene_append(scene, &scene->build.theta, sizeof(float), count);
-    e->slot = rey_scene_append(scene, &scene->build.textures, sizeof(TextureNode), 1);
-    e->table = rey_scene_append(scene, &scene->build.tables, sizeof(float),
-                                rey_envmap_table_size(image->width, image->height));
-    char name[MAX_PATH_NAME];
-    build_join(name, path, "data");
-    Param p = {PARAM_DEFAULTS, .theta = at, .count = (int32_t)count, .dims = 3,
-               .shape = {image->height, image->width, 3}, .low = 0, .unit = "W/(m^2 sr)", .terms = REY_TERM_INTERIOR,
-               .description = "radiance by direction, rows from the +y pole", .texture = e->slot};
-    TextureSource *source = rey_array_push(b->ctx, &b->source->textures, sizeof *source, 1);
-    if (at < 0 || e->slot < 0 || e->table < 0 || !source || rey_scene_add_param(scene, name, p) < 0) {
-        return REY_ERROR_MEMORY;
-    }
-    *source = (TextureSource){node, NULL, e->slot};
-    memcpy(&ARRAY_AT(scene->build.theta, float, at), image->data, (size_t)count * sizeof(float));
-    ARRAY_AT(scene->build.textures, TextureNode, e->slot) =
-        (TextureNode){.kind = TEXTURE_BITMAP, .theta = at, .width = image->width, .height = image->height, .channels = 3,
-                      .filter = FILTER_BILINEAR, .to_uv = -1, .child = {-1, -1}};
-    return REY_OK;
-}
-
-static rey_result build_envmap(Builder *b, rey_xml_node *node, int32_t id, const char *path, EmitterRecord *e) {
     rey_image image = {0};
     rey_result result = envmap_load(b, node, &image);
+    int64_t count = (int64_t)image.width * image.height * 3;
+    if (result == REY_OK && count > INT32_MAX) {
+        result = rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "the environment image has more than 2^31 values");
+    }
+    int32_t at = result ? -1 : rey_scene_append(scene, &scene->build.theta, sizeof(float), count);
+    *out = result ? -1 : rey_scene_append(scene, &scene->build.textures, sizeof(TextureNode), 1);
+    TextureSource *source = result ? NULL : rey_array_push(b->ctx, &b->source->textures, sizeof *source, 1);
+    Param p = {PARAM_DEFAULTS, .theta = at, .count = (int32_t)count, .dims = 3, .shape = {image.height, image.width, 3},
+               .low = row->low, .unit = row->unit, .terms = REY_TERM_INTERIOR, .description = row->text,
+               .texture = *out};
+    if (result == REY_OK && (at < 0 || *out < 0 || !source || rey_scene_add_param(scene, path, p) < 0)) {
+        result = REY_ERROR_MEMORY;
+    }
     if (result == REY_OK) {
-        result = envmap_data(b, node, &image, path, e);
+        *source = (TextureSource){node, NULL, *out};
+        memcpy(&ARRAY_AT(scene->build.theta, float, at), image.data, (size_t)count * sizeof(float));
+        ARRAY_AT(scene->build.textures, TextureNode, *out) =
+            (TextureNode){.kind = TEXTURE_BITMAP, .theta = at, .width = image.width, .height = image.height,
+                          .channels = 3, .filter = FILTER_BILINEAR, .to_uv = -1, .child = {-1, -1}};
     }
     rey_image_free(b->ctx, &image);
-    TRY(result);
-    TextureUse use = {REY_COLOUR_UNBOUNDED, true, 0, INFINITY, "", "factor on the image", 0, NULL};
-    char name[MAX_PATH_NAME];
-    double one = 1, matrix[16];
-    bool mis_compensation;
-    build_join(name, path, "scale");
-    TRY(build_slot(b, node, "scale", use, &one, 1, name, &e->scale));
-    TRY(rey_xml_get_bool(b->ctx, node, "mis_compensation", false, &mis_compensation));
-    TRY(rey_xml_get_transform(b->ctx, node, "to_world", matrix));
-    Param pose = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_INDIRECT, .why = pose_why, .emitter = id};
-    return build_pose(b, matrix, path, pose, &e->to_world);
+    return result;
+}
+
+// ---- lights ------------------------------------------------------------------------------------------------------
+
+// Brings the rows of the kind's parameters into the record's slots.
+static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *kind, int32_t id, const char *path,
+                             EmitterRecord *e) {
+    for (int i = 0; i < kind->param_count; i++) {
+        const EmitterParam *row = kind->params + i;
+        char name[MAX_PATH_NAME];
+        build_join(name, path, row->name);
+        Param place = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_INDIRECT, .why = pose_why, .emitter = id,
+                       .place = i};
+        int32_t *slot = &e->slot[i];
+        switch (row->type) {
+        case EMITTER_PARAM_EMISSION:
+        case EMITTER_PARAM_COLOUR:
+            TRY(colour_slot(b, node, row, name, slot));
+            break;
+        case EMITTER_PARAM_REAL:
+            TRY(number_slot(b, node, row, (double)row->value, name, slot));
+            break;
+        case EMITTER_PARAM_FRACTION:
+            TRY(fraction_slot(b, node, row, name, e->slot[i - 1], slot));
+            break;
+        case EMITTER_PARAM_IMAGE:
+            TRY(image_slot(b, node, row, name, slot));
+            break;
+        case EMITTER_PARAM_FOV:
+            TRY(fov_slot(b, node, e->slot[0], slot));
+            break;
+        case EMITTER_PARAM_POSITION:
+            TRY(position_slot(b, node, row, place, name, slot));
+            break;
+        default:
+            TRY(pose_slot(b, node, row, place, path, slot));
+        }
+    }
+    return REY_OK;
 }
 
 static rey_result set_environment(Builder *b, rey_xml_node *node, int32_t id) {
@@ -126,18 +249,27 @@ static rey_result set_environment(Builder *b, rey_xml_node *node, int32_t id) {
     return REY_OK;
 }
 
-// Radiance and sampling weight of an area light. Several shapes may share one by reference: its values are read once.
-static rey_result build_area(Builder *b, rey_xml_node *node, const char *path, EmitterRecord *e) {
-    bool first;
+static rey_result get_weight(Builder *b, rey_xml_node *node, EmitterRecord *e) {
     double weight;
-    e->kind = EMITTER_AREA;
-    TRY(build_visit(b, node, path, &first));
-    if (first) {
-        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "emitted radiance", path, &node->built));
-    }
-    e->slot = node->built;
     TRY(rey_xml_get_float(b->ctx, node, "sampling_weight", 1, &weight));
     e->weight = (float)weight;
+    if (!(e->weight >= 0) || !isfinite(e->weight)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "sampling_weight is %g, expected a number >= 0", weight);
+    }
+    return REY_OK;
+}
+
+// A light that is a surface. Several shapes may share one by reference: its only parameter is read once.
+static rey_result build_surface(Builder *b, rey_xml_node *node, const EmitterKind *kind, const char *path,
+                                EmitterRecord *e) {
+    bool first;
+    TRY(build_visit(b, node, path, &first));
+    if (first) {
+        TRY(build_rows(b, node, kind, -1, path, e));
+        node->built = e->slot[0];
+    }
+    e->slot[0] = node->built;
+    TRY(get_weight(b, node, e));
     if (first) {
         TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
         TRY(build_finish(b, node, path));
@@ -146,53 +278,52 @@ static rey_result build_area(Builder *b, rey_xml_node *node, const char *path, E
 }
 
 // Lights that belong to no shape.
-static rey_result build_free_emitter(Builder *b, rey_xml_node *node, int32_t id, const char *path, EmitterRecord *e) {
-    bool first;
-    double weight;
+static rey_result build_free(Builder *b, rey_xml_node *node, const EmitterKind *kind, int32_t id, const char *path,
+                             EmitterRecord *e) {
+    bool first, compensation;
     TRY(build_visit(b, node, path, &first));
     if (!first) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "this emitter can stand in one place only");
     }
-    if (strcmp(node->type, "constant") == 0) {
-        e->kind = EMITTER_CONSTANT;
-        TRY(emission_slot(b, node, "radiance", "W/(m^2 sr)", "radiance from everywhere", path, &e->slot));
+    TRY(build_rows(b, node, kind, id, path, e));
+    if (kind->form == EMITTER_IS_ENVIRONMENT) {
+        TRY(rey_xml_get_bool(b->ctx, node, "mis_compensation", false, &compensation));
         TRY(set_environment(b, node, id));
-    } else if (strcmp(node->type, "point") == 0) {
-        e->kind = EMITTER_POINT;
-        TRY(build_point(b, node, path, e));
-    } else if (strcmp(node->type, "envmap") == 0) {
-        e->kind = EMITTER_ENVMAP;
-        TRY(build_envmap(b, node, id, path, e));
-        TRY(set_environment(b, node, id));
-    } else {
-        return build_unknown(b, node, emitter_word, NULL);
     }
-    TRY(rey_xml_get_float(b->ctx, node, "sampling_weight", 1, &weight));
-    e->weight = (float)weight;
+    int64_t size = kind->table_size(b->scene->build.textures.data, e);
+    if (size > 0) {
+        e->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), size);
+        TRY(e->table < 0 ? REY_ERROR_MEMORY : REY_OK);
+    }
+    TRY(get_weight(b, node, e));
     node->built = id;
     TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
     return build_finish(b, node, path);
 }
 
 rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out) {
-    EmitterRecord e = {.shape = shape, .slot = -1, .scale = -1, .position = -1, .to_world = -1, .table = -1};
-    bool area = strcmp(node->type, "area") == 0;
-    if (!area && shape >= 0) {
+    EmitterRecord e = {.shape = shape, .table = -1, .family = -1};
+    for (int i = 0; i < MAX_EMITTER_SLOTS; i++) {
+        e.slot[i] = -1;
+    }
+    e.kind = rey_emitter_kind_find(node->type);
+    if (e.kind < 0) {
+        return build_unknown(b, node, emitter_word, NULL);
+    }
+    const EmitterKind *kind = rey_emitter_kinds + e.kind;
+    bool surface = kind->form == EMITTER_IS_SURFACE;
+    if (!surface && shape >= 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape's emitter must be an 'area' light, not '%s'",
                             node->type);
     }
-    if (area && shape < 0) { // declared here, for shapes to refer to
-        return build_area(b, node, path, &e);
+    if (surface && shape < 0) { // declared here, for shapes to refer to
+        return build_surface(b, node, kind, path, &e);
     }
     int32_t id = rey_scene_append(b->scene, &b->scene->build.emitters, sizeof e, 1);
     if (id < 0) {
         return REY_ERROR_MEMORY;
     }
-    TRY(area ? build_area(b, node, path, &e) : build_free_emitter(b, node, id, path, &e));
-    if (!(e.weight >= 0) || !isfinite(e.weight)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "sampling_weight is %g, expected a number >= 0",
-                            (double)e.weight);
-    }
+    TRY(surface ? build_surface(b, node, kind, path, &e) : build_free(b, node, kind, id, path, &e));
     ARRAY_AT(b->scene->build.emitters, EmitterRecord, id) = e;
     *out = id;
     return REY_OK;

@@ -115,7 +115,7 @@ static rey_result build_film(Builder *b, rey_xml_node *node, SensorRecord *s) {
 }
 
 // Horizontal field of view [degrees] from fov and its axis, or from a focal length in 35 mm equivalents.
-static rey_result field_of_view(Builder *b, rey_xml_node *node, double aspect, double *out) {
+rey_result build_field_of_view(Builder *b, rey_xml_node *node, double aspect, double *out) {
     static const char *const axes[] = {"x", "y", "diagonal", "smaller", "larger"};
     double fov = 0;
     int axis;
@@ -153,7 +153,7 @@ static rey_result field_of_view(Builder *b, rey_xml_node *node, double aspect, d
 static rey_result camera_numbers(Builder *b, rey_xml_node *node, const char *path, SensorRecord *s) {
     double fov = 0, x, y, near_clip, far_clip, ignored, pose[16];
     const char *const why = "a camera that moves or zooms moves silhouettes across the film";
-    TRY(field_of_view(b, node, (double)s->width / s->height, &fov));
+    TRY(build_field_of_view(b, node, (double)s->width / s->height, &fov));
     TRY(rey_xml_get_float(b->ctx, node, "principal_point_offset_x", 0, &x));
     TRY(rey_xml_get_float(b->ctx, node, "principal_point_offset_y", 0, &y));
     TRY(rey_xml_get_float(b->ctx, node, "near_clip", 0.01, &near_clip));

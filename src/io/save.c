@@ -1,5 +1,6 @@
 // save.c: writes a scene back: the source document with the current values of all parameters. Pictures become EXR files
 // and meshes PLY files in a folder beside the XML, so that the result stands alone.
+#include "emitter/table.h"
 #include "io/build.h"
 #include "io/curve.h"
 #include "io/file.h"
@@ -113,7 +114,7 @@ static void write_constants(Writer *w, int depth, const rey_xml_node *node) {
 
 // Properties that constants, poses or data files stand for now.
 static bool is_replaced(const Writer *w, const rey_xml_node *node, const char *name) {
-    static const char *const anywhere[] = {"to_world", "material", "ext_ior", "filename", "raw", "to_uv", "position",
+    static const char *const anywhere[] = {"to_world", "material", "ext_ior", "filename", "raw", "to_uv", "position", "direction",
                                            "center", "radius", "p0", "p1", "shape_index", "flip_tex_coords", "face_normals", "fov", "fov_axis",
                                            "focal_length", "principal_point_offset_x", "principal_point_offset_y",
                                            "alpha", "alpha_u", "alpha_v"};
@@ -275,16 +276,25 @@ static void write_sensor_parts(Writer *w, int depth, const SensorRecord *s) {
 }
 
 static rey_result write_emitter_parts(Writer *w, int depth, const rey_xml_node *node) {
-    if (strcmp(node->type, "area") == 0) {
+    const EmitterKind *kind = rey_emitter_kinds + rey_emitter_kind_find(node->type);
+    if (kind->form == EMITTER_IS_SURFACE) {
         return REY_OK;
     }
     const EmitterRecord *e = w->scene->view.emitters + node->built;
-    if (e->kind == EMITTER_POINT) {
-        const float *p = theta(w, e->position);
-        line(w, depth, "<point name=\"position\" value=\"%.9g %.9g %.9g\"/>", (double)p[0], (double)p[1], (double)p[2]);
-    } else if (e->kind == EMITTER_ENVMAP) {
-        write_matrix(w, depth, "to_world", theta(w, e->to_world));
-        return write_picture(w, depth, e->slot, "environment");
+    for (int i = 0; i < kind->param_count; i++) {
+        const EmitterParam *row = kind->params + i;
+        const float *v = row->type >= EMITTER_PARAM_POSITION ? theta(w, e->slot[i]) : NULL;
+        if (row->type == EMITTER_PARAM_IMAGE) {
+            TRY(write_picture(w, depth, e->slot[i], "environment"));
+        } else if (row->type == EMITTER_PARAM_FOV) {
+            line(w, depth, "<float name=\"fov\" value=\"%.9g\"/>",
+                 (double)*theta(w, w->scene->view.textures[e->slot[i]].theta));
+        } else if (row->type == EMITTER_PARAM_POSITION) {
+            line(w, depth, "<point name=\"%s\" value=\"%.9g %.9g %.9g\"/>", row->name, (double)v[0], (double)v[1],
+                 (double)v[2]);
+        } else if (v) {
+            write_matrix(w, depth, "to_world", v);
+        }
     }
     return REY_OK;
 }

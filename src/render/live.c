@@ -1,6 +1,8 @@
 // live.c: follows textures and nested scattering functions to find what depends on a selection.
 #include "render/live.h"
 
+#include "emitter/table.h"
+
 static bool texture_live(const SceneView *view, const PathJob *job, int32_t id) {
     if (id < 0) {
         return false;
@@ -27,13 +29,19 @@ static bool bsdf_live(const SceneView *view, const PathJob *job, int32_t id) {
 }
 
 static bool emitter_live(const SceneView *view, const PathJob *job, int32_t id) {
-    return id >= 0 && (texture_live(view, job, view->emitters[id].slot) || texture_live(view, job, view->emitters[id].scale));
+    bool live = false;
+    for (int k = 0; id >= 0 && k < rey_emitter_kinds[view->emitters[id].kind].param_count; k++) {
+        bool place = rey_emitter_kinds[view->emitters[id].kind].params[k].type >= EMITTER_PARAM_POSITION;
+        live |= job->place_at[MAX_EMITTER_SLOTS * id + k] >= 0 || (!place && texture_live(view, job, view->emitters[id].slot[k]));
+    }
+    return live;
 }
 
 void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
     for (int64_t i = 0; i < view->groups_count; i++) {
         const Group *group = view->groups + i;
-        bool scattering = job->any_normals || bsdf_live(view, job, group->bsdf);
+        // A light that moves changes the directions from which every surface is lit.
+        bool scattering = job->any_normals || job->any_places || bsdf_live(view, job, group->bsdf);
         live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0);
     }
     job->live = live;

@@ -31,7 +31,7 @@ typedef struct Render {
     double *gradients;     // reverse: one per shard
     int64_t gradient_size;
     double *columns, *rows;
-    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, live
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, place_at, live
     float *adjoint;
     rey_stats stats;
     double done, total;    // progress
@@ -233,7 +233,7 @@ rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image,
 
 // Whether the kernels know the derivative of the path integrand with respect to a parameter.
 static bool has_interior(const Param *p) {
-    return p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0;
+    return p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0 || p->emitter >= 0;
 }
 
 // Refuses parameters whose derivative would lack a term.
@@ -268,19 +268,20 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
     return REY_OK;
 }
 
-// Where the values of each texture, to_uv, shape's normals and mesh attribute begin in the compact vectors of the selection.
+// Where the values of each texture, to_uv, shape's normals, mesh attribute and emitter's place begin in the compact vectors of the selection.
 static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
     int64_t textures = view->textures_count, shapes = view->shapes_count;
     enum { PAD = 16 };
-    int64_t n = 2 * textures + shapes + view->attributes_count + view->groups_count + PAD;
+    int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
+    int64_t n = 2 * textures + shapes + view->attributes_count + places + view->groups_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
     }
     memset(r->offsets, 0xff, (size_t)n * sizeof *r->offsets);
     int32_t *texture_at = r->offsets, *to_uv_at = r->offsets + textures, *normals_at = r->offsets + 2 * textures;
-    int32_t *attribute_at = normals_at + shapes;
+    int32_t *attribute_at = normals_at + shapes, *place_at = attribute_at + view->attributes_count;
     int64_t at = 0;
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
@@ -288,6 +289,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
                         : p->to_uv >= 0   ? &to_uv_at[p->to_uv]
                         : p->normals >= 0 ? &normals_at[p->normals]
                         : p->attribute >= 0 ? &attribute_at[p->attribute]
+                        : p->emitter >= 0 ? &place_at[MAX_EMITTER_SLOTS * p->emitter + p->place]
                                           : NULL;
         if (slot && *slot >= 0) {
             return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "%s is selected twice", p->name);
@@ -297,6 +299,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         }
         r->job.any_normals |= p->normals >= 0;
         r->job.any_attributes |= p->attribute >= 0;
+        r->job.any_places |= p->emitter >= 0;
         at += p->count;
         if (at > INT32_MAX / 2) {
             return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
@@ -307,7 +310,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.to_uv_at = to_uv_at;
     r->job.normals_at = normals_at;
     r->job.attribute_at = attribute_at;
-    rey_live_groups(view, &r->job, attribute_at + view->attributes_count);
+    r->job.place_at = place_at;
+    rey_live_groups(view, &r->job, place_at + places);
     return REY_OK;
 }
 

@@ -26,6 +26,15 @@ KFN TexCoord texcoord(Vec2 uv, const Hit *hit) { return (TexCoord){uv.x, uv.y, h
     i_gather((const int32_t *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                             \
                                                    (int32_t)(offsetof(ShapeRecord, field) / 4))
 
+// A float among the numbers of shapes (the tests compile these headers with wider ones).
+#ifdef REAL_DOUBLE
+#define SHAPE_FLOAT(scene, id, field) ((Float)(scene)->shapes[id].field)
+#else
+#define SHAPE_FLOAT(scene, id, field)                                                                                  \
+    f_gather((const float *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                               \
+                                                 (int32_t)(offsetof(ShapeRecord, field) / 4))
+#endif
+
 KFN Float theta_at(const SceneView *scene, Int index) {
 #ifdef REAL_DOUBLE
     return (Float)scene->theta[index];

@@ -88,7 +88,9 @@ const float *rey_param_values(const rey_scene *scene, int param) {
 static void texture_changed(rey_scene *scene, int32_t texture) {
     for (int64_t i = 0; i < scene->view.emitters_count; i++) {
         const EmitterRecord *e = scene->view.emitters + i;
-        scene->dirty_emitters[i] |= e->kind == EMITTER_ENVMAP && e->slot == texture;
+        for (int k = 0; k < MAX_EMITTER_SLOTS && e->table >= 0; k++) {
+            scene->dirty_emitters[i] |= e->slot[k] == texture;
+        }
     }
     for (int64_t i = 0; i < scene->view.bsdfs_count; i++) {
         const BsdfNode *b = scene->view.bsdfs + i;

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-enum { MAX_SLOTS = 16, MAX_CONFIG = 4, MAX_CHILDREN = 2 };
+enum { MAX_SLOTS = 16, MAX_CONFIG = 4, MAX_CHILDREN = 2, MAX_EMITTER_SLOTS = 5 };
 
 enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_ATTRIBUTE };
 enum { FILTER_NEAREST, FILTER_BILINEAR };
@@ -56,16 +56,12 @@ typedef struct InstanceRecord {
     int32_t table;    // rows of to_world (12), rows of its inverse (12)
 } InstanceRecord;
 
-enum { EMITTER_AREA, EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP };
-
 typedef struct EmitterRecord {
-    int32_t kind, shape;   // shape: of an area light, else -1
-    int32_t slot;          // radiance or intensity texture; envmap: the image
-    int32_t scale;         // envmap: constant texture, else -1
-    int32_t position;      // point: theta offset of 3 numbers
-    int32_t to_world;      // envmap: theta offset of 4 x 4
-    int32_t table;         // envmap: inverse rotation (9), then the distribution
-    int32_t attributes;    // area: 1 = its texture reads mesh attributes, so samples say where by barycentrics
+    int32_t kind, shape;   // kind: emitter/kinds.inl; shape: of lights that are one, else -1
+    int32_t slot[MAX_EMITTER_SLOTS]; // in the order of the kind's parameter list: textures, or theta offsets of places
+    int32_t table;         // what the kind derives from its parameters, -1 = nothing
+    int32_t attributes;    // its texture reads mesh attributes, so samples say where by barycentrics
+    int32_t family;        // lights of one family are handled in one call, with their numbers gathered; -1 = alone
     float weight;          // sampling weight, normalised: the probability of being chosen
 } EmitterRecord;
 
@@ -128,7 +124,8 @@ typedef struct Param {
     int32_t attribute;        // entry of `attributes` that these are the values of, -1 = none
     int32_t geometry;         // shape whose geometry follows, -1 = none
     int32_t instance;         // instance whose pose this is, -1 = none
-    int32_t emitter;          // emitter whose pose this is, -1 = none
+    int32_t emitter;          // emitter whose place this is, -1 = none
+    int32_t place;            // which of its slots that is
     uint32_t version;         // counts changes of the values
     uint32_t built;           // the version that derived data was built from
 } Param;

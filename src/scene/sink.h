@@ -13,7 +13,8 @@ typedef struct Sink {
     const int32_t *to_uv_at;   // per texture: its to_uv
     const int32_t *normals_at; // per shape: its vertex normals
     const int32_t *attribute_at; // like view.attributes: every second entry
-    bool any_normals, any_attributes;
+    const int32_t *place_at;   // per emitter and slot: position or pose
+    bool any_normals, any_attributes, any_places;
     Float derivative;          // forward: accumulates
 } Sink;
 

@@ -105,3 +105,16 @@ KFN Hit mesh_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
 KFN Float mesh_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
     return area_density(ref, d, si, f_set(scene->shapes[id].area));
 }
+
+// Of a mesh per lane.
+KFN Hit mesh_sample_many(const SceneView *scene, Int id, Vec2 u) {
+    Hit hit;
+    hit.shape = id;
+    hit.prim = cdf_search_many(scene, SHAPE_FIELD(scene, id, area_cdf), SHAPE_FIELD(scene, id, triangle_count), u.x, &u.x);
+    Float root = f_sqrt(1.0f - u.x);
+    hit.u = 1.0f - root;
+    hit.v = u.y * root;
+    hit.p = v3_zero();
+    hit.instance = i_set(0);
+    return hit;
+}

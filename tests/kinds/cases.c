@@ -1,6 +1,7 @@
 // cases.c: random scenes for the kind tests.
 #include "cases.h"
 
+#include "emitter/table.h"
 #include "emitter/update.h"
 #include "shape/update.h"
 #include "shape/shape.h"
@@ -188,7 +189,8 @@ void case_set(KindCase *c, const char *name, double value) {
 
 // ---- lights ------------------------------------------------------------------------------------------------------
 
-const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "cylinder", "point", "constant", "envmap"};
+const char *const light_names[LIGHT_COUNT] = {"rectangle", "sphere", "disk", "cylinder", "point",
+                                               "constant", "envmap", "spot", "projector", "directional"};
 
 static const ParamDesc radiance = {PARAM_SPEC, "radiance", 1, 0, INFINITY, "", ""};
 
@@ -263,16 +265,37 @@ static void make_cylinder(KindCase *c, const double rotation[9], const double sc
     }
 }
 
+// Rows of the inverse of a 4 x 4 pose, without a float's rounding.
+static void invert_pose(const double *m, double *inverse) {
+    double determinant = 0;
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        determinant += m[i] * (m[4 + j] * m[8 + k] - m[4 + k] * m[8 + j]);
+        for (int row = 0; row < 3; row++) {
+            int a = (row + 1) % 3, b = (row + 2) % 3;
+            inverse[4 * i + row] = m[4 * a + j] * m[4 * b + k] - m[4 * a + k] * m[4 * b + j];
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        inverse[4 * i + 3] = 0;
+        for (int row = 0; row < 3; row++) {
+            inverse[4 * i + row] /= determinant;
+            inverse[4 * i + 3] -= inverse[4 * i + row] * m[4 * row + 3];
+        }
+    }
+}
+
 void case_update_light(KindCase *c) {
-    if (c->emitter.kind != EMITTER_ENVMAP) {
+    const CaseEmitter *e = &c->emitter;
+    if (e->table < 0) {
         return;
     }
     float theta[CASE_THETA], tables[CASE_TABLES] = {0};
     for (int i = 0; i < c->theta_count; i++) {
         theta[i] = (float)c->theta[i];
     }
-    const CaseEmitter *e = &c->emitter;
-    EmitterRecord record = {.kind = e->kind, .slot = e->slot, .scale = e->scale, .to_world = e->to_world};
+    EmitterRecord record = {.kind = e->kind, .table = e->table};
+    memcpy(record.slot, e->slot, sizeof record.slot);
     rey_scene scene = {0};
     scene.view.theta = theta;
     scene.view.tables = tables;
@@ -282,55 +305,98 @@ void case_update_light(KindCase *c) {
     for (int i = 0; i < CASE_TABLES; i++) {
         c->tables[i] = (double)tables[i];
     }
-    for (int i = 0; i < 9; i++) { // the inverse rotation without its rounding
-        c->tables[i] = c->theta[e->to_world + i % 3 * 4 + i / 3];
+    for (int i = 0; i < MAX_EMITTER_SLOTS; i++) {
+        if (e->places >> i & 1) {
+            invert_pose(c->theta + e->slot[i], c->tables);
+        }
     }
 }
 
-static void make_envmap(KindCase *c, Random *r, const double rotation[9]) {
-    static const ParamDesc factor = {PARAM_REAL, "scale", 1, 0, INFINITY, "", ""};
-    int width = 3 + below(r, 6), height = 2 + below(r, 5);
-    c->emitter.slot = c->texture_count++;
-    c->textures[c->emitter.slot] = (TextureNode){.kind = TEXTURE_BITMAP, .width = width, .height = height,
-                                                 .channels = 3, .filter = FILTER_BILINEAR, .to_uv = -1};
-    c->textures[c->emitter.slot].theta = add_values(c, r, &radiance, 3 * width * height, 0);
-    c->emitter.scale = case_texture(c, r, &factor, 1, false);
-    c->emitter.to_world = c->theta_count;
-    for (int i = 0; i < 16; i++) {
-        double value = i % 5 == 0;
-        if (i / 4 < 3 && i % 4 < 3) {
-            value = rotation[i / 4 * 3 + i % 4];
+static int32_t add_pose(KindCase *c, const double rotation[9], const double position[3]) {
+    int32_t at = c->theta_count;
+    double m[16] = {[15] = 1};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            m[4 * i + j] = rotation[3 * i + j];
         }
-        add_fixed(c, &value, 1);
-        c->theta[c->theta_count - 1] = value;
+        m[4 * i + 3] = position[i];
     }
-    case_update_light(c);
+    add_fixed(c, m, 16);
+    memcpy(c->theta + at, m, sizeof m); // a float's rounding would move directions near an environment's poles
+    return at;
+}
+
+static int32_t add_image(KindCase *c, Random *r, int owner) {
+    int width = 3 + below(r, 6), height = 2 + below(r, 5), id = c->texture_count++;
+    c->textures[id] = (TextureNode){.kind = TEXTURE_BITMAP, .width = width, .height = height, .channels = 3,
+                                    .filter = FILTER_BILINEAR, .to_uv = -1};
+    c->textures[id].theta = add_values(c, r, &radiance, 3 * width * height, owner);
+    return id;
+}
+
+// A number of a light. Angles are kept inside their ranges, a beam within its cutoff.
+static int32_t add_number(KindCase *c, Random *r, const EmitterParam *row, int owner) {
+    static const ParamDesc number = {PARAM_REAL, "number", 1, 0, INFINITY, "", ""};
+    int id = case_texture(c, r, &number, owner, false), at = c->textures[id].theta;
+    if (row->type == EMITTER_PARAM_FRACTION) {
+        c->theta[at] = c->theta[at - 1] * between(r, 0.2, 0.9);
+    } else if (strcmp(row->unit, "degrees") == 0) {
+        c->theta[at] = between(r, 25, 60);
+    }
+    return id;
+}
+
+static void add_rows(KindCase *c, Random *r, bool textured, const double rotation[9]) {
+    const EmitterKind *kind = rey_emitter_kinds + c->emitter.kind;
+    const double zero[3] = {0}, position[3] = {0.3, -0.2, 0.5};
+    for (int i = 0; i < kind->param_count; i++) {
+        const EmitterParam *row = kind->params + i;
+        int32_t *slot = &c->emitter.slot[i];
+        switch (row->type) {
+        case EMITTER_PARAM_EMISSION:
+        case EMITTER_PARAM_COLOUR:
+            *slot = case_texture(c, r, &radiance, i, textured);
+            break;
+        case EMITTER_PARAM_IMAGE:
+            *slot = add_image(c, r, i);
+            break;
+        case EMITTER_PARAM_FOV:
+        case EMITTER_PARAM_REAL:
+        case EMITTER_PARAM_FRACTION:
+            *slot = add_number(c, r, row, row->type == EMITTER_PARAM_FOV ? -1 : i);
+            break;
+        case EMITTER_PARAM_POSITION:
+            *slot = c->theta_count;
+            add_fixed(c, position, 3);
+            break;
+        default:
+            *slot = add_pose(c, rotation, row->type == EMITTER_PARAM_POSE ? position : zero);
+        }
+        c->emitter.places |= (row->type >= EMITTER_PARAM_POSITION) << i;
+    }
 }
 
 void case_make_light(KindCase *c, Random *r, int light, bool textured) {
-    static const int kinds[LIGHT_COUNT] = {EMITTER_AREA,  EMITTER_AREA,     EMITTER_AREA, EMITTER_AREA,
-                                           EMITTER_POINT, EMITTER_CONSTANT, EMITTER_ENVMAP};
+    static const char *const kinds[LIGHT_COUNT] = {"area",     "area",   "area", "area",      "point",
+                                                   "constant", "envmap", "spot", "projector", "directional"};
+    bool surface = light <= LIGHT_CYLINDER;
     *c = (KindCase){.coat_eta = -1, .coat_alpha = -1, .emitter_count = 1, .shape_count = 1};
-    c->emitter = (CaseEmitter){.kind = kinds[light], .shape = light <= LIGHT_CYLINDER ? 0 : -1, .scale = -1};
+    c->emitter = (CaseEmitter){.kind = rey_emitter_kind_find(kinds[light]), .shape = surface ? 0 : -1, .table = -1};
     double rotation[9], scale[2] = {between(r, 0.3, 2), between(r, 0.3, 2)};
     random_rotation(r, rotation);
-    if (light == LIGHT_ENVMAP) {
-        make_envmap(c, r, rotation);
-        return;
-    }
-    c->emitter.slot = case_texture(c, r, &radiance, 0, textured && c->emitter.kind == EMITTER_AREA);
-    if (light == LIGHT_RECTANGLE) {
+    add_rows(c, r, textured && (surface || light == LIGHT_SPOT || light == LIGHT_PROJECTOR), rotation);
+    if (!surface) {
+        const EmitterRecord record = {.slot = {c->emitter.slot[0]}};
+        c->emitter.table = rey_emitter_kinds[c->emitter.kind].table_size(c->textures, &record) > 0 ? 0 : -1;
+        case_update_light(c);
+    } else if (light == LIGHT_RECTANGLE) {
         make_rectangle(c, rotation, scale);
     } else if (light == LIGHT_SPHERE) {
         make_sphere(c, rotation, scale[0]);
     } else if (light == LIGHT_DISK) {
         make_disk(c, rotation, scale[0]);
-    } else if (light == LIGHT_CYLINDER) {
-        make_cylinder(c, rotation, scale);
     } else {
-        const double position[3] = {0.3, -0.2, 0.5};
-        c->emitter.position = c->theta_count;
-        add_fixed(c, position, 3);
+        make_cylinder(c, rotation, scale);
     }
 }
 

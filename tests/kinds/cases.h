@@ -32,10 +32,22 @@ void case_make(KindCase *c, Random *r, int kind, int variant, bool textured);
 // Number of combinations of a kind's switches.
 int case_variants(int kind);
 // Scenes with one light: every kind of light, and of shape for area lights.
-enum { LIGHT_RECTANGLE, LIGHT_SPHERE, LIGHT_DISK, LIGHT_CYLINDER, LIGHT_POINT, LIGHT_CONSTANT, LIGHT_ENVMAP, LIGHT_COUNT };
+enum {
+    LIGHT_RECTANGLE,
+    LIGHT_SPHERE,
+    LIGHT_DISK,
+    LIGHT_CYLINDER,
+    LIGHT_POINT,
+    LIGHT_CONSTANT,
+    LIGHT_ENVMAP,
+    LIGHT_SPOT,
+    LIGHT_PROJECTOR,
+    LIGHT_DIRECTIONAL,
+    LIGHT_COUNT
+};
 extern const char *const light_names[LIGHT_COUNT];
 void case_make_light(KindCase *c, Random *r, int light, bool textured);
-// Brings derived tables up to date with theta (environment maps).
+// Brings derived tables up to date with theta (poses, environment maps).
 void case_update_light(KindCase *c);
 // Appends a texture with values in the range of a parameter row; returns its number.
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured);

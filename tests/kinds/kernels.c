@@ -24,7 +24,7 @@ typedef struct View {
     SceneView scene;
     ShapeRecord shapes[CASE_SHAPES];
     EmitterRecord emitter;
-    int32_t texture_at[CASE_TEXTURES], to_uv_at[CASE_TEXTURES];
+    int32_t texture_at[CASE_TEXTURES], to_uv_at[CASE_TEXTURES], place_at[MAX_EMITTER_SLOTS];
     float theta[CASE_THETA], tables[CASE_TABLES], tangent[CASE_THETA];
 } View;
 
@@ -61,8 +61,11 @@ static void view_make(const KindCase *c, View *v) {
                                      .table = s->table, .area_cdf = s->area_cdf, .area = (float)s->area};
     }
     const CaseEmitter *e = &c->emitter;
-    v->emitter = (EmitterRecord){.kind = e->kind, .shape = e->shape, .slot = e->slot, .scale = e->scale,
-                                 .position = e->position, .to_world = e->to_world, .table = e->table, .weight = 1};
+    v->emitter = (EmitterRecord){.kind = e->kind, .shape = e->shape, .table = e->table, .family = -1, .weight = 1};
+    for (int i = 0; i < MAX_EMITTER_SLOTS; i++) {
+        v->emitter.slot[i] = e->slot[i];
+        v->place_at[i] = e->places >> i & 1 ? e->slot[i] : -1;
+    }
     SceneView *s = &v->scene;
     s->theta = v->theta;
     s->tables = v->tables;
@@ -87,7 +90,7 @@ static Sink sink_make(View *v, const KindCase *c, double *gradient, const double
         v->tangent[i] = (float)tangent[i];
     }
     return (Sink){.gradient = gradient, .tangent = gradient ? NULL : v->tangent, .texture_at = v->texture_at,
-                  .to_uv_at = v->to_uv_at, .derivative = f_set(0)};
+                  .to_uv_at = v->to_uv_at, .place_at = v->place_at, .derivative = f_set(0)};
 }
 
 // Entry k of lane l is item (first + l), the last one repeated past the end.
@@ -333,16 +336,16 @@ static void run_light_pdf(const KindCase *c, int n, LightDraw *draws) {
         GATHER3(ref, draws[AT(lane)].ref);
         GATHER3(d, draws[AT(lane)].d);
         LightSample s = {d, f_set(1), f_set(INV_FOUR_PI), {f_set(0), f_set(0)}, i_set(0), m_set(true)};
-        if (e->kind == EMITTER_ENVMAP) {
-            s.uv = envmap_uv(&view.scene, e, d);
-            s.pdf = envmap_pdf(&view.scene, e, s.uv);
-        } else if (e->kind == EMITTER_AREA) {
+        if (e->shape < 0) {
+            s.uv = environment_uv(&view.scene, e, d);
+            s.pdf = environment_pdf(&view.scene, e, s.uv);
+        } else {
             const ShapeRecord *shape = view.shapes + e->shape;
             Hit hit;
             Mask met = meet_shape(&view.scene, e->shape, ref, d, &hit);
             Interaction si = shape_interaction(&view.scene, shape->kind, shape->flags, &hit);
             s.valid = met & m_lt(v3_dot(d, si.sh.n), f_set(0));
-            s.pdf = f_zero_unless(s.valid, area_pdf(&view.scene, e, ref, d, &si));
+            s.pdf = f_zero_unless(s.valid, surface_light_pdf(&view.scene, e, ref, d, &si));
             s.uv = si.uv;
             s.distance = v3_length(v3_sub(si.p, ref));
         }
@@ -368,8 +371,8 @@ static void run_light_eval(const KindCase *c, int n, LightDraw *d) {
     }
 }
 
-static void run_light_adj(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
-                          const double *tangent) {
+static void light_adjoint(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
+                          const double *tangent, bool moves) {
     View view;
     view_make(c, &view);
     Sink sink = sink_make(&view, c, gradient, tangent);
@@ -381,13 +384,31 @@ static void run_light_adj(const KindCase *c, int n, const LightDraw *d, Adjoint 
         GATHER(distance, d[AT(lane)].distance);
         Mask m = m_first_n(n - first);
         sink.derivative = f_set(0);
-        emitter_adj(&view.scene, &view.emitter, texcoord(uv, NULL), distance,
-                    spec_zero_unless(m, gather_df(a, first, n)), &sink, m);
+        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
+        GATHER3(move.d, a[AT(lane)].dwo);
+        emitter_adj(&view.scene, 0, texcoord(uv, NULL), distance, spec_zero_unless(m, gather_df(a, first, n)),
+                    moves ? &move : NULL, &sink, m);
+        if (moves) {
+            Vec3 ref, direction;
+            GATHER3(ref, d[AT(lane)].ref);
+            GATHER3(direction, d[AT(lane)].d);
+            emitter_move_adj(&view.scene, 0, ref, direction, distance, &move, &sink, m);
+        }
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             a[first + lane].forward = (double)f_lane(sink.derivative, lane);
         }
     }
 }
 
+static void run_light_adj(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
+                          const double *tangent) {
+    light_adjoint(c, n, d, a, gradient, tangent, false);
+}
+
+static void run_light_move_adj(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
+                               const double *tangent) {
+    light_adjoint(c, n, d, a, gradient, tangent, true);
+}
+
 const KindKernels KERNELS = {KERNELS_NAME, LANES, run_eval, run_sample, run_adj, run_texture, run_light_sample,
-                             run_light_pdf, run_light_eval, run_light_adj};
+                             run_light_pdf, run_light_eval, run_light_adj, run_light_move_adj};

@@ -8,7 +8,8 @@ enum { CASE_THETA = 768, CASE_TEXTURES = 48, CASE_BSDFS = 4, CASE_SHAPES = 2, CA
 
 // No float in here: the double build reads the same bytes.
 typedef struct CaseEmitter {
-    int32_t kind, shape, slot, scale, position, to_world, table;
+    int32_t kind, shape, slot[MAX_EMITTER_SLOTS], table;
+    int32_t places; // bits: slots that are positions or poses
 } CaseEmitter;
 typedef struct CaseShape {
     int32_t kind, flags, triangle_count, positions, uvs, table, area_cdf;
@@ -71,6 +72,9 @@ typedef struct KindKernels {
     void (*light_eval)(const KindCase *c, int n, LightDraw *d);
     void (*light_adj)(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
                       const double *tangent);
+    // The same, and of where the light lies: dwo of a is the adjoint of the sample's direction, in.
+    void (*light_move_adj)(const KindCase *c, int n, const LightDraw *d, Adjoint *a, double *gradient,
+                           const double *tangent);
 } KindKernels;
 
 extern const KindKernels kind_kernels_double, kind_kernels_w1, kind_kernels_w8, kind_kernels_w16;

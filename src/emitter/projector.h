@@ -1,0 +1,89 @@
+// projector.h: a camera that emits its picture: pi scale T(u, v) / (z^2 cos a), where z is the depth below the lens and a
+// the angle from the axis, so that a white diffuse plane at depth 1 that faces it shows scale T. The uv of samples are
+// the slopes x/z and y/z of the local direction. NOT differentiated: the jump at the frustum's border.
+#pragma once
+
+#include "emitter/spot.h"
+
+#define PROJECTOR_PARAMS(P)                                                                                            \
+    P(EMISSION, irradiance, 1, 0, INFINITY, "radiance of a white plane at depth 1", "W/(m^2 sr)")                      \
+    P(REAL, scale, 1, -INFINITY, INFINITY, "factor on the picture", "")                                                \
+    P(FOV, fov, 0, 0, 180, "horizontal field of view", "degrees")                                                      \
+    P(POSE, to_world, 0, -INFINITY, INFINITY, "from the projector's space, which is a camera's", "")
+EMITTER_SLOTS(Projector, PROJECTOR_PARAMS)
+
+// Behind the inverse pose: half the extent of the picture at depth 1, along x and y.
+enum { PROJECTOR_EXTENT = 12, PROJECTOR_TABLE = 14 };
+
+static inline int64_t projector_size(const TextureNode *textures, const EmitterRecord *e) {
+    UNUSED(textures), UNUSED(e);
+    return PROJECTOR_TABLE;
+}
+static inline bool projector_follow(const SceneView *view, const EmitterRecord *e) {
+    const TextureNode *t = view->textures + e->slot[SLOT(Projector, irradiance)];
+    double half = 0.5 * 3.14159265358979323846 / 180 *
+                  (double)view->theta[view->textures[e->slot[SLOT(Projector, fov)]].theta];
+    double aspect = t->kind == TEXTURE_BITMAP ? (double)t->width / t->height : 1;
+    view->tables[e->table + PROJECTOR_EXTENT] = (float)tan(half);
+    view->tables[e->table + PROJECTOR_EXTENT + 1] = (float)(tan(half) / aspect);
+    return light_pose_follow(view, e, SLOT(Projector, to_world));
+}
+
+typedef struct ProjectorBeam {
+    Float weight, secant2, x, y; // weight: pi / (distance^2 cos^3)
+    Mask inside;
+    TexCoord uv;
+} ProjectorBeam;
+
+KFN ProjectorBeam projector_beam(const SceneView *scene, const Light *l, TexCoord slope, Float distance) {
+    ProjectorBeam b;
+    b.x = light_table(scene, l, PROJECTOR_EXTENT);
+    b.y = light_table(scene, l, PROJECTOR_EXTENT + 1);
+    b.inside = m_lt(f_abs(slope.x), b.x) & m_lt(f_abs(slope.y), b.y);
+    b.uv = texcoord((Vec2){0.5f - 0.5f * slope.x / b.x, 0.5f - 0.5f * slope.y / b.y}, NULL);
+    b.secant2 = 1.0f + slope.x * slope.x + slope.y * slope.y;
+    b.weight = f_zero_unless(b.inside, PI * b.secant2 * f_sqrt(b.secant2) * f_safe_rcp(distance * distance));
+    return b;
+}
+
+KFN LightSample projector_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
+    UNUSED(u);
+    const int slot = SLOT(Projector, to_world);
+    LightSample s = light_at_point(ref, v3(light_place(scene, l, slot, 3), light_place(scene, l, slot, 7),
+                                           light_place(scene, l, slot, 11)));
+    Vec3 local = light_to_local(scene, l, ref);
+    Mask front = m_gt(local.z, f_set(0));
+    Float rcp = f_safe_rcp(local.z);
+    s.uv = (Vec2){f_zero_unless(front, local.x * rcp), f_zero_unless(front, local.y * rcp)};
+    s.valid = s.valid & front;
+    return s;
+}
+
+KFN Spec projector_eval(const SceneView *scene, const Light *l, TexCoord slope, Float distance) {
+    ProjectorBeam b = projector_beam(scene, l, slope, distance);
+    return spec_scale(light_colour(scene, l, SLOT(Projector, irradiance), b.uv),
+                      b.weight * light_real(scene, l, SLOT(Projector, scale)));
+}
+
+KFN void projector_adj(const SceneView *scene, const Light *l, TexCoord slope, Float distance, Spec dl, LightMove *move,
+                       Sink *sink, Mask m) {
+    ProjectorBeam b = projector_beam(scene, l, slope, distance);
+    Float scale = light_real(scene, l, SLOT(Projector, scale));
+    Vec2 duv = {f_set(0), f_set(0)};
+    // L = w scale T(uv)
+    light_colour_adj(scene, l, SLOT(Projector, irradiance), b.uv, spec_scale(dl, b.weight * scale), &duv, sink, m);
+    Float along = spec_dot(dl, light_colour(scene, l, SLOT(Projector, irradiance), b.uv)) * b.weight;
+    light_real_adj(scene, l, SLOT(Projector, scale), along, sink, m);
+    if (move) {
+        // w = pi (1 + |slope|^2)^(3/2) / distance^2, uv = 1/2 - slope / (2 extent)
+        Float by_slope = 3.0f * along * scale / b.secant2;
+        move->uv.x = move->uv.x + by_slope * slope.x - 0.5f * duv.x / b.x;
+        move->uv.y = move->uv.y + by_slope * slope.y - 0.5f * duv.y / b.y;
+        move->distance = move->distance - 2.0f * along * scale * f_safe_rcp(distance);
+    }
+}
+
+KFN void projector_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance,
+                            const LightMove *move, Sink *sink, Mask m) {
+    slope_move_adj(scene, l, SLOT(Projector, to_world), ref, d, distance, move, sink, m);
+}
