@@ -8,7 +8,7 @@ KINDS = {"shape", "bsdf", "emitter", "medium", "sensor"}
 LEFT = {"base": set(), "math": {"base"}, "scene": {"base", "math"}}
 for kind in KINDS:
     # The emitters of shapes are sampled through them; kinds otherwise know nothing of each other.
-    LEFT[kind] = {"base", "math", "scene"} | ({"shape"} if kind == "emitter" else set())
+    LEFT[kind] = {"base", "math", "scene"} | ({"shape"} if kind in ("emitter", "sensor") else set())
 LEFT["accel"] = {"base", "math", "scene"} | KINDS
 LEFT["integrator"] = LEFT["accel"] | {"accel"}
 LEFT["backend"] = LEFT["integrator"] | {"integrator"}

@@ -179,6 +179,11 @@ typedef struct rey_stats {
 /* Renders. image: height x width x 3 floats owned by the caller. stats may be null. */
 REY_API rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats);
 
+/* Renders several sensors of a scene: images[i] is the picture of sensors[i] (as of rey_render), and def->sensor does not
+ * matter. Each picture has the bits that rey_render gives it. stats: the sum over all; may be null. */
+REY_API rey_result rey_render_sensors(rey_scene *scene, const rey_render_def *def, const int *sensors, int count,
+                                      float *const *images, rey_stats *stats);
+
 /* A selection of parameters: vectors over it are the parameters' values one after the other. */
 typedef struct rey_selection {
     const int *params; /* parameter indices, none twice */

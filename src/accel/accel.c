@@ -226,6 +226,8 @@ static rey_result set_surface(rey_scene *scene, int32_t id, RTCGeometry geometry
     return result;
 }
 
+static bool is_seen(const ShapeRecord *shape) { return !(shape->flags & SHAPE_UNSEEN); }
+
 static rey_result add_shape(rey_scene *scene, int32_t id) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
@@ -317,6 +319,9 @@ static rey_result update_shapes(rey_scene *scene, bool fresh, bool *groups_chang
     rey_result result = REY_OK;
     for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
         const ShapeRecord *shape = scene->view.shapes + i;
+        if (!is_seen(shape)) {
+            continue;
+        }
         if (fresh) {
             result = add_shape(scene, i);
         } else if (scene->dirty_shapes[i]) {

@@ -2,7 +2,7 @@
 // asserts on non-finite input, and non-finite rays are dropped before they get there.
 #pragma once
 
-#include "sensor/perspective.h"
+#include "scene/ray.h"
 #include "shape/shape.h"
 
 #include <embree3/rtcore.h>

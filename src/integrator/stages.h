@@ -4,6 +4,7 @@
 #include "accel/trace.h"
 #include "integrator/state.h"
 #include "math/rng.h"
+#include "sensor/sensor.h"
 
 #include <time.h>
 
@@ -11,6 +12,9 @@
 enum { PURPOSE_FILM, PURPOSE_LIGHT_CHOICE, PURPOSE_LIGHT, PURPOSE_LOBE, PURPOSE_DIRECTION, PURPOSE_ROULETTE, PURPOSES };
 
 KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)bounce * PURPOSES + purpose; }
+
+// Beyond the dimensions of bounces, so that a lens changes no other random number.
+#define DIMENSION_LENS 0x80000000u
 
 // Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
 #define DERIVATIVE_FLOOR 0.05f
@@ -70,7 +74,12 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         Float film_x = f_from_i(x - 64) + jitter.x, film_y = f_from_i(y - 64) + jitter.y;
         f_store(t->ws.film_x + i, film_x);
         f_store(t->ws.film_y + i, film_y);
-        Ray ray = perspective_ray(t->scene, t->sensor, film_x, film_y);
+        Vec2 lens = {f_set(0), f_set(0)};
+        if (sensor_has_lens(t->sensor)) {
+            lens = rng_2d(&key, DIMENSION_LENS);
+        }
+        SensorRay sample = sensor_ray(t->scene, t->sensor, film_x, film_y, lens);
+        Ray ray = sample.ray;
         f_store(p->ox + i, ray.o.x);
         f_store(p->oy + i, ray.o.y);
         f_store(p->oz + i, ray.o.z);
@@ -81,7 +90,7 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         f_store(p->py + i, ray.o.y);
         f_store(p->pz + i, ray.o.z);
         f_store(p->tmax + i, ray.tmax);
-        spec_store(p->beta, i, spec_set(f_set(1)));
+        spec_store(p->beta, i, spec_set(sample.weight));
         f_store(p->eta2 + i, f_set(1));
         f_store(p->roulette + i, f_set(1));
         f_store(p->pdf + i, f_set(-1));

@@ -47,6 +47,7 @@ typedef struct Builder {
     Array prefixes; // of Prefix: the first parameter path of each object
     Array attribute_uses; // of AttributeUse
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
+    int32_t shape_flags;  // of all shapes that are built now
 } Builder;
 
 #define TRY(expression)                                                                                                \
@@ -110,6 +111,13 @@ rey_result build_merge(Builder *b, rey_xml_node *node, const char *path);
 rey_result build_instance(Builder *b, rey_xml_node *node, const char *path);
 // shape: of an area light, else -1.
 rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const char *path, int32_t *out);
-rey_result build_sensor(Builder *b, rey_xml_node *node, const char *path);
+// shape: that the sensor belongs to, else -1.
+rey_result build_sensor(Builder *b, rey_xml_node *node, int32_t shape, const char *path);
+// node->built of a sensor that is part of a batch: this less its number in `batch_sensors`.
+enum { SENSOR_OF_BATCH = -2 };
+// A shape that no ray meets, for a sensor to look at.
+rey_result build_target_shape(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
+// A pose that turns +z into the property `direction`.
+rey_result build_direction(Builder *b, rey_xml_node *node, double matrix[16]);
 rey_result build_sampler(Builder *b, rey_xml_node *node, SensorRecord *s);
 rey_result build_integrator(Builder *b, rey_xml_node *node);

@@ -78,8 +78,7 @@ static rey_result position_slot(Builder *b, rey_xml_node *node, const EmitterPar
     return REY_OK;
 }
 
-// A rotation of +z into the direction.
-static rey_result direction_matrix(Builder *b, rey_xml_node *node, double matrix[16]) {
+rey_result build_direction(Builder *b, rey_xml_node *node, double matrix[16]) {
     double d[3] = {0, 0, 1}, length, z[3], x[3];
     if (rey_xml_has(node, "to_world")) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'direction' or 'to_world' may be given");
@@ -87,7 +86,7 @@ static rey_result direction_matrix(Builder *b, rey_xml_node *node, double matrix
     TRY(rey_xml_get_vec3(b->ctx, node, "direction", d, d));
     length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     if (!(length > 0)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the direction of a light must not be 0");
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the direction of a %s must not be 0", node->type);
     }
     for (int k = 0; k < 3; k++) {
         z[k] = d[k] / length;
@@ -112,7 +111,7 @@ static rey_result pose_slot(Builder *b, rey_xml_node *node, const EmitterParam *
                             int32_t *out) {
     double matrix[16];
     if (row->type == EMITTER_PARAM_AXIS && rey_xml_has(node, "direction")) {
-        TRY(direction_matrix(b, node, matrix));
+        TRY(build_direction(b, node, matrix));
     } else {
         TRY(rey_xml_get_transform(b->ctx, node, "to_world", matrix));
     }

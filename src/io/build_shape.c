@@ -318,6 +318,7 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
     }
     rey_xml_child *bsdf = rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0);
     rey_xml_child *emitter = rey_xml_child_of(node, REY_XML_BIT(REY_XML_EMITTER), 0);
+    rey_xml_child *sensor = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SENSOR), 0);
     build_join(name, path, "bsdf");
     if (bsdf) {
         TRY(build_bsdf(b, bsdf->node, name, &shape->bsdf));
@@ -330,12 +331,14 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
     if (emitter) {
         build_join(name, path, "emitter");
         TRY(build_emitter(b, emitter->node, id, name, &shape->emitter));
-        if (shape->kind == SHAPE_MESH) {
-            shape->area_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), shape->triangle_count);
-            if (shape->area_cdf < 0) {
-                return REY_ERROR_MEMORY;
-            }
-        }
+    }
+    if (shape->kind == SHAPE_MESH && (emitter || sensor || (shape->flags & SHAPE_UNSEEN))) {
+        shape->area_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), shape->triangle_count);
+        TRY(shape->area_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);
+    }
+    if (sensor) {
+        build_join(name, path, "sensor");
+        TRY(build_sensor(b, sensor->node, id, name));
     }
     return assign_group(b, shape);
 }
@@ -361,7 +364,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     }
     TRY(rey_xml_get_bool(b->ctx, node, "flip_normals", false, &flip));
     TRY(rey_xml_get_float(b->ctx, node, "silhouette_sampling_weight", 1, &weight));
-    shape.flags = (flip ? SHAPE_FLIP_NORMALS : 0) | (b->collection >= 0 ? SHAPE_INSTANCED : 0);
+    shape.flags = (flip ? SHAPE_FLIP_NORMALS : 0) | (b->collection >= 0 ? SHAPE_INSTANCED : 0) | b->shape_flags;
     if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
         TRY(build_mesh(b, node, id, path, &shape));
     } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {
@@ -381,4 +384,20 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     node->built = id;
     TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
     return build_finish(b, node, path);
+}
+
+rey_result build_target_shape(Builder *b, rey_xml_node *node, const char *path, int32_t *out) {
+    static const char *const plain[] = {"rectangle", "disk", "sphere", "cylinder", "cube", "obj", "ply", "serialized"};
+    bool known = false;
+    for (int i = 0; i < COUNT_OF(plain); i++) {
+        known |= strcmp(node->type, plain[i]) == 0;
+    }
+    if (!known) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "a %s cannot be the target of a sensor", node->type);
+    }
+    b->shape_flags = SHAPE_UNSEEN;
+    rey_result result = build_shape(b, node, path);
+    b->shape_flags = 0;
+    *out = node->built;
+    return result;
 }

@@ -133,7 +133,7 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     case REY_XML_EMITTER:
         return build_emitter(b, node, -1, name, &unused);
     case REY_XML_SENSOR:
-        return build_sensor(b, node, name);
+        return build_sensor(b, node, -1, name);
     case REY_XML_TEXTURE:
     case REY_XML_SPECTRUM: {
         TextureUse use = {REY_COLOUR_UNBOUNDED, false, -INFINITY, INFINITY, "", "texture", 0, NULL};

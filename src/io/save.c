@@ -117,7 +117,7 @@ static bool is_replaced(const Writer *w, const rey_xml_node *node, const char *n
     static const char *const anywhere[] = {"to_world", "material", "ext_ior", "filename", "raw", "to_uv", "position", "direction",
                                            "center", "radius", "p0", "p1", "shape_index", "flip_tex_coords", "face_normals", "fov", "fov_axis",
                                            "focal_length", "principal_point_offset_x", "principal_point_offset_y",
-                                           "alpha", "alpha_u", "alpha_v"};
+                                           "alpha", "alpha_u", "alpha_v", "aperture_radius", "focus_distance", "origin"};
     for (int i = 0; i < COUNT_OF(anywhere); i++) {
         if (strcmp(anywhere[i], name) == 0 && (node->tag != REY_XML_RFILTER)) {
             return true;
@@ -267,12 +267,22 @@ static rey_result write_shape_parts(Writer *w, int depth, const rey_xml_node *no
     return strcmp(node->type, "sdfgrid") == 0 ? write_grid(w, depth, shape) : REY_OK;
 }
 
-static void write_sensor_parts(Writer *w, int depth, const SensorRecord *s) {
-    const float *principal = theta(w, s->principal);
-    write_matrix(w, depth, "to_world", theta(w, s->to_world));
-    line(w, depth, "<float name=\"fov\" value=\"%.9g\"/>", (double)*theta(w, s->fov));
-    line(w, depth, "<float name=\"principal_point_offset_x\" value=\"%.9g\"/>", (double)principal[0]);
-    line(w, depth, "<float name=\"principal_point_offset_y\" value=\"%.9g\"/>", (double)principal[1]);
+static void write_sensor_parts(Writer *w, int depth, int32_t built) {
+    const SceneView *view = &w->scene->view;
+    const SensorRecord *s = built >= 0 ? view->sensors + built : view->batch_sensors + (SENSOR_OF_BATCH - built);
+    if (s->to_world >= 0) {
+        write_matrix(w, depth, "to_world", theta(w, s->to_world));
+    }
+    if (s->fov >= 0) {
+        const float *principal = theta(w, s->principal);
+        line(w, depth, "<float name=\"fov\" value=\"%.9g\"/>", (double)*theta(w, s->fov));
+        line(w, depth, "<float name=\"principal_point_offset_x\" value=\"%.9g\"/>", (double)principal[0]);
+        line(w, depth, "<float name=\"principal_point_offset_y\" value=\"%.9g\"/>", (double)principal[1]);
+    }
+    if (s->lens >= 0) {
+        line(w, depth, "<float name=\"aperture_radius\" value=\"%.9g\"/>", (double)*theta(w, s->lens));
+        line(w, depth, "<float name=\"focus_distance\" value=\"%.9g\"/>", (double)*theta(w, s->lens + 1));
+    }
 }
 
 static rey_result write_emitter_parts(Writer *w, int depth, const rey_xml_node *node) {
@@ -369,7 +379,7 @@ static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, con
     } else if (node->tag == REY_XML_SHAPE && strcmp(node->type, "instance") == 0) {
         write_matrix(w, depth + 1, "to_world", theta(w, w->scene->view.instances[node->built].to_world));
     } else if (node->tag == REY_XML_SENSOR) {
-        write_sensor_parts(w, depth + 1, w->scene->view.sensors + node->built);
+        write_sensor_parts(w, depth + 1, node->built);
     } else if (node->tag == REY_XML_EMITTER) {
         TRY(write_emitter_parts(w, depth + 1, node));
     } else if (node->tag == REY_XML_TEXTURE) {

@@ -229,6 +229,31 @@ rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image,
     return render_end(&r, result, start, stats);
 }
 
+rey_result rey_render_sensors(rey_scene *scene, const rey_render_def *def, const int *sensors, int count,
+                              float *const *images, rey_stats *stats) {
+    if (!def || count < 0 || (count > 0 && (!sensors || !images))) {
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "rey_render_sensors needs a def, sensors and a picture for each");
+    }
+    rey_stats sum = {0};
+    rey_result result = REY_OK;
+    for (int i = 0; i < count && result == REY_OK; i++) {
+        rey_render_def one = *def;
+        rey_stats part = {0};
+        one.sensor = sensors[i];
+        result = rey_render(scene, &one, images[i], &part);
+        sum.seconds += part.seconds;
+        sum.trace_seconds += part.trace_seconds;
+        sum.thread_seconds += part.thread_seconds;
+        sum.paths += part.paths;
+        sum.rays += part.rays;
+        sum.nonfinite += part.nonfinite;
+    }
+    if (stats) {
+        *stats = sum;
+    }
+    return result;
+}
+
 // ---- derivatives -------------------------------------------------------------------------------------------------
 
 // Whether the kernels know the derivative of the path integrand with respect to a parameter.

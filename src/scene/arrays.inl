@@ -10,5 +10,6 @@ ARRAY(int32_t, attributes, "per attribute name and shape: where a mesh's values 
 ARRAY(int32_t, segments, "first control point of each segment of a curve, relative to the shape's first")
 ARRAY(EmitterRecord, emitters, "light sources")
 ARRAY(SensorRecord, sensors, "cameras with their films")
+ARRAY(SensorRecord, batch_sensors, "sensors that are parts of batches")
 ARRAY(Group, groups, "shading groups: what a batch of lanes has in common")
 ARRAY(float, tables, "data derived from theta: distributions, inverse transforms, transmittance tables")

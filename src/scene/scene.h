@@ -35,6 +35,8 @@ typedef struct BsdfNode {
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };
 // Host only: the vertex normals were computed from the positions and follow them.
 enum { SHAPE_SMOOTH_NORMALS = 8 };
+// Host only: no ray meets it; it only says where a sensor looks.
+enum { SHAPE_UNSEEN = 64 };
 
 typedef struct ShapeRecord {
     int32_t kind, flags, group, bsdf, emitter; // kind: shape/kinds.inl
@@ -70,7 +72,7 @@ enum { FILM_BOX, FILM_TENT, FILM_GAUSSIAN, FILM_MITCHELL, FILM_CATMULLROM, FILM_
 typedef struct SensorRecord {
     int32_t kind;
     int32_t to_world;         // theta offset of 4 x 4
-    int32_t fov;              // theta offset: horizontal field of view [degrees]
+    int32_t fov;              // theta offset: horizontal field of view [degrees], -1 = none
     int32_t principal;        // theta offset: principal point offset x, y [fraction of the film]
     int32_t width, height;    // full film [pixels]
     int32_t crop_x, crop_y, crop_width, crop_height;
@@ -78,7 +80,14 @@ typedef struct SensorRecord {
     float filter_radius, filter_a, filter_b; // gaussian: stddev; mitchell: B, C
     float near_clip, far_clip;
     int32_t medium;
+    int32_t lens;             // theta offset: aperture radius, focus distance; -1 = none
+    int32_t shape, aim;       // irradiancemeter: its shape; distant: SENSOR_AIM_, and the target shape
+    float target[3];          // distant: target point
+    int32_t batch, batch_count; // batch: its first sensor in `batch_sensors`, their number
 } SensorRecord;
+
+// What a distant sensor sees.
+enum { SENSOR_AIM_SCENE, SENSOR_AIM_POINT, SENSOR_AIM_SHAPE };
 
 // What changed of a shape.
 enum { SHAPE_DIRTY_POSE = 1, SHAPE_DIRTY_VERTICES = 2 };
