@@ -132,6 +132,34 @@ KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
     ray->tmax = length * (1.0f - 9e-4f);
 }
 
+// Appends the shadow rays of m: what they bring, and to whom.
+KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t record, Mask m) {
+    Shadows *q = &t->ws.shadows;
+    int32_t at = t->shadow_count;
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray->o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, ray->d, m);
+    f_compress(q->tmax + at, ray->tmax, m);
+    spec_compress(q->radiance, at, l, m);
+    i_compress(q->slot + at, slot, m);
+    i_compress(q->record + at, i_iota() + record, m);
+    t->shadow_count += m_count(m);
+}
+
+// The light sample of a vertex; its weight is multiplied by the transmittance once that is known.
+KFN void record_light(Tracer *t, int32_t record, Int light, const LightSample *s, Float weight, Spec f) {
+    Records *r = &t->ws.records;
+    i_store(r->light + record, light);
+    i_store(r->lprim + record, s->prim);
+    f_store(r->ldx + record, s->d.x);
+    f_store(r->ldy + record, s->d.y);
+    f_store(r->ldz + record, s->d.z);
+    f_store(r->lu + record, s->uv.x);
+    f_store(r->lv + record, s->uv.y);
+    f_store(r->ldist + record, s->distance);
+    spec_store(r->light_weight, record, spec_set(weight));
+    spec_store(r->light_f, record, f);
+}
+
 // Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
 KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
                         const SampleKey *key, int32_t bounce, int32_t record) {
@@ -170,35 +198,72 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     // A derivative may be non-zero where the value is 0, wherever scattering has a positive density.
     Mask useful = t->derivative ? m_gt(scatter_pdf, f_set(0)) | m_gt(spec_max(f), f_set(0)) : m_gt(spec_max(l), f_set(0));
     Mask m = drawn & s.valid & useful & m_gt(weight, f_set(0));
-    Shadows *q = &t->ws.shadows;
-    int32_t at = t->shadow_count;
     Ray ray;
     shadow_ray(si, s.d, s.distance, &ray);
-    f_compress(q->ox + at, ray.o.x, m);
-    f_compress(q->oy + at, ray.o.y, m);
-    f_compress(q->oz + at, ray.o.z, m);
-    f_compress(q->dx + at, ray.d.x, m);
-    f_compress(q->dy + at, ray.d.y, m);
-    f_compress(q->dz + at, ray.d.z, m);
-    f_compress(q->tmax + at, ray.tmax, m);
-    spec_compress(q->radiance, at, l, m);
-    i_compress(q->slot + at, v->slot, m);
-    i_compress(q->record + at, i_iota() + record, m);
-    t->shadow_count += m_count(m);
+    append_shadows(t, &ray, l, v->slot, record, m);
     if (record >= 0) {
-        Records *r = &t->ws.records;
-        i_store(r->light + record, light);
-        i_store(r->lprim + record, s.prim);
-        f_store(r->ldx + record, s.d.x);
-        f_store(r->ldy + record, s.d.y);
-        f_store(r->ldz + record, s.d.z);
-        f_store(r->lu + record, s.uv.x);
-        f_store(r->lv + record, s.uv.y);
-        f_store(r->ldist + record, s.distance);
-        // Times the transmittance, once it is known.
-        spec_store(r->light_weight, record, spec_set(f_zero_unless(m, weight)));
-        spec_store(r->light_f, record, f);
+        record_light(t, record, light, &s, f_zero_unless(m, weight), f);
     }
+}
+
+// How a batch of paths goes on from its vertices.
+typedef struct Onward {
+    Vec3 d;
+    BsdfSample sample;
+    Spec f, beta;                            // value of the scattering function; throughput
+    Float pdf, rcp, eta2, roulette;          // density; 1 / (density x survival)
+    Int depth;
+    Mask m, passed;                          // lanes that go on; that went through a surface undeviated
+} Onward;
+
+// Roulette from rr_depth on.
+KFN void play_roulette(const Tracer *t, const SampleKey *key, int32_t bounce, Onward *w) {
+    const SceneView *scene = t->scene;
+    if (bounce + 1 < scene->rr_depth) {
+        return;
+    }
+    Float q = f_min(w->roulette * w->eta2, f_set(0.95f));
+    if (scene->through) {
+        q = f_select(mi_lt(i_set(scene->rr_depth), w->depth), q, f_set(1));
+    }
+    w->m = w->m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
+    Float survival = f_safe_rcp(q);
+    w->beta = spec_scale(w->beta, survival);
+    w->roulette = w->roulette * survival;
+    w->rcp = w->rcp * survival;
+}
+
+KFN void append_paths(Tracer *t, const Vertex *v, const Interaction *si, const Onward *w, int32_t at) {
+    const Paths *p = &t->ws.paths[t->current];
+    Paths *next = &t->ws.paths[1 - t->current];
+    // Lights are weighed as seen from the last vertex that turned the path.
+    Vec3 origin = si->p;
+    Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(-1));
+    if (t->scene->through) {
+        origin = v3_select(w->passed, v->origin, si->p);
+        density = f_select(w->passed, v->pdf, density);
+        i_compress(next->depth + at, w->depth, w->m);
+    }
+    v3_compress(next->ox + at, next->oy + at, next->oz + at, interaction_offset(si, w->d), w->m);
+    v3_compress(next->dx + at, next->dy + at, next->dz + at, w->d, w->m);
+    v3_compress(next->px + at, next->py + at, next->pz + at, origin, w->m);
+    f_compress(next->tmax + at, f_set(INFINITY), w->m);
+    spec_compress(next->beta, at, w->beta, w->m);
+    f_compress(next->eta2 + at, w->eta2, w->m);
+    f_compress(next->roulette + at, w->roulette, w->m);
+    f_compress(next->pdf + at, density, w->m);
+    i_compress(next->slot + at, v->slot, w->m);
+    i_compress(next->medium + at, i_gather(p->medium, v->at), w->m);
+}
+
+KFN void record_onward(Tracer *t, int32_t record, const Onward *w) {
+    Records *r = &t->ws.records;
+    f_store(r->wox + record, w->d.x);
+    f_store(r->woy + record, w->d.y);
+    f_store(r->woz + record, w->d.z);
+    f_store(r->sw + record, f_zero_unless(w->m, w->rcp));
+    spec_store(r->weight, record, spec_zero_unless(w->m, spec_scale(w->f, w->rcp)));
+    i_store(r->lobe + record, w->sample.lobe);
 }
 
 // Samples how the paths go on and appends the survivors to the next bounce's paths; returns their number.
@@ -206,7 +271,6 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
                           const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
     const SceneView *scene = t->scene;
     const Paths *p = &t->ws.paths[t->current];
-    Paths *next = &t->ws.paths[1 - t->current];
     SampleKey scatter_key = *key;
     Split split;
     if (scene->split) {
@@ -214,79 +278,39 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
         scatter_key.sample = split.scatter_sample;
         key = &scatter_key;
     }
-    BsdfSample s = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
-                               rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
-    Float pdf;
-    Spec f = bsdf_eval_pdf(call, wi, s.wo, s.lobe, &pdf);
-    Float rcp = f_safe_rcp(pdf);
-    Mask drawn = v->m;
+    Onward w;
+    w.sample = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
+                           rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
+    w.f = bsdf_eval_pdf(call, wi, w.sample.wo, w.sample.lobe, &w.pdf);
+    w.rcp = f_safe_rcp(w.pdf);
+    w.m = v->m;
     if (scene->split) {
-        rcp = rcp * split.scatter_weight;
-        drawn = drawn & split.scatter;
+        w.rcp = w.rcp * split.scatter_weight;
+        w.m = w.m & split.scatter;
     }
-    Spec weight = spec_scale(f, rcp);
-    Spec beta = spec_mul(v->beta, weight);
-    Float eta2 = real_gather(p->eta2, v->at) * s.eta * s.eta;
-    Mask m = drawn & m_gt(pdf, f_set(0)) & m_finite(spec_sum(beta));
-    Mask passed = m_set(scene->through) & mi_eq(s.lobe & 3, i_set(LOBE_NULL));
-    Int depth = v->depth + i_select(passed, i_set(0), i_set(1));
+    Spec weight = spec_scale(w.f, w.rcp);
+    w.beta = spec_mul(v->beta, weight);
+    w.eta2 = real_gather(p->eta2, v->at) * w.sample.eta * w.sample.eta;
+    w.m = w.m & m_gt(w.pdf, f_set(0)) & m_finite(spec_sum(w.beta));
+    w.passed = m_set(scene->through) & mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+    w.depth = v->depth + i_select(w.passed, i_set(0), i_set(1));
     if (scene->through && scene->max_depth >= 0) {
-        m = m & mi_lt(depth, i_set(scene->max_depth));
+        w.m = w.m & mi_lt(w.depth, i_set(scene->max_depth));
     }
-    Float roulette = spec_max(beta);
+    w.roulette = spec_max(w.beta);
     if (t->derivative) {
         // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
-        roulette = real_gather(p->roulette, v->at) * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
+        w.roulette = real_gather(p->roulette, v->at) * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
     } else {
-        m = m & m_gt(roulette, f_set(0));
+        w.m = w.m & m_gt(w.roulette, f_set(0));
     }
-    if (bounce + 1 >= scene->rr_depth) {
-        Float q = f_min(roulette * eta2, f_set(0.95f));
-        if (scene->through) {
-            q = f_select(mi_lt(i_set(scene->rr_depth), depth), q, f_set(1));
-        }
-        m = m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
-        Float survival = f_safe_rcp(q);
-        beta = spec_scale(beta, survival);
-        roulette = roulette * survival;
-        rcp = rcp * survival;
-    }
-    Vec3 d = frame_to_world(&si->sh, s.wo);
-    Vec3 o = interaction_offset(si, d);
-    f_compress(next->ox + next_count, o.x, m);
-    f_compress(next->oy + next_count, o.y, m);
-    f_compress(next->oz + next_count, o.z, m);
-    f_compress(next->dx + next_count, d.x, m);
-    f_compress(next->dy + next_count, d.y, m);
-    f_compress(next->dz + next_count, d.z, m);
-    // Lights are weighed as seen from the last vertex that turned the path.
-    Vec3 origin = si->p;
-    Float density = f_select(mi_eq(s.lobe, i_set(LOBE_SMOOTH)), pdf, f_set(-1));
-    if (scene->through) {
-        origin = v3_select(passed, v->origin, si->p);
-        density = f_select(passed, v->pdf, density);
-        i_compress(next->depth + next_count, depth, m);
-    }
-    f_compress(next->px + next_count, origin.x, m);
-    f_compress(next->py + next_count, origin.y, m);
-    f_compress(next->pz + next_count, origin.z, m);
-    f_compress(next->tmax + next_count, f_set(INFINITY), m);
-    spec_compress(next->beta, next_count, beta, m);
-    f_compress(next->eta2 + next_count, eta2, m);
-    f_compress(next->roulette + next_count, roulette, m);
-    f_compress(next->pdf + next_count, density, m);
-    i_compress(next->slot + next_count, v->slot, m);
-    i_compress(next->medium + next_count, i_gather(p->medium, v->at), m);
+    play_roulette(t, key, bounce, &w);
+    w.d = frame_to_world(&si->sh, w.sample.wo);
+    append_paths(t, v, si, &w, next_count);
     if (record >= 0) {
-        Records *r = &t->ws.records;
-        f_store(r->wox + record, d.x);
-        f_store(r->woy + record, d.y);
-        f_store(r->woz + record, d.z);
-        f_store(r->sw + record, f_zero_unless(m, rcp));
-        spec_store(r->weight, record, spec_zero_unless(m, spec_scale(f, rcp)));
-        i_store(r->lobe + record, s.lobe);
+        record_onward(t, record, &w);
     }
-    return next_count + m_count(m);
+    return next_count + m_count(w.m);
 }
 
 // The parameterisation of the surface, for functions that ask for it. It looks at the surface again, so that nothing of

@@ -48,6 +48,12 @@ KFN void spec_scatter_add(real *const *rows, Int index, Spec s, Mask m) {
 }
 
 // Stores the lanes of m one behind the other.
+KFN void v3_compress(real *x, real *y, real *z, Vec3 v, Mask m) {
+    f_compress(x, v.x, m);
+    f_compress(y, v.y, m);
+    f_compress(z, v.z, m);
+}
+
 KFN void spec_compress(real *const *rows, int32_t at, Spec s, Mask m) {
     for (int c = 0; c < SPEC_N; c++) {
         f_compress(rows[c] + at, s.c[c], m);
