@@ -38,13 +38,13 @@ typedef struct SceneSource {
     rey_xml_document *document;
     Array textures, shapes; // of TextureSource, ShapeSource
     Array attributes;       // of MeshAttribute
+    Array paths;            // of char *, per node of the document: its first parameter path, null = none
 } SceneSource;
 
 typedef struct Builder {
     rey_context *ctx;
     rey_scene *scene;
     SceneSource *source;
-    Array prefixes; // of Prefix: the first parameter path of each object
     Array attribute_uses; // of AttributeUse
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
     int32_t shape_flags;  // of all shapes that are built now
@@ -62,6 +62,9 @@ enum { MAX_PATH_NAME = 512 };
 
 // "a.b" into out.
 void build_join(char out[MAX_PATH_NAME], const char *a, const char *b);
+
+// Remembers an object's parameter path, which starts the names of its parameters.
+rey_result build_name(Builder *b, const rey_xml_node *node, const char *path);
 
 // First visit of an object: remembers its path and returns true. Later visits: names the object's parameters under
 // the new path as well and returns false. Objects with an id are known under it, too.

@@ -64,6 +64,7 @@ rey_result build_instance(Builder *b, rey_xml_node *node, const char *path) {
     if (b->collection >= 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "an instance cannot stand inside a shapegroup");
     }
+    TRY(build_name(b, node, path));
     TRY(instance_group(b, node, path, &instance.group));
     TRY(rey_xml_get_transform(b->ctx, node, "to_world", m));
     for (int k = 0; k < 16; k++) {

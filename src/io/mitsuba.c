@@ -5,12 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-// The first parameter path of an object.
-typedef struct Prefix {
-    const rey_xml_node *node;
-    char *path;
-} Prefix;
-
 void build_join(char out[MAX_PATH_NAME], const char *a, const char *b) {
     snprintf(out, MAX_PATH_NAME, "%s%s%s", a, *a ? "." : "", b);
 }
@@ -40,24 +34,21 @@ static rey_result alias_prefix(Builder *b, const char *from, const char *to) {
     return REY_OK;
 }
 
+rey_result build_name(Builder *b, const rey_xml_node *node, const char *path) {
+    char **kept = &ARRAY_AT(b->source->paths, char *, node->index);
+    if (!*kept) {
+        *kept = rey_strdup(b->ctx, path);
+    }
+    return *kept ? REY_OK : REY_ERROR_MEMORY;
+}
+
 rey_result build_visit(Builder *b, rey_xml_node *node, const char *path, bool *first) {
+    const char *former = ARRAY_AT(b->source->paths, char *, node->index);
     *first = node->built < 0;
     if (!*first) {
-        for (size_t i = 0; i < b->prefixes.count; i++) {
-            Prefix p = ARRAY_AT(b->prefixes, Prefix, i);
-            if (p.node == node) {
-                return alias_prefix(b, p.path, path);
-            }
-        }
-        return REY_OK;
+        return former ? alias_prefix(b, former, path) : REY_OK;
     }
-    Prefix *p = rey_array_push(b->ctx, &b->prefixes, sizeof *p, 1);
-    if (!p) {
-        return REY_ERROR_MEMORY;
-    }
-    p->node = node;
-    p->path = rey_strdup(b->ctx, path);
-    return p->path ? REY_OK : REY_ERROR_MEMORY;
+    return build_name(b, node, path);
 }
 
 rey_result build_finish(Builder *b, rey_xml_node *node, const char *path) {
@@ -178,6 +169,10 @@ static void source_free(void *document) {
     rey_array_free(source->ctx, &source->textures);
     rey_array_free(source->ctx, &source->shapes);
     rey_array_free(source->ctx, &source->attributes);
+    for (size_t i = 0; i < source->paths.count; i++) {
+        rey_free(source->ctx, ARRAY_AT(source->paths, char *, i));
+    }
+    rey_array_free(source->ctx, &source->paths);
     rey_free(source->ctx, source);
 }
 
@@ -195,12 +190,12 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         result = (spare ? rey_xml_read_spare : rey_xml_read)(ctx, path, defines, define_count, &b.source->document);
     }
     if (result == REY_OK) {
+        size_t nodes = (size_t)rey_xml_node_count(b.source->document);
+        result = rey_array_push(ctx, &b.source->paths, sizeof(char *), nodes) ? REY_OK : REY_ERROR_MEMORY;
+    }
+    if (result == REY_OK) {
         result = build_scene(&b);
     }
-    for (size_t i = 0; i < b.prefixes.count; i++) {
-        rey_free(ctx, ARRAY_AT(b.prefixes, Prefix, i).path);
-    }
-    rey_array_free(ctx, &b.prefixes);
     rey_array_free(ctx, &b.attribute_uses);
     if (result != REY_OK) {
         rey_scene_destroy(b.scene);

@@ -53,7 +53,9 @@ typedef struct rey_xml_property {
     const char *name;
     rey_xml_position at;
     rey_xml_kind kind;
-    bool used; // set by the getters
+    bool used;    // set by the getters
+    bool ignored; // left out by a lenient reader
+    bool point;   // a vector that was written as <point>
     int order; // running number over properties and children of the node, in document order
     bool boolean;
     int64_t integer;
@@ -70,6 +72,7 @@ typedef struct rey_xml_child {
     rey_xml_position at;       // of the child or of the <ref>
     const char *ref;           // id that a <ref> names, null for a child that is declared here
     bool used;
+    bool ignored; // left out by a lenient reader
     int order;
 } rey_xml_child;
 
@@ -84,6 +87,7 @@ typedef struct rey_xml_node {
     rey_xml_child *children; // document order
     int child_count;
     int index;  // position in the document's list of nodes
+    bool ignored; // left out by a lenient reader
     int built;  // free for the builder: -1 at first. Nodes are shared: build each once.
     int height; // longest chain of children below, references included; at most REY_XML_DEEPEST
 } rey_xml_node;

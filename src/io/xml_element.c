@@ -195,7 +195,8 @@ static rey_result end_object(XmlFile *file, XmlFrame *frame) {
 
 static rey_result begin_value(XmlFile *file, const XmlTag *tag, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
-    rey_xml_property property = {.at = rey_xml_element_position(file), .kind = (rey_xml_kind)tag->which};
+    rey_xml_property property = {.at = rey_xml_element_position(file), .kind = (rey_xml_kind)tag->which,
+                                 .point = strcmp(tag->name, "point") == 0};
     rey_result result = keep_attribute(file, attributes, "name", &property.name);
     if (!result && property.kind == REY_XML_TRANSFORM_VALUE) {
         rey_xml_identity(property.matrix);

@@ -1,0 +1,36 @@
+// convert.c: `reynolds convert`: a scene written back as one that stands alone.
+#include "cli.h"
+
+#include <stdio.h>
+
+static void print_json(const Session *s) {
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    json_string(&json, "output", s->options->files[1]);
+    json_integer(&json, "parameters", rey_param_count(s->scene));
+    cli_json_ignored(&json, s);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+int cli_convert(int argc, char **argv) {
+    Options options;
+    Session session;
+    int status;
+    if (!cli_options_parse(COMMAND_CONVERT, argc, argv, &options, &status)) {
+        return status;
+    }
+    status = cli_session_open(&options, "convert", &session);
+    if (!status) {
+        rey_result result = rey_scene_save(session.scene, options.files[1]);
+        if (result) {
+            status = cli_report_failure(&options, session.ctx, result);
+        } else if (options.json) {
+            print_json(&session);
+        }
+        status = status ? status : cli_finish_output();
+        cli_session_close(&session);
+    }
+    cli_options_free(&options);
+    return status;
+}
