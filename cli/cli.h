@@ -17,6 +17,7 @@ typedef enum Command {
     COMMAND_FIT,
     COMMAND_PARAMS,
     COMMAND_INFO,
+    COMMAND_CONVERT,
     COMMAND_COMPARE,
     COMMAND_DOCTOR,
     COMMAND_COUNT
@@ -28,6 +29,7 @@ int cli_check(int argc, char **argv);
 int cli_fit(int argc, char **argv);
 int cli_params(int argc, char **argv);
 int cli_info(int argc, char **argv);
+int cli_convert(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_doctor(int argc, char **argv);
 

@@ -8,7 +8,6 @@ static void print_json(const Session *s) {
     json_object(&json, NULL);
     json_string(&json, "output", s->options->files[1]);
     json_integer(&json, "parameters", rey_param_count(s->scene));
-    cli_json_ignored(&json, s);
     json_object_end(&json);
     json_end(&json);
 }
@@ -20,6 +19,7 @@ int cli_convert(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_CONVERT, argc, argv, &options, &status)) {
         return status;
     }
+    options.output = options.files[1];
     status = cli_session_open(&options, "convert", &session);
     if (!status) {
         rey_result result = rey_scene_save(session.scene, options.files[1]);

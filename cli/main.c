@@ -41,6 +41,10 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
                      "recover parameters from images", ""},
     [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},
     [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
+    [COMMAND_CONVERT] =
+        {"convert", cli_convert, "IN OUT.xml [options]", "write a scene back, with its meshes and images",
+         "\nOUT.xml renders the same bits as IN. It is of the current version of the format, needs no define, include "
+         "or\nsearch path, and its files lie in the folder OUT_data beside it.\n"},
     [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
                          "differences between two images; B is the reference",
                          "\npsnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2).\n"},

@@ -10,7 +10,7 @@
 enum {
     RENDERS = 1 << COMMAND_RENDER | 1 << COMMAND_GRAD | 1 << COMMAND_CHECK,
     FITS = 1 << COMMAND_FIT,
-    READS = 1 << COMMAND_PARAMS | 1 << COMMAND_INFO,
+    READS = 1 << COMMAND_PARAMS | 1 << COMMAND_INFO | 1 << COMMAND_CONVERT,
     GRADS = 1 << COMMAND_GRAD,
     CHECKS = 1 << COMMAND_CHECK,
     DOCTOR = 1 << COMMAND_DOCTOR,
@@ -314,7 +314,7 @@ static const OptionRow *match_option(Options *o, const char *text, const char **
 }
 
 static bool add_file(Options *o, const char *text) {
-    static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 0};
+    static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     if (o->file_count >= most[o->command]) {
         cli_usage_error(o->command, "unexpected argument '%s'", text);
         return false;
@@ -365,8 +365,8 @@ static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
 
 static bool check_required(const Options *o) {
     static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE",   "JOB.yaml",
-                                                       "SCENE", "SCENE", "A and B", ""};
-    static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 0};
+                                                       "SCENE", "SCENE", "IN and OUT.xml", "A and B", ""};
+    static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     Command c = o->command;
     if (o->file_count < needed[c]) {
         cli_usage_error(c, "%s missing", missing[c]);

@@ -10,11 +10,6 @@
 
 static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, const char *slot);
 
-static void write_ref(Writer *w, int depth, const rey_xml_child *c) {
-    rey_save_line(w, depth, c->name ? "<ref id=\"%s\" name=\"%s\"/>" : "<ref id=\"%s\"/>",
-                  c->node->id ? c->node->id : c->ref, c->name);
-}
-
 static rey_result write_children(Writer *w, int depth, const rey_xml_node *node) {
     for (int i = 0; i < node->child_count; i++) {
         const rey_xml_child *c = &node->children[i];
@@ -22,7 +17,7 @@ static rey_result write_children(Writer *w, int depth, const rey_xml_node *node)
             continue;
         }
         if (c->ref) {
-            write_ref(w, depth, c);
+            rey_save_tag(w, depth, "ref", c->node->id ? c->node->id : c->ref, "name", c->name);
         } else {
             TRY(write_node(w, depth, c->node, c->name));
         }
@@ -86,7 +81,7 @@ static void write_aliases(Writer *w) {
     for (size_t i = 0; i < ids->capacity; i++) {
         const XmlId *id = &ids->slots[i];
         if (id->id && id->node->id && strcmp(id->id, id->node->id) != 0 && !id->node->ignored) {
-            rey_save_line(w, 1, "<alias id=\"%s\" as=\"%s\"/>", id->node->id, id->id);
+            rey_save_tag(w, 1, "alias", id->node->id, "as", id->id);
         }
     }
 }

@@ -51,6 +51,8 @@ void rey_save_value(Writer *w, int depth, const char *tag, const char *name, con
 void rey_save_matrix(Writer *w, int depth, const char *name, const float m[16]);
 // A property as the document has it. Names of files are looked up in the list of data files.
 void rey_save_property(Writer *w, int depth, const rey_xml_property *property);
+// <TAG id="VALUE" OTHER="OTHER_VALUE"/>; the second attribute is left out when its value is null.
+void rey_save_tag(Writer *w, int depth, const char *tag, const char *value, const char *other, const char *other_value);
 // <TAG type="TYPE" id="ID" name="SLOT">, and its end.
 void rey_save_open(Writer *w, int depth, const rey_xml_node *node, const char *type, const char *slot);
 

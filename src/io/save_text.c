@@ -170,6 +170,17 @@ void rey_save_property(Writer *w, int depth, const rey_xml_property *p) {
     end_value(w);
 }
 
+void rey_save_tag(Writer *w, int depth, const char *tag, const char *value, const char *other, const char *other_value) {
+    indent(w, depth);
+    put_text(w, "<");
+    put_text(w, tag);
+    put_attribute(w, "id", value);
+    if (other_value) {
+        put_attribute(w, other, other_value);
+    }
+    put_text(w, "/>\n");
+}
+
 void rey_save_open(Writer *w, int depth, const rey_xml_node *node, const char *type, const char *slot) {
     indent(w, depth);
     put_text(w, "<");

@@ -48,7 +48,7 @@ static void usage_errors_exit_with_two(void **state) {
 
 static void help_and_version(void **state) {
     Fixture *f = *state;
-    static const char *const commands[] = {"render", "grad", "check", "fit", "params", "info", "compare", "doctor"};
+    static const char *const commands[] = {"render", "grad", "check", "fit", "params", "info", "convert", "compare", "doctor"};
     expect(f, 0, "--version");
     assert_int_equal(strncmp(f->out, "reynolds ", 9), 0);
     expect(f, 0, "--help");

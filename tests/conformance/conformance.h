@@ -39,3 +39,4 @@ float *suite_image(Suite *suite, int width, int height);
 void run_renders(Suite *suite);
 void run_derivatives(Suite *suite);
 void run_facts(Suite *suite);
+void run_converts(Suite *suite);

@@ -124,6 +124,7 @@ int main(int argc, char **argv) {
     run_renders(&suite);
     run_derivatives(&suite);
     run_facts(&suite);
+    run_converts(&suite);
     rey_context_destroy(suite.ctx);
     printf("%d passed, %d failed, %d skipped\n", suite.passed, suite.failed, suite.skipped);
     return suite.failed ? 1 : 0;
