@@ -145,7 +145,8 @@ bool rey_save_is_curve_or_grid(const rey_xml_node *node) {
 
 // Properties that say in other words what the leaf says.
 static bool leaf_replaces(const char *leaf, const char *property) {
-    static const char *const pose[] = {"to_world", "position", "direction", "center", "radius", "p0", "p1", NULL};
+    static const char *const pose[] = {"to_world", "position", "direction", "origin",
+                                       "center",   "radius",   "p0",        "p1",     NULL};
     static const char *const point[] = {"to_world", "position", "direction", NULL};
     static const char *const fov[] = {"fov", "fov_axis", "focal_length", NULL};
     return strcmp(leaf, "to_world") == 0                                    ? is_one_of(property, pose)
