@@ -11,6 +11,8 @@
 
 // Systematic error that a finite difference may have after extrapolation, relative to the blocks' root mean square.
 static const double relative_floor = 1e-3;
+// Share of the mean variance over all blocks in the variance of each.
+static const double pooled = 0.25;
 
 Blocks check_blocks(int width, int height) {
     return (Blocks){.width = width, .height = height, .nx = width < 8 ? width : 8, .ny = height < 8 ? height : 8};
@@ -36,16 +38,16 @@ void check_add_blocks(const Blocks *b, const float *image, double weight, double
 
 typedef struct Sample {                   // one block and series over the sets
     double derivative, difference, error; // means, and the standard error of their difference
-    bool empty;                           // both vanish in every set
+    bool empty;                           // both vanish in every set, up to rounding
 } Sample;
 
-static Sample sample_at(const double *derivative, const double *difference, size_t stride, size_t at) {
+static Sample sample_at(const double *derivative, const double *difference, size_t stride, size_t at, double rounding) {
     Sample s = {.empty = true};
     for (size_t k = 0; k < CHECK_SETS; k++) {
         double a = derivative[k * stride + at], b = difference[k * stride + at];
         s.derivative += a / CHECK_SETS;
         s.difference += b / CHECK_SETS;
-        s.empty = s.empty && a == 0 && b == 0;
+        s.empty = s.empty && fabs(a) <= rounding && fabs(b) <= rounding;
     }
     double squares = 0;
     for (size_t k = 0; k < CHECK_SETS; k++) {
@@ -62,27 +64,56 @@ static double normal_from_t(double t, double nu) {
     return t < 0 ? -z : z;
 }
 
-CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, double rounding) {
-    CheckResult r = {0};
-    size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
-    double squares[CHECK_SERIES] = {0}, error_squares = 0, signal_squares = 0;
+// Mean squares over the blocks of each series.
+typedef struct Squares {
+    double signal[CHECK_SERIES], noise[CHECK_SERIES];
+} Squares;
+
+static Squares mean_squares(const double *derivative, const double *difference, size_t stride, double rounding) {
+    Squares q = {{0}, {0}};
     for (size_t at = 0; at < stride; at++) {
-        Sample s = sample_at(derivative, difference, stride, at);
-        squares[at % CHECK_SERIES] += s.difference * s.difference / (double)count;
-        error_squares += s.error * s.error;
-        signal_squares += s.difference * s.difference;
+        Sample s = sample_at(derivative, difference, stride, at, rounding);
+        q.signal[at % CHECK_SERIES] += s.difference * s.difference * CHECK_SERIES / (double)stride;
+        q.noise[at % CHECK_SERIES] += s.error * s.error * CHECK_SERIES / (double)stride;
     }
+    return q;
+}
+
+// Two orders of difference that lie an `apart` of each other's size apart leave the better one an error of about its
+// square. That is forgiven below apart_forgiven; more is a step that is too long, if it is not noise.
+static const double apart_forgiven = 0.03;
+
+static bool step_matters(const double *difference, const double *rough, size_t stride) {
+    double apart = 0, noise = 0, signal = 0;
+    for (size_t at = 3; at < stride; at += CHECK_SERIES) {
+        Sample s = sample_at(rough, difference, stride, at, 0);
+        apart += (s.derivative - s.difference) * (s.derivative - s.difference);
+        noise += s.error * s.error;
+        signal += s.difference * s.difference;
+    }
+    return apart > apart_forgiven * apart_forgiven * signal && apart > 4 * noise;
+}
+
+CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, const double *rough,
+                          double rounding) {
+    size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
+    CheckResult r = {.step_matters = step_matters(difference, rough, stride)};
+    Squares squares = mean_squares(derivative, difference, stride, rounding);
+    double signal_squares = squares.signal[0] + squares.signal[1] + squares.signal[2];
+    double error_squares = squares.noise[0] + squares.noise[1] + squares.noise[2];
     r.relative_error = signal_squares > 0 ? sqrt(error_squares / signal_squares) : 0;
     double sum = 0, variance = 0;
     int blocks = 0;
     for (size_t at = 0; at < stride; at++) {
         int series = (int)(at % CHECK_SERIES);
-        Sample s = sample_at(derivative, difference, stride, at);
+        Sample s = sample_at(derivative, difference, stride, at, rounding);
         if (s.empty) {
             continue;
         }
-        double floor = relative_floor * sqrt(squares[series]) + rounding;
-        double t = (s.derivative - s.difference) / sqrt(s.error * s.error + floor * floor);
+        double floor = relative_floor * sqrt(squares.signal[series]) + rounding;
+        // Sixteen sets may all miss a block's rare bright samples; the other blocks say how likely those are.
+        double error2 = (1 - pooled) * s.error * s.error + pooled * squares.noise[series];
+        double t = (s.derivative - s.difference) / sqrt(error2 + floor * floor);
         double z = normal_from_t(t, CHECK_SETS - 1);
         if (series == 3) {
             r.derivative += s.derivative / (double)count;

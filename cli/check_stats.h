@@ -23,11 +23,13 @@ typedef struct CheckResult {
     int worst_x, worst_y, worst_channel;
     double sum_z; // sum of the blocks' z of the mean channel / sqrt(their number)
     int tests;    // block and channel tests
+    bool step_matters; // the rough difference is away from the other by more than noise, and by more than is forgiven
 } CheckResult;
 
-// derivative and difference hold CHECK_SETS rows of ny * nx * CHECK_SERIES block means, from the same sample sets.
-// rounding: absolute error that float arithmetic leaves in a block's difference.
-CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, double rounding);
+// derivative, difference and rough (a difference of lower order) hold CHECK_SETS rows of ny * nx * CHECK_SERIES block
+// means, from the same sample sets. rounding: absolute error that float arithmetic leaves in a block's difference.
+CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, const double *rough,
+                          double rounding);
 
 // |z| that one of n tests passes with a probability of 1 % in all (Sidak's correction).
 double check_z_threshold(int n);

@@ -55,6 +55,9 @@ typedef struct Options {
     bool reverse;        // --mode reverse
     const char *adjoint; // number or file name
     bool resume, overwrite, json;
+    bool all;            // check every parameter
+    double step;         // of differences along the direction, 0 = found by itself
+    bool variance;       // write the variance of each pixel's derivative
     rey_define *defines; // -D
     char **define_names; // copies of their names, owned
     int define_count;

@@ -66,25 +66,82 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     json_end(&json);
 }
 
-static rey_result forward(Grad *g) {
+// OUT_variance.ext beside OUT.ext.
+static void variance_path(const char *output, char path[PATH_BYTES]) {
+    const char *dot = strrchr(output, '.');
+    snprintf(path, PATH_BYTES, "%.*s_variance%s", (int)(dot - output), output, dot);
+}
+
+// The sample sets one by one: their mean, and what each pixel's mean varies by, from the scatter of the sets.
+static rey_result forward_with_variance(Grad *g, float *image, float *variance, double *sets) {
+    Session *s = &g->session;
+    size_t count = (size_t)s->width * (size_t)s->height * 3;
+    double *sums = rey_alloc_array(s->ctx, count, 2 * sizeof *sums);
+    rey_result result = sums ? REY_OK : REY_ERROR_MEMORY;
+    rey_scene_info info;
+    rey_scene_get_info(s->scene, &info);
+    int spp = s->def.spp ? s->def.spp : info.sample_count;
+    s->def.sets = 1;
+    s->def.spp = (spp + SETS - 1) / SETS;
+    s->progress.parts = SETS;
+    for (uint32_t k = 0; k < SETS && !result; k++) {
+        rey_stats stats = {0};
+        s->def.set = k;
+        result = rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image, &sets[k],
+                         &stats);
+        cli_add_stats(&g->stats, &stats);
+        s->progress.part++;
+        for (size_t i = 0; i < count && !result; i++) {
+            double d = (double)image[i] - sums[2 * i];
+            sums[2 * i] += d / (k + 1);
+            sums[2 * i + 1] += d * ((double)image[i] - sums[2 * i]);
+        }
+    }
+    for (size_t i = 0; i < count && !result; i++) {
+        image[i] = (float)sums[2 * i];
+        variance[i] = (float)(sums[2 * i + 1] / (SETS - 1) / SETS);
+    }
+    rey_free(s->ctx, sums);
+    return result;
+}
+
+static rey_result write_forward(Grad *g, const float *image, const float *variance) {
     Session *s = &g->session;
     const char *output = s->options->output;
-    double sets[SETS];
-    float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, 3 * sizeof *image);
-    if (!image) {
-        return REY_ERROR_MEMORY;
+    char path[PATH_BYTES];
+    bool png = cli_image_format(output) == IMAGE_PNG;
+    rey_result result = cli_write_image(s->ctx, output, image, s->width, s->height, true, png ? &g->png_scale : NULL);
+    if (!result && variance) {
+        variance_path(output, path);
+        result = cli_write_image(s->ctx, path, variance, s->width, s->height, false, NULL);
     }
-    rey_result result = rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image,
-                                sets, &g->stats);
-    cli_progress_end(&s->progress);
+    return result;
+}
+
+static rey_result forward(Grad *g) {
+    Session *s = &g->session;
+    double sets[SETS];
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    float *image = rey_alloc_array(s->ctx, pixels, 3 * sizeof *image), *variance = NULL;
+    rey_result result = image ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && s->options->variance) {
+        char path[PATH_BYTES];
+        variance_path(s->options->output, path);
+        variance = rey_alloc_array(s->ctx, pixels, 3 * sizeof *variance);
+        result = variance ? rey_file_check_output(s->ctx, path) : REY_ERROR_MEMORY;
+    }
+    if (!result) {
+        result = variance ? forward_with_variance(g, image, variance, sets)
+                          : rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image,
+                                    sets, &g->stats);
+        cli_progress_end(&s->progress);
+    }
     if (!result) {
         summarize(sets, SETS, &g->value, &g->standard_error);
-    }
-    if (!result && output) {
-        bool png = cli_image_format(output) == IMAGE_PNG;
-        result = cli_write_image(s->ctx, output, image, s->width, s->height, true, png ? &g->png_scale : NULL);
+        result = s->options->output ? write_forward(g, image, variance) : REY_OK;
     }
     rey_free(s->ctx, image);
+    rey_free(s->ctx, variance);
     return result;
 }
 

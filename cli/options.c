@@ -3,6 +3,7 @@
 
 #include "base/context.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,6 +31,9 @@ typedef enum OptionId {
     OPTION_MODE,
     OPTION_ADJOINT,
     OPTION_TERMS,
+    OPTION_ALL,
+    OPTION_STEP,
+    OPTION_VARIANCE,
     OPTION_SET,
     OPTION_RESUME,
     OPTION_OVERWRITE,
@@ -53,6 +57,9 @@ static const OptionRow option_rows[] = {
     {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
     {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or an EXR of the image's size"},
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior)"},
+    {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
+    {OPTION_STEP, 0, "step", "H", CHECKS, "step of the differences along the direction (default: found by itself)"},
+    {OPTION_VARIANCE, 0, "variance", NULL, GRADS, "forward mode: also write the variance of each pixel, to OUT_variance"},
     {OPTION_SET, 0, "set", "key=value", FITS, "change an entry of the job; may be repeated"},
     {OPTION_RESUME, 0, "resume", NULL, FITS, "continue from the last checkpoint"},
     {OPTION_OVERWRITE, 0, "overwrite", NULL, FITS, "start again where the folder holds another or an unfinished fit"},
@@ -196,6 +203,16 @@ static bool parse_set(Options *o, const char *value) {
     return true;
 }
 
+static bool parse_step(Options *o, const char *value) {
+    char *end;
+    o->step = strtod(value, &end);
+    if (end == value || *end || !(o->step > 0) || !isfinite(o->step)) {
+        cli_usage_error(o->command, "--step: expected a positive number, got '%s'", value);
+        return false;
+    }
+    return true;
+}
+
 static bool parse_lanes(Options *o, const char *value) {
     static const char *const widths[] = {"1", "8", "16", NULL};
     static const int width_values[] = {1, 8, 16};
@@ -245,6 +262,14 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         return true;
     case OPTION_TERMS:
         return parse_terms(o, value);
+    case OPTION_ALL:
+        o->all = true;
+        return true;
+    case OPTION_STEP:
+        return parse_step(o, value);
+    case OPTION_VARIANCE:
+        o->variance = true;
+        return true;
     case OPTION_SET:
         return parse_set(o, value);
     case OPTION_RESUME:
@@ -370,8 +395,12 @@ static bool check_required(const Options *o) {
     Command c = o->command;
     if (o->file_count < needed[c]) {
         cli_usage_error(c, "%s missing", missing[c]);
-    } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count) {
+    } else if (o->all && o->param_count) {
+        cli_usage_error(c, "--all and --param: give one of them");
+    } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {
         cli_usage_error(c, "--param is missing");
+    } else if (o->variance && (o->reverse || !o->output || !strcmp(o->output, "-"))) {
+        cli_usage_error(c, "--variance is of forward mode and needs -o with the name of a file");
     } else if (c == COMMAND_GRAD && o->reverse && !o->adjoint) {
         cli_usage_error(c, "--mode reverse needs --adjoint");
     } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {

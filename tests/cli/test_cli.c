@@ -172,8 +172,42 @@ static void checks_pass_on_right_gradients(void **state) {
     assert_true(json_value(node, "passed", 0) == 1);
     json_free(node);
     // the interior term alone is wrong where refraction moves what is seen
-    expect(f, 1, "check %s -D ball=glass --param glass.eta.value --terms interior --spp 64");
+    expect(f, 1, "check %s -D ball=glass --param glass.eta.value --terms interior --spp 1024");
     assert_non_null(strstr(f->out, "WRONG"));
+    // too few samples to say anything
+    expect(f, 0, "check %s -D ball=glass --param glass.eta.value --terms interior --spp 16 --step 1e-4");
+    assert_non_null(strstr(f->out, "weak"));
+    expect(f, 2, "check %s --param red.reflectance.value --step 0");
+    expect(f, 2, "check %s --param red.reflectance.value --all");
+}
+
+static void check_all_lists_every_parameter(void **state) {
+    Fixture *f = *state;
+    JsonNode *node = run_json(f, 0, "check %s --all --spp 64 --json"), *params = run_json(f, 0, "params %s --json");
+    int count = 0, listed = 0, refused = 0, right = 0;
+    for (const JsonNode *row = json_get(node, "directions")->first; row; row = row->next) {
+        const char *verdict = json_text(row, "verdict", "");
+        count++;
+        refused += !strcmp(verdict, "refused");
+        right += !strcmp(verdict, "ok");
+        assert_string_not_equal(verdict, "WRONG");
+    }
+    for (const JsonNode *row = json_get(params, "parameters")->first; row; row = row->next) {
+        listed++;
+    }
+    assert_int_equal(count, listed);
+    assert_true(refused > 0 && right > 0);
+    json_free(node);
+    json_free(params);
+}
+
+// The mean over the pixels' variances, and the standard error of the mean, come from the same sets.
+static void variances_are_written(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "grad %s --param red.reflectance.value --spp 64 -o d.npy --variance");
+    expect(f, 0, "compare d_variance.npy d_variance.npy");
+    expect(f, 2, "grad %s --param red.reflectance.value --variance");
+    expect(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint 1 -o g --variance");
 }
 
 static void descriptions(void **state) {
@@ -217,7 +251,8 @@ int main(void) {
         cmocka_unit_test(usage_errors_exit_with_two),     cmocka_unit_test(help_and_version),
         cmocka_unit_test(failures_exit_with_one),         cmocka_unit_test(rendering),
         cmocka_unit_test(forward_and_reverse_agree),      cmocka_unit_test(incomplete_gradients_are_refused),
-        cmocka_unit_test(checks_pass_on_right_gradients), cmocka_unit_test(descriptions),
+        cmocka_unit_test(checks_pass_on_right_gradients), cmocka_unit_test(check_all_lists_every_parameter),
+        cmocka_unit_test(variances_are_written), cmocka_unit_test(descriptions),
         cmocka_unit_test(interruption_exits_with_130),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

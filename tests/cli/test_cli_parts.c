@@ -106,7 +106,27 @@ static CheckResult noisy_check(double factor, uint32_t seed) {
         derivative[i] = shared + 0.02 * normal(&seed);
         difference[i] = factor * shared + 0.02 * normal(&seed);
     }
-    return check_compare(&blocks, derivative, difference, 0);
+    return check_compare(&blocks, derivative, difference, difference, 0);
+}
+
+// A difference of lower order that is off by a part of each block's value, under noise.
+static bool long_step(double apart, double noise, uint32_t seed) {
+    static double difference[CHECK_SETS * ROW], rough[CHECK_SETS * ROW];
+    Blocks blocks = check_blocks(SIZE, SIZE);
+    for (int i = 0; i < CHECK_SETS * ROW; i++) {
+        difference[i] = 1;
+        rough[i] = 1 + apart + noise * normal(&seed);
+    }
+    return check_compare(&blocks, difference, difference, rough, 0).step_matters;
+}
+
+static void long_steps_are_seen(void **state) {
+    (void)state;
+    for (uint32_t seed = 1; seed <= 20; seed++) {
+        assert_true(long_step(0.1, 0.1, seed));
+        assert_false(long_step(0.001, 0.001, seed)); // harmless
+        assert_false(long_step(0, 0.5, seed));       // noise
+    }
 }
 
 static bool accepted(CheckResult r) {
@@ -267,7 +287,7 @@ int main(void) {
         cmocka_unit_test(numbers_are_all_or_nothing),
         cmocka_unit_test(json_is_escaped_and_exact),
         cmocka_unit_test(json_reader_refuses_broken_text),
-        cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
+        cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
         cmocka_unit_test(blocks_are_means),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),

@@ -1,0 +1,42 @@
+// check.h: what the parts of `reynolds check` share.
+#pragma once
+
+#include "check_stats.h"
+#include "cli.h"
+
+enum { CHECK_POINTS = 4, CHECK_HALVINGS = 6 };
+
+// difference = sum of weights * picture(theta + offset * direction); rough: the same of lower order, whose distance from
+// the difference says how much the step matters.
+typedef struct Step {
+    double h;
+    double offsets[CHECK_POINTS], weights[CHECK_POINTS], rough[CHECK_POINTS];
+} Step;
+
+typedef enum Verdict {
+    VERDICT_OK,
+    VERDICT_NO_EFFECT,
+    VERDICT_WEAK,    // too noisy to say
+    VERDICT_WRONG,
+    VERDICT_PARTIAL, // of --all with --terms: terms are left out, and the difference shows it
+    VERDICT_REFUSED  // of --all: no complete derivative
+} Verdict;
+
+typedef struct Check { // one direction
+    const char *spec;
+    Direction direction;
+    Step step;
+    CheckResult result;
+    double reverse_error; // |reverse - forward| over the mean of |derivative|
+    Verdict verdict;
+    char *refusal;        // why there is no complete derivative; owned
+} Check;
+
+// Largest difference between forward and reverse mode, which sum the same samples in float in another order.
+#define CHECK_REVERSE_TOLERANCE 1e-4
+// A direction whose noise is a larger part of its signal than this is weak.
+#define CHECK_WEAK 0.1
+
+const char *check_verdict_name(Verdict verdict);
+void check_print_table(const Check *checks, int count, double threshold);
+void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold);
