@@ -222,6 +222,29 @@ static bool parse_lanes(Options *o, const char *value) {
     return known;
 }
 
+// Options without a value.
+static void apply_switch(Options *o, OptionId id) {
+    switch (id) {
+    case OPTION_ALL:
+        o->all = true;
+        break;
+    case OPTION_VARIANCE:
+        o->variance = true;
+        break;
+    case OPTION_RESUME:
+        o->resume = true;
+        break;
+    case OPTION_OVERWRITE:
+        o->overwrite = true;
+        break;
+    case OPTION_JSON:
+        o->json = true;
+        break;
+    default:
+        break;
+    }
+}
+
 static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     static const char *const samplers[] = {"independent", "sobol", NULL};
     static const char *const modes[] = {"forward", "reverse", NULL};
@@ -262,26 +285,12 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         return true;
     case OPTION_TERMS:
         return parse_terms(o, value);
-    case OPTION_ALL:
-        o->all = true;
-        return true;
     case OPTION_STEP:
         return parse_step(o, value);
-    case OPTION_VARIANCE:
-        o->variance = true;
-        return true;
     case OPTION_SET:
         return parse_set(o, value);
-    case OPTION_RESUME:
-        o->resume = true;
-        return true;
-    case OPTION_OVERWRITE:
-        o->overwrite = true;
-        return true;
-    case OPTION_JSON:
-        o->json = true;
-        return true;
     default:
+        apply_switch(o, row->id);
         return true;
     }
 }
