@@ -7,6 +7,7 @@
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -132,11 +133,61 @@ static void print_words(const FitResult *result) {
     }
 }
 
+static void free_overrides(char **texts, int count) {
+    for (int i = 0; i < count && texts; i++) {
+        free(texts[i]);
+    }
+    free(texts);
+}
+
+// -D and --spp are entries of the job, as --set would write them. Returns the overrides, owned with their texts; null when
+// there is no memory.
+static char **job_overrides(const Options *o, int *count) {
+    char **texts = calloc((size_t)(o->set_count + o->define_count + 1), sizeof *texts);
+    bool whole = texts != NULL;
+    int n = 0;
+    for (int i = 0; i < o->set_count && whole; i++) {
+        whole = (texts[n++] = strdup(o->sets[i])) != NULL;
+    }
+    for (int i = 0; i < o->define_count && whole; i++) {
+        const rey_define *d = &o->defines[i];
+        size_t size = strlen(d->name) + 2 * strlen(d->value) + 16;
+        char *text = texts[n++] = malloc(size);
+        whole = text != NULL;
+        int at = whole ? snprintf(text, size, "defines.%s=\"", d->name) : 0;
+        for (const char *c = d->value; whole && *c; c++) {
+            if (*c == '"' || *c == '\\') {
+                text[at++] = '\\';
+            }
+            text[at++] = *c;
+        }
+        if (whole) {
+            memcpy(text + at, "\"", 2);
+        }
+    }
+    if (o->spp && whole) {
+        char text[32];
+        snprintf(text, sizeof text, "spp=%d", o->spp);
+        whole = (texts[n++] = strdup(text)) != NULL;
+    }
+    *count = n;
+    if (!whole) {
+        free_overrides(texts, n);
+        return NULL;
+    }
+    return texts;
+}
+
 static int run(const Options *options, Session *session) {
+    int override_count = 0;
+    char **overrides = job_overrides(options, &override_count);
+    if (!overrides) {
+        return cli_fail(options, "out of memory");
+    }
     Display display = {.terminal = isatty(STDERR_FILENO) != 0, .shown = rey_seconds()};
     FitDef def = {.job_path = options->files[0],
-                  .overrides = options->sets,
-                  .override_count = options->set_count,
+                  .overrides = (const char *const *)overrides,
+                  .override_count = override_count,
                   .output = options->output,
                   .resume = options->resume,
                   .overwrite = options->overwrite,
@@ -164,6 +215,7 @@ static int run(const Options *options, Session *session) {
         status = cli_finish_output();
     }
     rey_fit_result_free(&result);
+    free_overrides(overrides, override_count);
     return status;
 }
 

@@ -28,10 +28,23 @@ static void hangups_stop_fits(void **state) {
     assert_int_equal(access("fit/checkpoint.bin", R_OK), 0);
 }
 
+// -D and --spp of a fit are entries of its job.
+static void fits_take_the_common_options(void **state) {
+    (void)state;
+    char command[4096];
+    snprintf(command, sizeof command,
+             "'%s' render '%s/truth.xml' -o target.exr --spp 16 2>words.txt && '%s' fit '%s/job.yaml' --set "
+             "views.0.target=$PWD/target.exr --set iterations=2 -o short -D 'red=0.2, 0.3, 0.4' --spp 8 >out.txt 2>words.txt"
+             " && grep -q 'red: .0.2, 0.3, 0.4.' short/job.resolved.yaml && grep -q 'spp: 8' short/job.resolved.yaml",
+             REYNOLDS_COMMAND, TEST_JOBS, REYNOLDS_COMMAND, TEST_JOBS);
+    assert_int_equal(system(command), 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outputs_may_be_devices),
         cmocka_unit_test(hangups_stop_fits),
+        cmocka_unit_test(fits_take_the_common_options),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
