@@ -178,7 +178,22 @@ static char **job_overrides(const Options *o, int *count) {
     return texts;
 }
 
-static int run(const Options *options, Session *session) {
+// The command line, with what a shell would split in quotes.
+static char *command_text(int argc, char **argv) {
+    size_t size = sizeof "reynolds";
+    for (int i = 0; i < argc; i++) {
+        size += 4 * strlen(argv[i]) + 3;
+    }
+    char *text = malloc(size);
+    size_t at = text ? (size_t)snprintf(text, size, "reynolds") : 0;
+    for (int i = 0; text && i < argc; i++) {
+        bool plain = argv[i][0] && !argv[i][strcspn(argv[i], " \t\n'\"$&|;<>()*?[]{}\\`!#~")];
+        at += (size_t)snprintf(text + at, size - at, plain ? " %s" : " '%s'", argv[i]);
+    }
+    return text;
+}
+
+static int run(const Options *options, Session *session, const char *command) {
     int override_count = 0;
     char **overrides = job_overrides(options, &override_count);
     if (!overrides) {
@@ -189,6 +204,7 @@ static int run(const Options *options, Session *session) {
                   .overrides = (const char *const *)overrides,
                   .override_count = override_count,
                   .output = options->output,
+                  .command = command,
                   .resume = options->resume,
                   .overwrite = options->overwrite,
                   .seed_given = options->seed_given,
@@ -235,7 +251,9 @@ int cli_fit(int argc, char **argv) {
     }
     status = cli_context_open(&options, &session);
     if (!status) {
-        status = run(&options, &session);
+        char *command = command_text(argc, argv);
+        status = run(&options, &session, command);
+        free(command);
         cli_session_close(&session);
     }
     cli_options_free(&options);

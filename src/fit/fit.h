@@ -16,6 +16,7 @@ typedef struct FitDef {
     const char *const *overrides; // "key=value"
     int override_count;
     const char *output; // folder, null = the job's
+    const char *command; // what the user typed, for the report; may be null
     bool resume;
     bool overwrite; // start again where the folder holds another fit, or this one unfinished
     bool seed_given; // seed replaces the job's

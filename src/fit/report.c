@@ -96,7 +96,7 @@ static rey_result put_table(Fit *fit, const FitResult *out, Text *html) {
     bool weighted = false;
     rey_result result = REY_OK;
     rey_text_add(html, "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>truth</th>"
-                       "<th>start</th><th>found</th><th class=\"n\">error</th><th>history</th></tr></thead><tbody>\n");
+                       "<th>start</th><th>found</th><th class=\"n\">error</th><th>history, truth dashed</th></tr></thead><tbody>\n");
     for (size_t i = 0; i < out->rows.count && !result; i++) {
         const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
         result = put_row(fit, row, column, html);
@@ -139,6 +139,12 @@ static rey_result put_machine(Fit *fit, const FitResult *out, Text *html) {
     rey_text_add(html, "<h2>How it was made</h2>\n<dl><dt>version</dt><dd>Reynolds %s</dd><dt>processor</dt><dd>",
                  rey_version());
     put_cpu(html);
+    if (fit->def->command) {
+        rey_text_add(html, "</dd><dt>command</dt><dd><code>");
+        rey_text_html(html, fit->def->command);
+        rey_text_add(html, "</code>");
+    }
+    rey_text_add(html, "</dd><dt>seed</dt><dd>%u", (unsigned)fit->job.seed);
     rey_text_add(html, "</dd><dt>threads, lanes</dt><dd>%d, %d</dd>", rey_threads(fit->ctx), rey_lanes(fit->ctx));
     rey_text_add(html, "<dt>optimisation</dt><dd>%.1f s, %.3g s an iteration</dd><dt>finished</dt><dd>%s</dd></dl>\n",
                  out->seconds, out->iterations ? out->seconds / out->iterations : 0, date);

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-enum { WIDE = 880, HIGH = 240, LEFT = 56, BOTTOM = 34, SPARK_WIDE = 150, SPARK_HIGH = 34, MOST_POINTS = 440 };
+enum { WIDE = 880, HIGH = 240, LEFT = 56, BOTTOM = 34, SPARK_WIDE = 150, SPARK_HIGH = 34, SPARK_LABEL = 48, MOST_POINTS = 440 };
 
 static double cell(const Fit *fit, int64_t row, int column) {
     return ARRAY_AT(fit->state.history, double, (size_t)(row * fit->state.history_width + column));
@@ -94,6 +94,10 @@ void rey_report_loss(const Fit *fit, Text *html) {
     loss_axes(fit, axis, html);
     loss_curve(fit, axis, bins, 0, "raw", html);
     loss_curve(fit, axis, bins, bins / 60, "line", html);
+    rey_text_add(html, "<line class=\"raw\" x1=\"%d\" x2=\"%d\" y1=\"12\" y2=\"12\"/><text x=\"%d\" y=\"16\">each "
+                       "iteration&rsquo;s estimate</text><line class=\"line\" x1=\"%d\" x2=\"%d\" y1=\"28\" y2=\"28\"/>"
+                       "<text x=\"%d\" y=\"32\">running mean</text>\n",
+                 WIDE - 190, WIDE - 165, WIDE - 158, WIDE - 190, WIDE - 165, WIDE - 158);
     rey_text_add(html, "</svg>\n");
 }
 
@@ -112,7 +116,11 @@ void rey_report_curve(const Fit *fit, int column, int64_t count, const float *tr
         }
     }
     double range = high > low ? high - low : 1;
-    rey_text_add(html, "<svg width=\"%d\" height=\"%d\" role=\"img\" aria-label=\"history\">", SPARK_WIDE, SPARK_HIGH);
+    rey_text_add(html, "<svg width=\"%d\" height=\"%d\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"history\">",
+                 SPARK_WIDE + SPARK_LABEL, SPARK_HIGH, SPARK_WIDE + SPARK_LABEL, SPARK_HIGH);
+    rey_text_add(html, "<line class=\"grid\" x1=\"0\" x2=\"%d\" y1=\"%d\" y2=\"%d\"/><text x=\"%d\" y=\"9\">%.3g</text>"
+                       "<text x=\"%d\" y=\"%d\">%.3g</text>",
+                 SPARK_WIDE, SPARK_HIGH - 1, SPARK_HIGH - 1, SPARK_WIDE + 5, high, SPARK_WIDE + 5, SPARK_HIGH, low);
     for (int64_t k = 0; k < count; k++) {
         if (truth) {
             double y = 2 + (SPARK_HIGH - 4) * (high - (double)truth[k]) / range;

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { SMALL_PICTURE = 128 }; // pixels across, below which enlarged pixels stay square
+
 static const uint32_t REPORT_SET = 0xfffffff0u; // sample sets that no iteration uses
 
 static int compare_floats(const void *a, const void *b) {
@@ -123,13 +125,15 @@ static void comparison(Text *html, int view) {
         }
         rey_text_add(html, "</select>");
     }
-    rey_text_add(html, "</div></div>\n");
+    rey_text_add(html, "</div><label class=\"stops\">exposure <input type=\"range\" min=\"-4\" max=\"4\" step=\"0.5\" "
+                       "value=\"0\"> <output>0</output> stops</label></div>\n");
 }
 
 static rey_result view_section(Fit *fit, int index, const float *start, const float *result_image, Text *html) {
     const FitView *view = &fit->views[index];
     float exposure = rey_report_exposure(fit->ctx, view->target, (int64_t)view->width * view->height), scale = 0;
-    rey_text_add(html, "<section><h3>View %d <span class=\"note\">sensor %d, %d &times; %d", index, view->sensor,
+    rey_text_add(html, view->width < SMALL_PICTURE ? "<section class=\"small\">" : "<section>");
+    rey_text_add(html, "<h3>View %d <span class=\"note\">sensor %d, %d &times; %d", index, view->sensor,
                  view->width, view->height);
     if (exposure < 1 || exposure > 1) {
         rey_text_add(html, ", shown at exposure &times;%.3g", (double)exposure);
@@ -152,8 +156,9 @@ static rey_result view_section(Fit *fit, int index, const float *start, const fl
     if (!result) {
         result = difference_image(html, view, result_image, &scale);
     }
-    rey_text_add(html, "<figcaption>result &minus; target, &plusmn;%.2g</figcaption></figure></div></section>\n",
-                 (double)scale);
+    rey_text_add(html, "<figcaption>result &minus; target, mean of the channels<span class=\"bar\">&minus;%.2g<i></i>+%.2g"
+                       "</span></figcaption></figure></div></section>\n",
+                 (double)scale, (double)scale);
     return result;
 }
 
