@@ -230,7 +230,7 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
         {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
         {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
         {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
-        {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .high = 1e9},
+        {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .low = 1e-9, .high = 1e9},
         {0},
     };
     JobView **views = target;

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+static const double LOG_FLOOR = 1e-6; // lower bound where a parameter has none and log needs one
+
 static bool glob_match(const char *pattern, const char *text) {
     const char *star = NULL, *resume = NULL;
     while (*text) {
@@ -45,7 +47,7 @@ static rey_result set_bounds(Job *job, const JobParameter *p, const rey_param_in
     }
     if (p->parameterisation == PARAMETERISATION_LOG) {
         if (!(unknown->low > 0)) {
-            unknown->low = 1e-6; // log needs a positive lower bound
+            unknown->low = LOG_FLOOR; // log needs a positive lower bound
         }
         if (!(unknown->high > unknown->low)) {
             return fail_at(job, p, info->name, "parameterisation log needs positive bounds");
@@ -109,6 +111,21 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     }
     for (int64_t i = 0; i < unknown->count; i++) { // shorter lists repeat: a colour for every texel
         start[i] = (float)p->start[i % p->start_count];
+    }
+    return REY_OK;
+}
+
+// A start that would be moved before the first iteration is not what the job asked for.
+static rey_result check_start(Job *job, const JobParameter *p, const Unknown *unknown, const float *start) {
+    bool open_log = p->parameterisation == PARAMETERISATION_LOG && unknown->low <= LOG_FLOOR;
+    for (int64_t i = 0; i < unknown->count; i++) {
+        bool low = start[i] < (float)unknown->low && !(open_log && start[i] >= 0);
+        if (low || start[i] > (float)unknown->high) {
+            char why[160];
+            snprintf(why, sizeof why, "entry %lld starts at %g, outside of its bounds %g to %g", (long long)i,
+                     (double)start[i], unknown->low, unknown->high);
+            return fail_at(job, p, unknown->name, why);
+        }
     }
     return REY_OK;
 }
@@ -205,7 +222,11 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
     for (size_t i = 0; i < u->items.count && !result; i++) {
         const Unknown *unknown = &ARRAY_AT(u->items, Unknown, i);
         u->params[i] = unknown->param;
-        result = set_start(job, scene, &job->parameters[ARRAY_AT(owners, int, i)], unknown, u->start + unknown->offset);
+        const JobParameter *p = &job->parameters[ARRAY_AT(owners, int, i)];
+        result = set_start(job, scene, p, unknown, u->start + unknown->offset);
+        if (!result) {
+            result = check_start(job, p, unknown, u->start + unknown->offset);
+        }
     }
     rey_array_free(job->ctx, &owners);
     if (!result) {
