@@ -125,6 +125,9 @@ int cli_context_open(const Options *options, Session *session) {
     if (result == REY_ERROR_UNSUPPORTED) {
         return cli_fail(options, "this machine cannot run %d lanes, at most %d", options->lanes, rey_widest_lanes());
     }
+    if (result == REY_ERROR_ARGUMENT) {
+        return cli_fail(options, "%s", rey_context_problem(&def));
+    }
     return result ? cli_fail(options, "%s", rey_result_text(result)) : EXIT_OK;
 }
 

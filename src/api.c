@@ -5,10 +5,17 @@
 
 rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                           rey_scene **out) {
-    if (!ctx || !path || !out || (define_count && !defines)) {
-        return REY_ERROR_ARGUMENT;
+    rey_result result = rey_begin(ctx, path && out && (!define_count || defines));
+    if (out) {
+        *out = NULL;
     }
-    rey_result result = rey_mitsuba_load(ctx, path, defines, define_count, false, out);
+    if (result != REY_OK) {
+        return result;
+    }
+    if (define_count < 0) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "define_count is %d, expected at least 0", define_count);
+    }
+    result = rey_mitsuba_load(ctx, path, defines, define_count, false, out);
     if (result == REY_OK) {
         result = rey_scene_update(*out);
     }
@@ -20,10 +27,18 @@ rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *
 }
 
 rey_result rey_scene_save(const rey_scene *scene, const char *path) {
-    return scene && path ? rey_mitsuba_save(scene, path) : REY_ERROR_ARGUMENT;
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, path != NULL);
+    return result == REY_OK ? rey_mitsuba_save(scene, path) : result;
 }
 
 rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height) {
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, width && height);
+    if (result != REY_OK) {
+        return result;
+    }
+    if (scene->view.sensors_count == 0) {
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
+    }
     if (sensor < 0 || sensor >= scene->view.sensors_count) {
         return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", sensor,
                         (int)scene->view.sensors_count);
@@ -34,7 +49,7 @@ rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, i
 }
 
 int rey_scene_sensor_count(const rey_scene *scene) {
-    return (int)scene->view.sensors_count;
+    return scene ? (int)scene->view.sensors_count : 0;
 }
 
 int rey_scene_note_count(const rey_scene *scene) {
@@ -46,6 +61,9 @@ const char *rey_scene_note(const rey_scene *scene, int note) {
 }
 
 void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info) {
+    if (!scene || !info) {
+        return;
+    }
     const SceneView *v = &scene->view;
     *info = (rey_scene_info){.shapes = v->shapes_count,
                              .bsdfs = v->bsdfs_count,

@@ -1,8 +1,8 @@
 /* reynolds.h: the whole public C API of Reynolds, physics-based differentiable rendering.
  *
  * Compiles alone as C99, C11 and C++17. Every function that can fail returns a rey_result; the message
- * (file, line, value, allowed range) stays in the context until the next failure. The library never prints,
- * aborts or exits. A context may be used by one thread at a time; different contexts are independent.
+ * (file, line, value, allowed range) stays in the context until its next call. Null where something must be given is
+ * REY_ERROR_ARGUMENT, and 0, -1 or null from functions that return a value. The library never prints, aborts or exits. A context may be used by one thread at a time; different contexts are independent.
  *
  * Images are float32, linear sRGB, row major from the top left: image[(y * width + x) * 3 + channel]. */
 #ifndef REYNOLDS_H
@@ -66,9 +66,11 @@ REY_API rey_context_def rey_default_context_def(void);
 
 /* Creates a context. def may be null for the defaults. The caller owns *out and destroys it after its scenes. */
 REY_API rey_result rey_context_create(const rey_context_def *def, rey_context **out);
+/* What is wrong with a def, in words; "" when nothing is. */
+REY_API const char *rey_context_problem(const rey_context_def *def);
 REY_API void rey_context_destroy(rey_context *ctx);
 
-/* The last failure's message. Never null; valid until the next failing call on this context. */
+/* The message of the latest call when it failed, "" when it did not. Never null; valid until the next call. */
 REY_API const char *rey_error(const rey_context *ctx);
 REY_API const char *rey_result_text(rey_result result);
 REY_API const char *rey_version(void);

@@ -21,22 +21,40 @@ rey_context_def rey_default_context_def(void) {
     return (rey_context_def){.size = sizeof(rey_context_def), .alloc = default_alloc, .release = default_release};
 }
 
+static bool known_lanes(int lanes) {
+    return lanes == 0 || lanes == 1 || lanes == 8 || lanes == 16;
+}
+
+const char *rey_context_problem(const rey_context_def *def) {
+    if (!def) {
+        return "";
+    }
+    if (def->size != sizeof *def) {
+        return "rey_context_def must come from rey_default_context_def";
+    }
+    if (!def->alloc || !def->release) {
+        return "alloc and release must both be given";
+    }
+    if (def->threads < 0) {
+        return "threads must be at least 0";
+    }
+    if (!known_lanes(def->lanes)) {
+        return "lanes must be 0, 1, 8 or 16";
+    }
+    return def->lanes > rey_widest_lanes() ? "this machine does not run so many lanes" : "";
+}
+
 rey_result rey_context_create(const rey_context_def *def, rey_context **out) {
     if (!out) {
         return REY_ERROR_ARGUMENT;
     }
     *out = NULL;
     rey_context_def d = def ? *def : rey_default_context_def();
-    if (d.size != sizeof d || !d.alloc || !d.release || d.threads < 0) {
-        return REY_ERROR_ARGUMENT;
+    if (rey_context_problem(&d)[0]) {
+        return d.size == sizeof d && known_lanes(d.lanes) && d.lanes > rey_widest_lanes() ? REY_ERROR_UNSUPPORTED
+                                                                                         : REY_ERROR_ARGUMENT;
     }
-    int widest = rey_widest_lanes();
-    if (d.lanes == 0) {
-        d.lanes = widest;
-    }
-    if ((d.lanes != 1 && d.lanes != 8 && d.lanes != 16) || d.lanes > widest) {
-        return REY_ERROR_UNSUPPORTED;
-    }
+    d.lanes = d.lanes ? d.lanes : rey_widest_lanes();
     d.threads = rey_useful_threads(d.threads);
     rey_context *ctx = d.alloc(d.user, sizeof *ctx, 64);
     if (!ctx) {
@@ -55,15 +73,15 @@ void rey_context_destroy(rey_context *ctx) {
 }
 
 const char *rey_error(const rey_context *ctx) {
-    return ctx ? ctx->message : "no context";
+    return ctx ? ctx->message : "there is no context; rey_context_problem says why one cannot be created";
 }
 
 int rey_threads(const rey_context *ctx) {
-    return ctx->def.threads;
+    return ctx ? ctx->def.threads : 0;
 }
 
 int rey_lanes(const rey_context *ctx) {
-    return ctx->def.lanes;
+    return ctx ? ctx->def.lanes : 0;
 }
 
 const char *rey_version(void) {
@@ -85,6 +103,14 @@ rey_result rey_fail(rey_context *ctx, rey_result code, const char *format, ...) 
     vsnprintf(ctx->message, sizeof ctx->message, format, arguments);
     va_end(arguments);
     return code;
+}
+
+rey_result rey_begin(rey_context *ctx, bool all) {
+    if (!ctx) {
+        return REY_ERROR_ARGUMENT;
+    }
+    ctx->message[0] = 0;
+    return all ? REY_OK : rey_fail(ctx, REY_ERROR_ARGUMENT, "an argument is null that must not be");
 }
 
 rey_result rey_fail_memory(rey_context *ctx, size_t bytes) {

@@ -14,6 +14,9 @@ struct rey_context {
 // Records a message and returns the code, so that a failure reads `return rey_fail(ctx, REY_ERROR_IO, ...)`.
 rey_result rey_fail(rey_context *ctx, rey_result code, const char *format, ...) PRINTF_LIKE(3, 4);
 rey_result rey_fail_memory(rey_context *ctx, size_t bytes);
+// Public functions begin here: forgets the message of an earlier call, and refuses a null context or, when `all` is
+// false, arguments that must not be null.
+rey_result rey_begin(rey_context *ctx, bool all);
 
 // Zeroed, 64-byte aligned memory from the context's allocator; null (and a recorded message) on failure.
 // bytes 0 returns a valid pointer. rey_free accepts null.

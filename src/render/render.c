@@ -59,6 +59,13 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
     if (!def || def->size != sizeof *def) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "rey_render_def must come from rey_default_render_def");
     }
+    if (!scene->integrator) {
+        return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no integrator, expected one such as <integrator "
+                                              "type=\"path\"/>");
+    }
+    if (scene->view.sensors_count == 0) {
+        return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
+    }
     if (def->sensor < 0 || def->sensor >= scene->view.sensors_count) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", def->sensor,
                         (int)scene->view.sensors_count);
@@ -72,6 +79,9 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
     }
     if (def->sampler < REY_SAMPLER_DEFAULT || def->sampler > REY_SAMPLER_SOBOL) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sampler = %d is none of REY_SAMPLER_*", def->sampler);
+    }
+    if (def->terms & ~REY_TERM_ALL) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "terms = %d holds bits that are none of REY_TERM_*", def->terms);
     }
     return REY_OK;
 }
@@ -210,7 +220,11 @@ rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image,
     double start = rey_seconds();
     Render r;
     double *picture = NULL;
-    rey_result result = render_begin(&r, scene, def, MODE_PRIMAL);
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, image != NULL);
+    if (result != REY_OK) {
+        return result;
+    }
+    result = render_begin(&r, scene, def, MODE_PRIMAL);
     if (result == REY_OK) {
         picture = rey_alloc_array(scene->ctx, (size_t)picture_floats(&r), sizeof *picture);
         result = picture ? REY_OK : REY_ERROR_MEMORY;
@@ -351,6 +365,10 @@ static uint32_t set_scramble(const Render *r, int set) {
     return rng_scramble(r->def.seed, number, (uint32_t)r->def.sensor, r->def.sets == 1 ? 0 : 1);
 }
 
+static bool selection_given(rey_selection selection) {
+    return selection.count == 0 || (selection.count > 0 && selection.params);
+}
+
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
                                    int32_t mode) {
     rey_result result = render_begin(r, scene, def, mode);
@@ -383,7 +401,11 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
                    double *gradient, double *set_gradients, rey_stats *stats) {
     double start = rey_seconds();
     Render r;
-    rey_result result = derivative_begin(&r, scene, def, selection, MODE_REVERSE);
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, adjoint && gradient && selection_given(selection));
+    if (result != REY_OK) {
+        return result;
+    }
+    result = derivative_begin(&r, scene, def, selection, MODE_REVERSE);
     if (result == REY_OK) {
         result = prepare_adjoint(&r, adjoint);
     }
@@ -420,7 +442,11 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
     double start = rey_seconds();
     Render r;
     double *pictures = NULL;
-    rey_result result = derivative_begin(&r, scene, def, selection, MODE_FORWARD);
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, tangent && derivative && selection_given(selection));
+    if (result != REY_OK) {
+        return result;
+    }
+    result = derivative_begin(&r, scene, def, selection, MODE_FORWARD);
     int64_t n = 0;
     if (result == REY_OK) {
         n = picture_floats(&r);

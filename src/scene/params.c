@@ -32,16 +32,20 @@ rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param) {
 }
 
 static const Param *param_at(const rey_scene *scene, int i) {
-    return i >= 0 && (size_t)i < scene->params.count ? &ARRAY_AT(scene->params, Param, i) : NULL;
+    return scene && i >= 0 && (size_t)i < scene->params.count ? &ARRAY_AT(scene->params, Param, i) : NULL;
 }
 
 int rey_param_count(const rey_scene *scene) {
-    return (int)scene->params.count;
+    return scene ? (int)scene->params.count : 0;
 }
 
 rey_result rey_param_get_info(const rey_scene *scene, int param, rey_param_info *info) {
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, info != NULL);
+    if (result != REY_OK) {
+        return result;
+    }
     const Param *p = param_at(scene, param);
-    if (!p || !info) {
+    if (!p) {
         return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "there is no parameter number %d", param);
     }
     *info = (rey_param_info){.name = p->name, .unit = p->unit, .description = p->description, .count = p->count,
@@ -53,6 +57,9 @@ rey_result rey_param_get_info(const rey_scene *scene, int param, rey_param_info 
 }
 
 int rey_param_find(const rey_scene *scene, const char *name) {
+    if (!scene || !name) {
+        return -1;
+    }
     for (size_t i = 0; i < scene->params.count; i++) {
         if (strcmp(ARRAY_AT(scene->params, Param, i).name, name) == 0) {
             return (int)i;
@@ -76,7 +83,7 @@ static const char *param_word(void *user, int i) {
 }
 
 const char *rey_param_nearest(const rey_scene *scene, const char *name) {
-    return rey_nearest_word(name, param_word, (void *)(uintptr_t)scene);
+    return scene && name ? rey_nearest_word(name, param_word, (void *)(uintptr_t)scene) : NULL;
 }
 
 const float *rey_param_values(const rey_scene *scene, int param) {
@@ -148,12 +155,13 @@ void rey_scene_mark_changes(rey_scene *scene) {
 }
 
 rey_result rey_param_set(rey_scene *scene, int param, const float *values, int64_t count) {
-    return rey_scene_set(scene, param, values, count);
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, values != NULL);
+    return result == REY_OK ? rey_scene_set(scene, param, values, count) : result;
 }
 
 int64_t rey_selection_size(const rey_scene *scene, rey_selection selection) {
     int64_t size = 0;
-    for (int i = 0; i < selection.count; i++) {
+    for (int i = 0; selection.params && i < selection.count; i++) {
         const Param *p = param_at(scene, selection.params[i]);
         size += p ? p->count : 0;
     }
