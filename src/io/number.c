@@ -3,6 +3,7 @@
 #include "io/number.h"
 
 #include <errno.h>
+#include <float.h>
 #include <locale.h>
 #include <math.h>
 #include <stdlib.h>
@@ -54,6 +55,10 @@ bool rey_parse_real(const char *text, const char **end, double *value) {
     *end = stop;
     *value = v;
     return true;
+}
+
+bool rey_parse_single(const char *text, const char **end, double *value) {
+    return rey_parse_real(text, end, value) && fabs(*value) <= (double)FLT_MAX;
 }
 
 bool rey_parse_integer(const char *text, const char **end, int64_t *value) {

@@ -7,6 +7,9 @@
 // forms, "nan", "inf" and numbers too large for a double are refused.
 bool rey_parse_real(const char *text, const char **end, double *value);
 
+// The same for numbers that end up in single precision: those too large for it are refused as well.
+bool rey_parse_single(const char *text, const char **end, double *value);
+
 // Reads one decimal integer at text; false when there is none or it does not fit.
 bool rey_parse_integer(const char *text, const char **end, int64_t *value);
 

@@ -146,7 +146,7 @@ static bool read_line(const char *line, double *pair, size_t *pairs) {
         return true;
     }
     for (int i = 0; i < 2; i++) {
-        if (!rey_parse_real(line, &line, &pair[i]) || (*line && !rey_is_blank(*line))) {
+        if (!rey_parse_single(line, &line, &pair[i]) || (*line && !rey_is_blank(*line))) {
             return false;
         }
         while (rey_is_blank(*line)) {

@@ -76,6 +76,13 @@ typedef struct rey_xml_child {
     int order;
 } rey_xml_child;
 
+// Which properties and slots a builder has asked for: what an unknown one may have been meant to be.
+enum { REY_XML_MOST_ASKED = 40 };
+typedef struct rey_xml_asked {
+    const char *names[REY_XML_MOST_ASKED];
+    int count;
+} rey_xml_asked;
+
 typedef struct rey_xml_node {
     rey_xml_tag tag;
     const char *type; // plugin name; "scene" for a scene
@@ -86,6 +93,7 @@ typedef struct rey_xml_node {
     int property_count;
     rey_xml_child *children; // document order
     int child_count;
+    rey_xml_asked *asked; // kept by the getters
     int index;  // position in the document's list of nodes
     bool ignored; // left out by a lenient reader
     int built;  // free for the builder: -1 at first. Nodes are shared: build each once.
@@ -130,7 +138,8 @@ rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *
 
 // ---- properties --------------------------------------------------------------------------------------------------
 // All getters: an absent property gives the default and REY_OK; a property of the wrong kind is REY_ERROR_SCENE; a
-// property that is present is marked used. *out is written in every case but failure.
+// property that is present is marked used. *out is written in every case but failure. Names live as long as the
+// document, as literals do.
 
 rey_xml_property *rey_xml_find(const rey_xml_node *node, const char *name); // null when absent; does not mark
 bool rey_xml_has(const rey_xml_node *node, const char *name);               // a property or a named child
@@ -169,7 +178,8 @@ rey_xml_child *rey_xml_child_named(const rey_xml_node *node, const char *name);
 rey_xml_child *rey_xml_child_of(const rey_xml_node *node, unsigned tags, int index);
 int rey_xml_count_children(const rey_xml_node *node, unsigned tags); // marks nothing
 
-// An error that names the first property or child that nobody took, with the nearest of the known names.
+// An error that names the first property or child that nobody took, with the nearest of the known names; known null =
+// those that the getters were asked for.
 rey_result rey_xml_check_unused(rey_context *ctx, const rey_xml_node *node, const char *(*known)(void *user, int i),
                                 void *user);
 

@@ -75,12 +75,11 @@ static rey_result append(XmlReader *reader, Array *out, const char *text, size_t
     if (out->count + length > XML_LONGEST_VALUE || reader->substituted > XML_MOST_SUBSTITUTED) {
         return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "substitution makes this value too long");
     }
-    char *place = rey_array_push(reader->ctx, out, 1, length);
-    if (!place) {
-        return REY_ERROR_MEMORY;
+    char *place = length ? rey_array_push(reader->ctx, out, 1, length) : NULL;
+    if (place) {
+        memcpy(place, text, length);
     }
-    memcpy(place, text, length);
-    return REY_OK;
+    return place || !length ? REY_OK : REY_ERROR_MEMORY;
 }
 
 rey_result rey_xml_substitute(XmlReader *reader, const char *text, rey_xml_position at, const char **out) {

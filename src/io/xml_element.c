@@ -133,12 +133,14 @@ static rey_result check_version(XmlFile *file, const XmlTag *tag, const XmlAttri
 static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttributes *attributes) {
     XmlReader *reader = file->reader;
     rey_xml_node *node = rey_xml_keep(reader->ctx, reader->document, sizeof *node);
+    rey_xml_asked *asked = rey_xml_keep(reader->ctx, reader->document, sizeof *asked);
     rey_xml_node **listed =
-        node ? rey_array_push(reader->ctx, &reader->document->nodes, sizeof(rey_xml_node *), 1) : NULL;
+        node && asked ? rey_array_push(reader->ctx, &reader->document->nodes, sizeof(rey_xml_node *), 1) : NULL;
     if (!listed) {
         return REY_ERROR_MEMORY;
     }
     *listed = node;
+    node->asked = asked;
     node->tag = (rey_xml_tag)tag->which;
     node->at = rey_xml_element_position(file);
     rey_result result = keep_attribute(file, attributes, "id", &node->id);

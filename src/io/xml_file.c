@@ -67,6 +67,19 @@ rey_result rey_xml_search(rey_context *ctx, const rey_xml_document *document, co
     return REY_OK;
 }
 
+static size_t length_without_dots(const char *folder) {
+    size_t n = strlen(folder);
+    while (n > 1 && (folder[n - 1] == '/' || (n > 2 && folder[n - 1] == '.' && folder[n - 2] == '/'))) {
+        n--;
+    }
+    return n;
+}
+
+static bool same_folder(const char *a, const char *b) { // as far as their names say
+    size_t n = length_without_dots(a);
+    return n == length_without_dots(b) && memcmp(a, b, n) == 0;
+}
+
 rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
                              const char *first_folder, const char *path) {
     if (path[0] == '/') {
@@ -76,6 +89,13 @@ rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document,
     size_t used = 0;
     const char *folder;
     for (size_t i = 0; (folder = search_folder(document, first_folder, i)); i++) {
+        bool listed = false;
+        for (size_t k = 0; k < i && !listed; k++) {
+            listed = same_folder(search_folder(document, first_folder, k), folder);
+        }
+        if (listed) {
+            continue;
+        }
         int written = snprintf(list + used, sizeof list - used, "%s'%s'", i ? ", " : "", folder);
         if (written < 0 || (size_t)written >= sizeof list - used) {
             memcpy(list + sizeof list - 4, "...", 4);

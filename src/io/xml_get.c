@@ -1,12 +1,31 @@
 // xml_get.c: typed access to a node's properties and children, and the check that none was left over.
 #include "io/xml_parts.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
+static void note_asked(const rey_xml_node *node, const char *name) {
+    rey_xml_asked *asked = node->asked;
+    for (int i = 0; i < asked->count; i++) {
+        if (strcmp(asked->names[i], name) == 0) {
+            return;
+        }
+    }
+    if (asked->count < REY_XML_MOST_ASKED) {
+        asked->names[asked->count++] = name;
+    }
+}
+
+static const char *asked_name(void *user, int i) {
+    const rey_xml_asked *asked = user;
+    return i < asked->count ? asked->names[i] : NULL;
+}
+
 rey_xml_property *rey_xml_find(const rey_xml_node *node, const char *name) {
+    note_asked(node, name);
     for (int i = 0; i < node->property_count; i++) {
         if (strcmp(node->properties[i].name, name) == 0) {
             return &node->properties[i];
@@ -162,6 +181,10 @@ rey_result rey_xml_get_colour(rey_context *ctx, const rey_xml_node *node, const 
         } else if (property->kind != REY_XML_SPECTRUM_VALUE) {
             out[i] = property->number;
         }
+        if (!(fabs(out[i]) <= (double)FLT_MAX)) {
+            return rey_xml_fail(ctx, property->at, REY_ERROR_SCENE, "'%s' of %s '%.100s' is too large", name,
+                                rey_xml_tag_name(node->tag), node->type);
+        }
         bool low = use != REY_COLOUR_UNBOUNDED && out[i] < 0;
         if (low || (use == REY_COLOUR_REFLECTANCE && out[i] > 1)) {
             return rey_xml_fail(ctx, property->at, REY_ERROR_SCENE, "'%s' of %s '%.100s' has the component %g, %s",
@@ -198,6 +221,7 @@ rey_result rey_xml_get_ior(rey_context *ctx, const rey_xml_node *node, const cha
 // ---- children ----------------------------------------------------------------------------------------------------
 
 rey_xml_child *rey_xml_child_named(const rey_xml_node *node, const char *name) {
+    note_asked(node, name);
     rey_xml_child *child = find_child(node, name);
     if (child) {
         child->used = true;
@@ -245,6 +269,8 @@ rey_result rey_xml_check_unused(rey_context *ctx, const rey_xml_node *node, cons
                                 void *user) {
     const rey_xml_property *property = NULL;
     const rey_xml_child *child = NULL;
+    user = known ? user : node->asked;
+    known = known ? known : asked_name;
     for (int i = 0; i < node->property_count && !property; i++) {
         property = node->properties[i].used ? NULL : &node->properties[i];
     }

@@ -1,6 +1,7 @@
 // xml_transform.c: the operations of <transform>. Each multiplies from the left: the first listed acts first.
 #include "io/xml_parts.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -194,7 +195,7 @@ rey_result rey_xml_apply_operation(XmlReader *reader, const XmlTag *tag, const X
     }
     rey_xml_multiply_left(matrix, operation);
     for (int i = 0; i < 16; i++) {
-        if (!isfinite(matrix[i])) {
+        if (!(fabs(matrix[i]) <= (double)FLT_MAX)) {
             return rey_xml_fail(reader->ctx, at, REY_ERROR_SCENE, "the transform overflows");
         }
     }

@@ -24,6 +24,7 @@ static const char *skip_separators(const char *text) {
     return text;
 }
 
+// Numbers that are not finite, or not in the single precision that they end up in, are no numbers here.
 static rey_result fail_value(XmlReader *reader, const XmlAttribute *attribute, const char *expected) {
     return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s', expected %s", attribute->name,
                         attribute->value, strlen(attribute->value) > 60 ? "..." : "", expected);
@@ -34,7 +35,7 @@ static rey_result fail_value(XmlReader *reader, const XmlAttribute *attribute, c
 static void read_list(const char *text, int most, double *out, int *count) {
     *count = 0;
     for (const char *c = skip_separators(text); *c; c = skip_separators(c)) {
-        if (*count == most || !rey_parse_real(c, &c, &out[*count]) || (*c && !is_separator(*c))) {
+        if (*count == most || !rey_parse_single(c, &c, &out[*count]) || (*c && !is_separator(*c))) {
             *count = -1;
             return;
         }
@@ -44,7 +45,7 @@ static void read_list(const char *text, int most, double *out, int *count) {
 
 rey_result rey_xml_read_numbers(XmlReader *reader, const XmlAttribute *attribute, int most, double *out, int *count) {
     read_list(attribute->value, most, out, count);
-    return *count < 0 ? fail_value(reader, attribute, "numbers separated by blanks or commas") : REY_OK;
+    return *count < 0 ? fail_value(reader, attribute, "numbers up to 3.4e38 separated by blanks or commas") : REY_OK;
 }
 
 rey_result rey_xml_read_vector(XmlReader *reader, const XmlAttributes *attributes, double otherwise, double out[3]) {
@@ -96,8 +97,8 @@ static rey_result read_pairs(XmlReader *reader, const XmlAttribute *attribute, i
     double *values = wavelengths + count;
     int i = 0;
     for (const char *c = skip_separators(attribute->value); *c; c = skip_separators(c), i++) {
-        if (i == count || !rey_parse_real(c, &c, &wavelengths[i]) || *c++ != ':' ||
-            !rey_parse_real(c, &c, &values[i]) || (*c && !is_separator(*c))) {
+        if (i == count || !rey_parse_single(c, &c, &wavelengths[i]) || *c++ != ':' ||
+            !rey_parse_single(c, &c, &values[i]) || (*c && !is_separator(*c))) {
             return fail_value(reader, attribute, "one number, or pairs such as 400:0.1, 500:0.2 (wavelength in nm)");
         }
         if (i > 0 && wavelengths[i] <= wavelengths[i - 1]) {
@@ -152,7 +153,7 @@ static rey_result read_integer(XmlReader *reader, const XmlAttribute *value, rey
 
 static rey_result read_float(XmlReader *reader, const XmlAttribute *value, double *out) {
     const char *end = skip_blanks(value->value);
-    return rey_parse_real(end, &end, out) && !*skip_blanks(end) ? REY_OK : fail_value(reader, value, "a number");
+    return rey_parse_single(end, &end, out) && !*skip_blanks(end) ? REY_OK : fail_value(reader, value, "a number up to 3.4e38");
 }
 
 rey_result rey_xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,

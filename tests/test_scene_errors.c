@@ -1,0 +1,203 @@
+// test_scene_errors.c: scenes that are wrong, and where and in which words they are refused.
+#include "reynolds/reynolds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+typedef struct Case {
+    const char *text; // what stands in the scene, from its second line on
+    const char *words;
+} Case;
+
+#define INTEGRATOR "<integrator type=\"path\"/>"
+#define SENSOR                                                                                                         \
+    "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" value=\"4\"/>"                         \
+    "<integer name=\"height\" value=\"4\"/></film></sensor>"
+
+static char folder[64], path[96];
+
+static int make_folder(void **state) {
+    (void)state;
+    snprintf(folder, sizeof folder, "/tmp/reynolds_scene_errors_XXXXXX");
+    if (!mkdtemp(folder)) {
+        return 1;
+    }
+    snprintf(path, sizeof path, "%s/scene.xml", folder);
+    return 0;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    return unlink(path) || rmdir(folder);
+}
+
+static rey_result load(rey_context *ctx, const char *text, rey_scene **scene) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file, "<scene version=\"3.0.0\">\n%s</scene>\n", text);
+    assert_int_equal(fclose(file), 0);
+    return rey_scene_load(ctx, path, NULL, 0, scene);
+}
+
+static void check_cases(const Case *cases, size_t count) {
+    rey_context *ctx = NULL;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    int wrong = 0;
+    for (size_t i = 0; i < count; i++) {
+        rey_scene *scene = NULL;
+        rey_result result = load(ctx, cases[i].text, &scene);
+        if (result == REY_OK || !strstr(rey_error(ctx), cases[i].words)) {
+            print_error("%s\nresult %d: '%s'\nexpected '%s'\n\n", cases[i].text, result, rey_error(ctx),
+                        cases[i].words);
+            wrong++;
+        }
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
+    assert_int_equal(wrong, 0);
+}
+
+#define RADIUS(value) "<shape type='sphere'><float name='radius' value='" value "'/></shape>"
+
+static void numbers_are_finite(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {RADIUS("1e39"), "scene.xml:2:43: bad value '1e39', expected a number up to 3.4e38"},
+        {RADIUS("nan"), "scene.xml:2:43: bad value 'nan'"},
+        {RADIUS("inf"), "scene.xml:2:43: bad value 'inf'"},
+        {RADIUS("-1e400"), "scene.xml:2:43: bad value '-1e400'"},
+        {RADIUS(""), "scene.xml:2:43: bad value ''"},
+        {"<emitter type='point'><point name='position' x='1' y='1e39' z='0'/></emitter>", "scene.xml:2:52: bad y '1e39'"},
+        {"<emitter type='constant'><rgb name='radiance' value='1 nan 1'/></emitter>", "scene.xml:2:47: bad value"},
+        {"<emitter type='constant'><spectrum name='radiance' value='400:1 500:1e39'/></emitter>", "bad value '400:1 500"},
+        {"<emitter type='constant'><spectrum name='radiance' value='400:3e38 700:3e38'/></emitter>", "is too large"},
+        {"<shape type='sphere'><transform name='to_world'><matrix value='1 0 0 0 0 1 0 0 0 0 1 1e39 0 0 0 1'/>"
+         "</transform></shape>", "scene.xml:2:57: bad value"},
+        {"<shape type='sphere'><transform name='to_world'><scale value='1e30'/><scale value='1e30'/></transform>"
+         "</shape>", "the transform overflows"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+static void neighbours_are_named(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<shape type='sphere'><float name='radus' value='1'/></shape>",
+         "unknown property 'radus' of shape 'sphere', did you mean 'radius'?"},
+        {"<shape type='sphere'><point name='centre' value='1'/></shape>", "did you mean 'center'?"},
+        {"<shape type='rectangle'><boolean name='flip_normal' value='true'/></shape>", "did you mean 'flip_normals'?"},
+        {"<bsdf type='roughconductor'><float name='alpa' value='1'/></bsdf>", "did you mean 'alpha'?"},
+        {"<bsdf type='conductor'><string name='material' value='Agg'/></bsdf>", "did you mean 'Ag'?"},
+        {"<bsdf type='dielectric'><string name='int_ior' value='bk8'/></bsdf>", "did you mean 'bk7'?"},
+        {"<bsdf type='diffuse'><rgb name='reflectanse' value='0.5'/></bsdf>", "did you mean 'reflectance'?"},
+        {"<bsdf type='diffuse'><texture type='checkerboard' name='reflectanse'/></bsdf>", "did you mean 'reflectance'?"},
+        {"<sensor type='perspective'><float name='fow' value='1'/></sensor>", "did you mean 'fov'?"},
+        {"<sensor type='perspective'><film type='hdrfilm'><integer name='with' value='1'/></film></sensor>",
+         "did you mean 'width'?"},
+        {"<integrator type='path'><integer name='maxdepth' value='1'/></integrator>", "did you mean 'max_depth'?"},
+        {"<emitter type='point'><rgb name='intensty' value='1'/></emitter>", "did you mean 'intensity'?"},
+        {"<emitter type='constant'><rgb name='radiace' value='1'/></emitter>", "did you mean 'radiance'?"},
+        {"<shape type='sphere'><float nane='radius' value='1'/></shape>",
+         "scene.xml:2:29: unknown attribute 'nane' of <float>, did you mean 'name'?"},
+        {"<shape typ='sphere'/>", "unknown attribute 'typ' of <shape>, did you mean 'type'?"},
+        {"<shape type='spere'/>", "did you mean 'sphere'?"},
+        {"<shap type='sphere'/>", "did you mean 'shape'?"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+#define TWOSIDED(nested) "<bsdf type='twosided'>" nested "</bsdf>"
+
+static void twosided_is_opaque(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {TWOSIDED("<bsdf type='dielectric'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='thindielectric'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='roughdielectric'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='null'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='diffuse'/><bsdf type='dielectric'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='mask'><bsdf type='diffuse'/></bsdf>"), "lets light through"},
+        {TWOSIDED("<bsdf type='blendbsdf'><float name='weight' value='0.5'/><bsdf type='diffuse'/><bsdf "
+                  "type='dielectric'/></bsdf>"), "lets light through"},
+        {TWOSIDED("<bsdf type='bumpmap'><texture type='checkerboard'/><bsdf type='dielectric'/></bsdf>"),
+         "lets light through"},
+        {"<bsdf type='dielectric' id='glass'/>" TWOSIDED("<ref id='glass'/>"), "lets light through"},
+        {"<bsdf type='mask' id='net'><bsdf type='diffuse'/></bsdf>" TWOSIDED("<ref id='net'/>"), "lets light through"},
+        {TWOSIDED("<bsdf type='principled'><float name='spec_trans' value='0.5'/></bsdf>"), "lets light through"},
+        {TWOSIDED("<bsdf type='principledthin'/>"), "lets light through"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+// A scene without a camera or an integrator may be looked at, but not rendered.
+static void incomplete_scenes_do_not_render(void **state) {
+    (void)state;
+    static const Case cases[] = {{SENSOR, "no integrator"}, {INTEGRATOR, "no sensor"}};
+    rey_context *ctx = NULL;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        rey_scene *scene = NULL;
+        float image[4 * 4 * 3];
+        rey_render_def def = rey_default_render_def();
+        assert_int_equal(load(ctx, cases[i].text, &scene), REY_OK);
+        assert_int_equal(rey_render(scene, &def, image, NULL), REY_ERROR_SCENE);
+        if (!strstr(rey_error(ctx), cases[i].words)) {
+            fail_msg("'%s', expected '%s'", rey_error(ctx), cases[i].words);
+        }
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
+}
+
+static void folders_are_listed_once(void **state) {
+    (void)state;
+    rey_context *ctx = NULL;
+    rey_scene *scene = NULL;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    assert_int_not_equal(load(ctx, "<path value='.'/><path value='.'/><shape type='obj'><string name='filename' "
+                                   "value='nowhere.obj'/></shape>", &scene), REY_OK);
+    const char *first = strstr(rey_error(ctx), folder), *listed = strstr(rey_error(ctx), "looked in");
+    assert_non_null(first);
+    assert_non_null(listed);
+    first = strstr(listed, folder);
+    assert_non_null(first);
+    assert_null(strstr(first + 1, folder));
+    rey_context_destroy(ctx);
+}
+
+// A define may be empty: where a text is wanted it is one, where a number is wanted that is what is missing.
+static void defines_may_be_empty(void **state) {
+    (void)state;
+    rey_context *ctx = NULL;
+    rey_scene *scene = NULL;
+    const rey_define define = {"x", ""};
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file, "<scene version='3.0.0'>\n<shape type='sphere'><float name='radius' value='$x'/></shape></scene>");
+    assert_int_equal(fclose(file), 0);
+    assert_int_equal(rey_scene_load(ctx, path, &define, 1, &scene), REY_ERROR_SCENE);
+    if (!strstr(rey_error(ctx), "scene.xml:2:43: bad value '', expected a number")) {
+        fail_msg("%s", rey_error(ctx));
+    }
+    rey_context_destroy(ctx);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_are_finite),
+        cmocka_unit_test(neighbours_are_named),
+        cmocka_unit_test(twosided_is_opaque),
+        cmocka_unit_test(incomplete_scenes_do_not_render),
+        cmocka_unit_test(folders_are_listed_once),
+        cmocka_unit_test(defines_may_be_empty),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
