@@ -73,8 +73,9 @@ bool cli_options_parse(Command command, int argc, char **argv, Options *options,
 void cli_options_free(Options *options);
 void cli_options_help(Command command); // the list of the options that a subcommand takes
 
-// Prints "reynolds COMMAND: message" and a hint at --help to standard error; returns EXIT_USAGE.
-int cli_usage_error(Command command, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Prints "reynolds COMMAND: message" and a hint at --help to standard error, with --json an object on standard output
+// too; returns EXIT_USAGE.
+int cli_usage_error(const Options *options, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 // Whole-text conversions: false when text is not a number of that kind within the range.
 bool cli_parse_integer(const char *text, int64_t low, int64_t high, int64_t *out);
@@ -123,6 +124,10 @@ void cli_session_close(Session *session);
 int cli_report_failure(const Options *options, const rey_context *ctx, rey_result result);
 // The same for failures of the command itself.
 int cli_fail(const Options *options, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// {"error": message, "kind": kind} on standard output.
+void cli_json_error(const char *message, const char *kind);
+// Says so when samples were dropped because they were not finite: the picture is then too dark somewhere.
+void cli_warn_nonfinite(const rey_stats *stats);
 // Words on standard error, one line.
 void cli_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // Flushes standard output; EXIT_OK, or EXIT_FAILED and a message when the data could not be written.

@@ -13,16 +13,24 @@ typedef struct Difference {
     double max_error;
     int x, y, channel; // where the largest error is
     double mean_a, mean_b;
-    int64_t nonfinite; // numbers in either picture
+    int64_t numbers;                    // that both pictures have
+    int64_t nonfinite_a, nonfinite_b; // left out of everything above
 } Difference;
 
 static Difference compare(const float *a, const float *b, int width, int height) {
     Difference d = {.max_error = -1};
     int64_t count = (int64_t)width * height * 3;
-    double n = (double)count;
+    for (int64_t i = 0; i < count; i++) {
+        d.nonfinite_a += !isfinite(a[i]);
+        d.nonfinite_b += !isfinite(b[i]);
+        d.numbers += isfinite(a[i]) && isfinite(b[i]);
+    }
+    double n = (double)d.numbers;
     for (int64_t i = 0; i < count; i++) {
         double p = (double)a[i], q = (double)b[i], e = fabs(p - q);
-        d.nonfinite += !isfinite(p) + !isfinite(q);
+        if (!isfinite(p) || !isfinite(q)) {
+            continue;
+        }
         d.mse += e * e / n;
         d.mae += e / n;
         d.relative_mse += e * e / (q * q + relative_floor) / n;
@@ -44,8 +52,9 @@ static void print_text(const Difference *d, int width, int height) {
            width, height, d->mse, d->mae, d->relative_mse, d->psnr);
     printf("max_error     %.9g at %d,%d %c\nmean          %.9g against %.9g\n", d->max_error, d->x, d->y,
            "RGB"[d->channel], d -> mean_a, d -> mean_b);
-    if (d->nonfinite) {
-        printf("nonfinite     %lld\n", (long long)d->nonfinite);
+    if (d->nonfinite_a || d->nonfinite_b) {
+        printf("nonfinite     %lld in A, %lld in B, left out above\n", (long long)d->nonfinite_a,
+               (long long)d->nonfinite_b);
     }
 }
 
@@ -66,7 +75,9 @@ static void print_json(const Difference *d, int width, int height) {
     json_array_end(&json);
     json_number(&json, "mean_a", d->mean_a);
     json_number(&json, "mean_b", d->mean_b);
-    json_integer(&json, "nonfinite", d->nonfinite);
+    json_integer(&json, "nonfinite", d->nonfinite_a + d->nonfinite_b);
+    json_integer(&json, "nonfinite_a", d->nonfinite_a);
+    json_integer(&json, "nonfinite_b", d->nonfinite_b);
     json_object_end(&json);
     json_end(&json);
 }
@@ -84,8 +95,17 @@ static int compare_files(const Options *o, rey_context *ctx, float *images[2]) {
                         o->files[1], width[1], height[1]);
     }
     Difference d = compare(images[0], images[1], width[0], height[0]);
+    if (d.numbers == 0) {
+        return cli_fail(o, "no pixel is finite in both %s and %s", o->files[0], o->files[1]);
+    }
     (o->json ? print_json : print_text)(&d, width[0], height[0]);
-    return cli_finish_output();
+    if (d.nonfinite_a || d.nonfinite_b) {
+        cli_note("%lld of %lld numbers of %s and %lld of %s are not finite: the pictures differ there",
+                 (long long)d.nonfinite_a, (long long)width[0] * height[0] * 3, o->files[0], (long long)d.nonfinite_b,
+                 o->files[1]);
+    }
+    int status = cli_finish_output();
+    return status ? status : d.nonfinite_a || d.nonfinite_b ? EXIT_FAILED : EXIT_OK;
 }
 
 int cli_compare(int argc, char **argv) {

@@ -69,6 +69,12 @@ static rey_result unknown_op(rey_context *ctx, const char *spec, const char *op)
     char word[64];
     snprintf(word, sizeof word, "%.*s", (int)strcspn(op, "="), op);
     const char *nearest = rey_nearest_word(word, op_name_at, NULL);
+    if (nearest && !strcmp(nearest, word)) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: '%s' needs a value, such as %s=%s", spec, word, word,
+                        !strcmp(word, "add") || !strcmp(word, "scale") ? "1"
+                        : !strcmp(word, "file")                        ? "TANGENT.npy"
+                                                                       : "1,0,0");
+    }
     return rey_fail(ctx, REY_ERROR_ARGUMENT,
                     "%s: unknown operation '%s', %s%s (one of add, translate, local_translate, rotate, scale, file)",
                     spec, word, nearest ? "did you mean " : "expected OP=VALUE", nearest ? nearest : "");
@@ -98,8 +104,8 @@ static rey_result parse_op(rey_context *ctx, const char *spec, const char *text,
             break;
         }
     }
-    if (op->id == OP_COUNT) {
-        return unknown_op(ctx, spec, text);
+    if (op->id == OP_COUNT || !*text) {
+        return unknown_op(ctx, spec, spec + name_length(spec) + 1);
     }
     if (op->id == OP_FILE) {
         op->file = text;
@@ -112,7 +118,7 @@ static rey_result parse_op(rey_context *ctx, const char *spec, const char *text,
     }
     bool vector = op->id != OP_ADD && op->id != OP_SCALE;
     if ((vector && op->value_count != 3) || (op->id == OP_SCALE && op->value_count != 1)) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: %s takes %s, got %d numbers", spec, op_names[op->id],
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: %s takes %s, got %d", spec, op_names[op->id],
                         vector ? "three numbers x,y,z" : "one number", op->value_count);
     }
     return REY_OK;
@@ -202,8 +208,8 @@ static rey_result add_constant(rey_context *ctx, const char *spec, const Op *op,
                                float *tangent) {
     int64_t last = info->dims ? info->shape[info->dims - 1] : 1;
     if (op->value_count != 1 && op->value_count != last) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: add takes 1 or %lld numbers for %s, got %d", spec,
-                        (long long)last, info->name, op->value_count);
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: add takes %s%lld number%s for %s, got %d", spec,
+                        last > 1 ? "1 or " : "", (long long)last, PLURAL(last), info->name, op->value_count);
     }
     for (int64_t i = 0; i < info->count; i++) {
         tangent[i] += (float)op->values[op->value_count == 1 ? 0 : i % last];

@@ -36,6 +36,12 @@ static const char scene_text[] =
 
 enum { TEST_PIXELS = 64, TEST_WIDTHS = 3, LIBRARIES = 7 };
 
+#if defined(__clang__) || !defined(__GNUC__)
+static const char compiler[] = __VERSION__; // holds clang's name
+#else
+static const char compiler[] = "gcc " __VERSION__;
+#endif
+
 typedef struct WidthTest {
     int lanes;
     bool available, passed;
@@ -197,7 +203,7 @@ static void examine(const Options *options, Examination *e) {
 
 static void print_text(const Examination *e) {
     printf("reynolds   %s\ncompiler   %s\ncpu        %s\nthreads    %d of %d that are allowed\nlanes      up to %d\n",
-           rey_version(), __VERSION__, e->cpu, e->threads, e->threads_allowed, e->widest);
+           rey_version(), compiler, e->cpu, e->threads, e->threads_allowed, e->widest);
     for (int i = 0; i < LIBRARIES; i++) {
         printf("%-10s %s\n", e->libraries[i].name, e->libraries[i].version);
     }
@@ -213,7 +219,7 @@ static void print_json(const Examination *e) {
     json_object(&json, NULL);
     json_bool(&json, "passed", e->passed);
     json_string(&json, "version", rey_version());
-    json_string(&json, "compiler", __VERSION__);
+    json_string(&json, "compiler", compiler);
     json_string(&json, "cpu", e->cpu);
     json_integer(&json, "threads", e->threads);
     json_integer(&json, "threads_allowed", e->threads_allowed);

@@ -121,7 +121,8 @@ static void print_json(const FitResult *result) {
 
 static void print_words(const FitResult *result) {
     print_table(result);
-    printf("\n%lld numbers, %d iterations%s, %.1f s, loss %.4g\n", (long long)result->numbers, result->iterations,
+    printf("\n%lld number%s, %d iteration%s%s, %.1f s, loss %.4g\n", (long long)result->numbers,
+           PLURAL(result->numbers), result->iterations, PLURAL(result->iterations),
            result->converged ? " (converged)" : "", result->seconds, result->loss);
     if (result->report) {
         printf("report  %s\n", result->report);

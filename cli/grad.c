@@ -271,6 +271,7 @@ static rey_result differentiate(Grad *g) {
 }
 
 static void print_result(const Grad *g) {
+    cli_warn_nonfinite(&g->stats);
     if (g->png_scale > 0) {
         cli_note("blue -%g, white 0, red %g", (double)g->png_scale, (double)g->png_scale);
     }

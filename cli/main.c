@@ -47,7 +47,8 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "or\nsearch path, and its files lie in the folder OUT_data beside it.\n"},
     [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
                          "differences between two images; B is the reference",
-                         "\npsnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2).\n"},
+                         "\npsnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
+                         "either are left out and counted, and make the exit status 1.\n"},
     [COMMAND_DOCTOR] = {"doctor", cli_doctor, "[options]", "examine this machine and this build", ""},
 };
 
@@ -83,15 +84,16 @@ static const char *command_name_at(void *user, int i) {
     return i < COMMAND_COUNT ? command_rows[i].name : NULL;
 }
 
-static int unknown_word(const char *word) {
+static int unknown_word(const char *word, bool as_json) {
     const char *nearest = rey_nearest_word(word, command_name_at, NULL);
     const char *what = word[0] == '-' ? "option" : "command";
-    if (nearest) {
-        fprintf(stderr, "reynolds: unknown %s '%s', did you mean '%s'?\n", what, word, nearest);
-    } else {
-        fprintf(stderr, "reynolds: unknown %s '%s'\n", what, word);
+    char message[512];
+    snprintf(message, sizeof message, "unknown %s '%.200s'%s%s%s", what, word, nearest ? ", did you mean '" : "",
+             nearest ? nearest : "", nearest ? "'?" : "");
+    fprintf(stderr, "reynolds: %s\nTry 'reynolds --help'.\n", message);
+    if (as_json) {
+        cli_json_error(message, "usage");
     }
-    fprintf(stderr, "Try 'reynolds --help'.\n");
     return EXIT_USAGE;
 }
 
@@ -116,5 +118,9 @@ int main(int argc, char **argv) {
         print_help(stdout);
         return cli_finish_output();
     }
-    return unknown_word(word);
+    bool as_json = false;
+    for (int i = 2; i < argc; i++) {
+        as_json = as_json || !strcmp(argv[i], "--json");
+    }
+    return unknown_word(word, as_json);
 }

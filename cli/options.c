@@ -18,6 +18,8 @@ enum {
     EVERY = (1 << COMMAND_COUNT) - 1
 };
 
+enum { MOST_SPP = 1 << 24 }; // the library's limit
+
 typedef enum OptionId {
     OPTION_OUTPUT,
     OPTION_SPP,
@@ -76,13 +78,17 @@ static const OptionRow option_rows[] = {
 };
 enum { OPTION_ROW_COUNT = sizeof option_rows / sizeof option_rows[0] };
 
-int cli_usage_error(Command command, const char *format, ...) {
+int cli_usage_error(const Options *options, const char *format, ...) {
+    const char *command = cli_command_name(options->command);
+    char message[1024];
     va_list arguments;
     va_start(arguments, format);
-    fprintf(stderr, "reynolds %s: ", cli_command_name(command));
-    vfprintf(stderr, format, arguments);
-    fprintf(stderr, "\nTry 'reynolds %s --help'.\n", cli_command_name(command));
+    vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
+    fprintf(stderr, "reynolds %s: %s\nTry 'reynolds %s --help'.\n", command, message, command);
+    if (options->json) {
+        cli_json_error(message, "usage");
+    }
     return EXIT_USAGE;
 }
 
@@ -125,7 +131,7 @@ static bool parse_terms(Options *o, const char *text) {
             found |= strlen(name) == length && !strncmp(name, s, length) ? bit : 0;
         }
         if (!found) {
-            cli_usage_error(o->command, "--terms: '%.*s' is none of %s", (int)length, s, all);
+            cli_usage_error(o, "--terms: '%.*s' is none of %s", (int)length, s, all);
             return false;
         }
         o->terms |= found;
@@ -139,12 +145,12 @@ static bool parse_terms(Options *o, const char *text) {
 static bool parse_define(Options *o, const char *text) {
     const char *equals = strchr(text, '=');
     if (!equals || equals == text) {
-        cli_usage_error(o->command, "-D: expected key=value, got '%s'", text);
+        cli_usage_error(o, "-D: expected key=value, got '%s'", text);
         return false;
     }
     char *name = strndup(text, (size_t)(equals - text));
     if (!name) {
-        cli_usage_error(o->command, "out of memory");
+        cli_usage_error(o, "out of memory");
         return false;
     }
     o->define_names[o->define_count] = name;
@@ -166,7 +172,7 @@ static bool parse_choice(const Options *o, const char *option, const char *value
         size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", choices[i]);
     }
-    cli_usage_error(o->command, "%s: '%s' is none of %s", option, value, list);
+    cli_usage_error(o, "%s: '%s' is none of %s", option, value, list);
     return false;
 }
 
@@ -174,7 +180,7 @@ static bool parse_count(const Options *o, const char *option, const char *value,
                         int *target) {
     int64_t number;
     if (!cli_parse_integer(value, low, high, &number)) {
-        cli_usage_error(o->command, "%s: expected a whole number from %lld to %lld, got '%s'", option, (long long)low,
+        cli_usage_error(o, "%s: expected a whole number from %lld to %lld, got '%s'", option, (long long)low,
                         (long long)high, value);
         return false;
     }
@@ -185,7 +191,7 @@ static bool parse_count(const Options *o, const char *option, const char *value,
 static bool parse_seed(Options *o, const char *value) {
     int64_t number;
     if (!cli_parse_integer(value, 0, UINT32_MAX, &number)) {
-        cli_usage_error(o->command, "--seed: expected a whole number from 0 to %u, got '%s'", UINT32_MAX, value);
+        cli_usage_error(o, "--seed: expected a whole number from 0 to %u, got '%s'", UINT32_MAX, value);
         return false;
     }
     o->seed = (uint32_t)number;
@@ -196,7 +202,7 @@ static bool parse_seed(Options *o, const char *value) {
 static bool parse_set(Options *o, const char *value) {
     const char *equals = strchr(value, '=');
     if (!equals || equals == value) {
-        cli_usage_error(o->command, "--set: expected key=value, got '%s'", value);
+        cli_usage_error(o, "--set: expected key=value, got '%s'", value);
         return false;
     }
     o->sets[o->set_count++] = value;
@@ -207,7 +213,7 @@ static bool parse_step(Options *o, const char *value) {
     char *end;
     o->step = strtod(value, &end);
     if (end == value || *end || !(o->step > 0) || !isfinite(o->step)) {
-        cli_usage_error(o->command, "--step: expected a positive number, got '%s'", value);
+        cli_usage_error(o, "--step: expected a positive number, got '%s'", value);
         return false;
     }
     return true;
@@ -254,7 +260,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         o->output = value;
         return true;
     case OPTION_SPP:
-        return parse_count(o, "--spp", value, 1, INT32_MAX, &o->spp);
+        return parse_count(o, "--spp", value, 1, MOST_SPP, &o->spp);
     case OPTION_SEED:
         return parse_seed(o, value);
     case OPTION_SENSOR:
@@ -323,7 +329,7 @@ static const OptionRow *match_option(Options *o, const char *text, const char **
     if (text[1] != '-') {
         const OptionRow *row = find_row(o->command, NULL, 0, text[1]);
         if (!row || (text[2] && !row->argument)) {
-            cli_usage_error(o->command, "unknown option '%s'", text);
+            cli_usage_error(o, "unknown option '%s'", text);
             return NULL;
         }
         *attached = text[2] ? text + 2 : NULL;
@@ -337,9 +343,9 @@ static const OptionRow *match_option(Options *o, const char *text, const char **
         snprintf(word, sizeof word, "%.*s", (int)length, name);
         const char *nearest = rey_nearest_word(word, option_name_at, &o->command);
         if (nearest) {
-            cli_usage_error(o->command, "unknown option '--%s', did you mean '--%s'?", word, nearest);
+            cli_usage_error(o, "unknown option '--%s', did you mean '--%s'?", word, nearest);
         } else {
-            cli_usage_error(o->command, "unknown option '--%s'", word);
+            cli_usage_error(o, "unknown option '--%s'", word);
         }
         return NULL;
     }
@@ -350,7 +356,7 @@ static const OptionRow *match_option(Options *o, const char *text, const char **
 static bool add_file(Options *o, const char *text) {
     static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     if (o->file_count >= most[o->command]) {
-        cli_usage_error(o->command, "unexpected argument '%s'", text);
+        cli_usage_error(o, "unexpected argument '%s'", text);
         return false;
     }
     o->files[o->file_count++] = text;
@@ -382,12 +388,12 @@ static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
         }
         if (row->argument && !value) {
             if (++i == argc) {
-                cli_usage_error(o->command, "option '%s' needs a value (%s)", text, row->argument);
+                cli_usage_error(o, "option '%s' needs a value (%s)", text, row->argument);
                 return false;
             }
             value = argv[i];
         } else if (!row->argument && value) {
-            cli_usage_error(o->command, "option '--%s' takes no value", row->name);
+            cli_usage_error(o, "option '--%s' takes no value", row->name);
             return false;
         }
         if (!apply_option(o, row, value)) {
@@ -397,36 +403,44 @@ static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
     return true;
 }
 
+static bool is_nonfinite(const char *text) {
+    char *end;
+    double value = strtod(text, &end);
+    return end != text && !*end && !isfinite(value);
+}
+
 static bool check_required(const Options *o) {
     static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE",   "JOB.yaml",
                                                        "SCENE", "SCENE", "IN and OUT.xml", "A and B", ""};
     static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     Command c = o->command;
     if (o->file_count < needed[c]) {
-        cli_usage_error(c, "%s missing", missing[c]);
+        cli_usage_error(o, "%s missing", missing[c]);
     } else if (o->all && o->param_count) {
-        cli_usage_error(c, "--all and --param: give one of them");
+        cli_usage_error(o, "--all and --param: give one of them");
     } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {
-        cli_usage_error(c, "--param is missing");
+        cli_usage_error(o, "--param is missing");
     } else if (o->variance && (o->reverse || !o->output || !strcmp(o->output, "-"))) {
-        cli_usage_error(c, "--variance is of forward mode and needs -o with the name of a file");
+        cli_usage_error(o, "--variance is of forward mode and needs -o with the name of a file");
     } else if (c == COMMAND_GRAD && o->reverse && !o->adjoint) {
-        cli_usage_error(c, "--mode reverse needs --adjoint");
+        cli_usage_error(o, "--mode reverse needs --adjoint");
+    } else if (c == COMMAND_GRAD && o->reverse && is_nonfinite(o->adjoint)) {
+        cli_usage_error(o, "--adjoint: '%s' is not a finite number; a file of that name is ./%s", o->adjoint, o->adjoint);
     } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {
-        cli_usage_error(c, "--adjoint needs --mode reverse");
+        cli_usage_error(o, "--adjoint needs --mode reverse");
     } else if (c == COMMAND_GRAD && o->reverse && o->output && !strcmp(o->output, "-")) {
-        cli_usage_error(c, "reverse mode writes a folder, -o - is not one");
+        cli_usage_error(o, "reverse mode writes a folder, -o - is not one");
     } else if (c == COMMAND_GRAD && o->reverse && o->output && cli_image_format(o->output) != IMAGE_UNKNOWN) {
-        cli_usage_error(c, "reverse mode writes a folder of .npy files, -o %s names a picture", o->output);
+        cli_usage_error(o, "reverse mode writes a folder of .npy files, -o %s names a picture", o->output);
     } else if ((c == COMMAND_RENDER || (c == COMMAND_GRAD && !o->reverse)) && o->output &&
                cli_image_format(o->output) == IMAGE_UNKNOWN) {
-        cli_usage_error(c, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
+        cli_usage_error(o, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
     } else if (o->resume && o->overwrite) {
-        cli_usage_error(c, "--resume continues and --overwrite starts again: give one of them");
+        cli_usage_error(o, "--resume continues and --overwrite starts again: give one of them");
     } else if (c == COMMAND_RENDER && !o->output && !o->json) {
-        cli_usage_error(c, "-o OUT is missing");
+        cli_usage_error(o, "-o OUT is missing");
     } else if (o->json && o->output && !strcmp(o->output, "-")) {
-        cli_usage_error(c, "--json and -o - both want standard output");
+        cli_usage_error(o, "--json and -o - both want standard output");
     } else {
         return true;
     }
@@ -442,6 +456,9 @@ bool cli_options_parse(Command command, int argc, char **argv, Options *options,
     options->params = calloc(most, sizeof *options->params);
     options->sets = calloc(most, sizeof *options->sets);
     bool help = false;
+    for (int i = 1; i < argc && strcmp(argv[i], "--"); i++) { // errors before it are to be told as JSON, too
+        options->json = options->json || !strcmp(argv[i], "--json");
+    }
     if (!options->defines || !options->define_names || !options->params || !options->sets) {
         cli_note("out of memory");
         *status = EXIT_FAILED;

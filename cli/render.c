@@ -41,6 +41,7 @@ int cli_render(int argc, char **argv) {
     if (!status) {
         rey_stats stats = {0};
         rey_result result = render(&session, &stats);
+        cli_warn_nonfinite(&stats);
         if (result) {
             status = cli_report_failure(&options, session.ctx, result);
         } else if (options.json) {

@@ -76,28 +76,40 @@ static void value_text(const rey_param_info *info, const float *values, char *te
     }
 }
 
-static void print_param(const rey_param_info *info, const float *values, int name_width) {
-    char shape[80], value[128], range[64], terms[128];
-    shape_text(info, shape, sizeof shape);
-    value_text(info, values, value, sizeof value);
-    snprintf(range, sizeof range, "[%g, %g]", (double)info->low, (double)info->high);
-    cli_terms_text(info->terms, terms, sizeof terms);
-    printf("%-*s  %-12s %-10s %-16s %-28s %s\n", name_width, info->name, shape, info->unit[0] ? info->unit : "-", range,
-           value, terms);
+enum { PARAM_CELLS = 6, CELL_BYTES = 512 };
+
+// One parameter's cells: name, shape, unit, range, value, terms.
+static void param_cells(const Session *s, int param, char cells[PARAM_CELLS][CELL_BYTES]) {
+    static const char *const titles[PARAM_CELLS] = {"name", "shape", "unit", "range", "value", "terms"};
+    rey_param_info info;
+    if (param < 0 || rey_param_get_info(s->scene, param, &info) != REY_OK) {
+        for (int c = 0; c < PARAM_CELLS; c++) {
+            snprintf(cells[c], CELL_BYTES, "%s", titles[c]);
+        }
+        return;
+    }
+    snprintf(cells[0], CELL_BYTES, "%s", info.name);
+    shape_text(&info, cells[1], CELL_BYTES);
+    snprintf(cells[2], CELL_BYTES, "%s", info.unit[0] ? info.unit : "-");
+    snprintf(cells[3], CELL_BYTES, "[%g, %g]", (double)info.low, (double)info.high);
+    value_text(&info, rey_param_values(s->scene, param), cells[4], CELL_BYTES);
+    cli_terms_text(info.terms, cells[5], CELL_BYTES);
 }
 
 static void print_params(const Session *s) {
-    int count = rey_param_count(s->scene), name_width = 4;
-    rey_param_info info;
-    for (int i = 0; i < count; i++) {
-        if (rey_param_get_info(s->scene, i, &info) == REY_OK && (int)strlen(info.name) > name_width) {
-            name_width = (int)strlen(info.name);
+    int count = rey_param_count(s->scene), widths[PARAM_CELLS] = {0};
+    char cells[PARAM_CELLS][CELL_BYTES];
+    for (int i = -1; i < count; i++) { // the titles first
+        param_cells(s, i, cells);
+        for (int c = 0; c < PARAM_CELLS - 1; c++) {
+            int length = (int)strlen(cells[c]);
+            widths[c] = length > widths[c] ? length : widths[c];
         }
     }
-    printf("%-*s  %-12s %-10s %-16s %-28s %s\n", name_width, "name", "shape", "unit", "range", "value", "terms");
-    for (int i = 0; i < count; i++) {
-        if (rey_param_get_info(s->scene, i, &info) == REY_OK) {
-            print_param(&info, rey_param_values(s->scene, i), name_width);
+    for (int i = -1; i < count; i++) {
+        param_cells(s, i, cells);
+        for (int c = 0; c < PARAM_CELLS; c++) {
+            printf("%-*s%s", widths[c], cells[c], c < PARAM_CELLS - 1 ? "  " : "\n");
         }
     }
 }

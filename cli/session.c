@@ -76,15 +76,26 @@ void cli_note(const char *format, ...) {
     va_end(arguments);
 }
 
+void cli_json_error(const char *message, const char *kind) {
+    Json json = json_begin(stdout);
+    json_object(&json, NULL);
+    json_string(&json, "error", message);
+    json_string(&json, "kind", kind);
+    json_object_end(&json);
+    json_end(&json);
+}
+
+void cli_warn_nonfinite(const rey_stats *stats) {
+    if (stats->nonfinite > 0) {
+        cli_note("warning: %lld sample%s of %lld path%s not finite and left out", (long long)stats->nonfinite,
+                 PLURAL(stats->nonfinite), (long long)stats->paths, stats->paths == 1 ? " was" : "s were");
+    }
+}
+
 static void report(const Options *options, const char *message, rey_result result) {
     cli_note("%s", message);
     if (options->json) {
-        Json json = json_begin(stdout);
-        json_object(&json, NULL);
-        json_string(&json, "error", message);
-        json_string(&json, "kind", rey_result_text(result));
-        json_object_end(&json);
-        json_end(&json);
+        cli_json_error(message, rey_result_text(result));
     }
 }
 

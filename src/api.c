@@ -53,15 +53,19 @@ int rey_scene_sensor_count(const rey_scene *scene) {
 }
 
 int rey_scene_note_count(const rey_scene *scene) {
-    return (int)scene->notes.count;
+    return scene ? (int)scene->notes.count : 0;
 }
 
 const char *rey_scene_note(const rey_scene *scene, int note) {
-    return note >= 0 && note < (int)scene->notes.count ? ARRAY_AT(scene->notes, char *, note) : NULL;
+    return scene && note >= 0 && note < (int)scene->notes.count ? ARRAY_AT(scene->notes, char *, note) : NULL;
 }
 
 void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info) {
-    if (!scene || !info) {
+    if (!info) {
+        return;
+    }
+    if (!scene) {
+        *info = (rey_scene_info){.integrator = ""};
         return;
     }
     const SceneView *v = &scene->view;

@@ -101,6 +101,8 @@ static void values_of_nothing(void **state) {
     assert_int_equal(rey_threads(NULL), 0);
     assert_int_equal(rey_lanes(NULL), 0);
     assert_int_equal(rey_scene_sensor_count(NULL), 0);
+    assert_int_equal(rey_scene_note_count(NULL), 0);
+    assert_null(rey_scene_note(NULL, 0));
     assert_int_equal(rey_param_count(NULL), 0);
     assert_int_equal(rey_param_find(NULL, "a"), -1);
     assert_int_equal(rey_param_find(scene, NULL), -1);

@@ -88,7 +88,7 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: unknown value 'l3', did you mean");
     expect_error(f, HEAD "loss: l2\nloss: l1\n", NULL, "job.yaml:5: key 'loss' is given twice");
     expect_error(f, HEAD "spp: [{from: 0, spp: 4}, {from: 0, spp: 8}]\n", NULL, "'from' must rise");
-    expect_error(f, HEAD "views_per_iteration: 2\n", NULL, "there are 1 views");
+    expect_error(f, HEAD "views_per_iteration: 2\n", NULL, "the job has 1 view");
     expect_error(f, HEAD "defines: {'a b': 1}\n", NULL, "is not a name");
     expect_error(f, "scene: a.xml\n", NULL, "key 'views' is missing");
     expect_error(f, "a: &x 1\n", NULL, "anchors and aliases");

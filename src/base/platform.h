@@ -19,4 +19,5 @@
 #define PRINTF_LIKE(text, first) __attribute__((format(__printf__, text, first)))
 #define ALIGNED(n) __attribute__((aligned(n)))
 #define COUNT_OF(array) ((int)(sizeof(array) / sizeof((array)[0])))
+#define PLURAL(n) ((n) == 1 ? "" : "s") // "%d view%s"
 #define UNUSED(x) ((void)(x))

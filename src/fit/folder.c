@@ -81,8 +81,8 @@ static rey_result check_former(Fit *fit, const char *path) {
     }
     if (state.iteration != fit->job.iterations && !state.converged) {
         bool more = state.iteration < fit->job.iterations;
-        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds %d iterations of this fit; %s--overwrite starts again",
-                        fit->output, state.iteration, more ? "--resume continues, " : "");
+        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds %d iteration%s of this fit; %s--overwrite starts again",
+                        fit->output, state.iteration, PLURAL(state.iteration), more ? "--resume continues, " : "");
     }
     return REY_OK;
 }

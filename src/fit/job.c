@@ -463,7 +463,8 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     }
     if (!result && job->views_per_iteration > job->view_count) {
         result = fail_at(job, rey_yaml_find(job->tree, "views_per_iteration"),
-                         "views_per_iteration = %d, but there are %d views", job->views_per_iteration, job->view_count);
+                         "views_per_iteration = %d, but the job has %d view%s", job->views_per_iteration,
+                         job->view_count, PLURAL(job->view_count));
     }
     return result;
 }

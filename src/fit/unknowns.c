@@ -105,8 +105,8 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     int64_t last = unknown->dims ? unknown->shape[unknown->dims - 1] : 1;
     if (p->start_count != 1 && p->start_count != unknown->count && p->start_count != last) {
         char why[128];
-        snprintf(why, sizeof why, "start holds %d numbers, expected 1 or %lld", p->start_count,
-                 (long long)unknown->count);
+        snprintf(why, sizeof why, "start holds %d numbers, expected %s%lld", p->start_count,
+                 unknown->count > 1 ? "1 or " : "", (long long)unknown->count);
         return fail_at(job, p, unknown->name, why);
     }
     for (int64_t i = 0; i < unknown->count; i++) { // shorter lists repeat: a colour for every texel

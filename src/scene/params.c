@@ -113,7 +113,7 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
         return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "there is no parameter number %d", param);
     }
     if (count != p->count) {
-        return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s has %d values, %lld were given", p->name, (int)p->count,
+        return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s has %d value%s, %lld given", p->name, (int)p->count, PLURAL(p->count),
                         (long long)count);
     }
     for (int64_t i = 0; i < count; i++) {

@@ -12,6 +12,12 @@ static void usage_errors_exit_with_two(void **state) {
                                         "render %s -o a.bmp",
                                         "render %s -o a.exr --spp 0",
                                         "render %s -o a.exr --spp 1.5",
+                                        "render %s -o a.exr --spp 16777217",
+                                        "grad %s --param x --mode reverse --adjoint nan",
+                                        "grad %s --param x --mode reverse --adjoint 1e999",
+                                        "grad %s --param red.reflectance.value:add",
+                                        "grad %s --param red.reflectance.value:add=",
+                                        "grad %s --param red.reflectance.value:file=",
                                         "render %s -o a.exr --ssp 4",
                                         "render %s -o a.exr extra",
                                         "render %s -o",
@@ -37,7 +43,8 @@ static void usage_errors_exit_with_two(void **state) {
                                         "render %s -o a.exr --json=1"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         expect(f, 2, wrong[i]);
-        assert_string_equal(f->out, "");
+        bool json = strstr(wrong[i], "--json") && !strstr(wrong[i], "--json=");
+        assert_true(json == (f->out[0] != 0));
         assert_true(f->words[0] != 0);
     }
     run(f, "rendr %s");

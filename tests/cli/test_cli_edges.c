@@ -19,8 +19,9 @@ static void hangups_stop_fits(void **state) {
              REYNOLDS_COMMAND, TEST_JOBS);
     assert_int_equal(system(command), 0);
     snprintf(command, sizeof command,
-             "timeout --preserve-status -s HUP 1 '%s' fit '%s/job.yaml' --set views.0.target=$PWD/target.exr --set "
-             "iterations=1000000 -o fit >out.txt 2>words.txt",
+             "'%s' fit '%s/job.yaml' --set views.0.target=$PWD/target.exr --set iterations=1000000 -o fit >out.txt "
+             "2>words.txt & fit=$!; tries=0; while [ ! -s fit/metrics.jsonl ] && [ $tries -lt 600 ]; do sleep 0.1; "
+             "tries=$((tries + 1)); done; kill -HUP $fit; wait $fit",
              REYNOLDS_COMMAND, TEST_JOBS);
     int status = system(command);
     assert_true(WIFEXITED(status));
@@ -40,11 +41,100 @@ static void fits_take_the_common_options(void **state) {
     assert_int_equal(system(command), 0);
 }
 
+static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words)) {
+        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
+    }
+}
+
+static void usage_errors_are_json_too(void **state) {
+    Fixture *f = *state;
+    static const char *const wrong[] = {"render --json", "rendr %s --json", "render %s -o a.exr --json --spp 0",
+                                        "grad %s --param red.reflectance.value:ad=1 --json", "--jsn --json"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        JsonNode *node = run_json(f, 2, wrong[i]);
+        assert_non_null(json_text(node, "error", NULL));
+        json_free(node);
+    }
+}
+
+static void words_help(void **state) {
+    Fixture *f = *state;
+    expect_words(f, 2, "grad %s --param red.reflectance.value:add", "'add' needs a value, such as add=1");
+    expect_words(f, 2, "grad %s --param red.reflectance.value:file=", "'file' needs a value, such as file=TANGENT.npy");
+    expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint inf", "not a finite number");
+    expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint 1 -o d.exr", "folder");
+    expect_words(f, 1, "render %s -o a.exr -D ball=", "attribute 'id' of <ref> is empty");
+    expect(f, 0, "doctor");
+    assert_true(strstr(f->out, "compiler   gcc ") || strstr(f->out, "lang"));
+}
+
+// Every column of the table begins where its title does.
+static void tables_are_aligned(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "params %s");
+    const char *value = strstr(f->out, " value"), *terms = strstr(f->out, " terms");
+    assert_true(value && terms);
+    long at[2] = {value - f->out, terms - f->out};
+    for (const char *line = strchr(f->out, '\n'); line && line[1]; line = strchr(line + 1, '\n')) {
+        for (int k = 0; k < 2; k++) {
+            assert_true((long)strcspn(line + 1, "\n") > at[k]);
+            assert_true(line[1 + at[k]] == ' ' && line[2 + at[k]] != ' ');
+        }
+    }
+}
+
+static void write_pfm(const char *path, int width, float value) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    fprintf(file, "PF\n%d 1\n-1\n", width);
+    for (int i = 0; i < 3 * width; i++) {
+        float x = i == 0 ? value : 1;
+        fwrite(&x, sizeof x, 1, file);
+    }
+    fclose(file);
+}
+
+static void unequal_pictures(void **state) {
+    Fixture *f = *state;
+    write_pfm("one.pfm", 2, 1);
+    write_pfm("nan.pfm", 2, __builtin_nanf(""));
+    write_pfm("wide.pfm", 3, 1);
+    expect_words(f, 1, "compare one.pfm wide.pfm", "the sizes differ: one.pfm is 2 x 1, wide.pfm is 3 x 1");
+    expect_words(f, 1, "compare nan.pfm one.pfm", "1 of 6 numbers of nan.pfm and 0 of one.pfm are not finite");
+    JsonNode *node = run_json(f, 1, "compare one.pfm nan.pfm --json");
+    assert_true(json_value(node, "mse", -1) == 0 && json_value(node, "mean_a", -1) == 1);
+    assert_true(json_value(node, "nonfinite_a", -1) == 0 && json_value(node, "nonfinite_b", -1) == 1);
+    json_free(node);
+}
+
+// A light so strong that its picture overflows: the samples are dropped, and that is said.
+static void dropped_samples_are_told(void **state) {
+    Fixture *f = *state;
+    FILE *file = fopen("bright.xml", "w");
+    assert_non_null(file);
+    fprintf(file, "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><transform name='to_world'>"
+                  "<lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer "
+                  "name='width' value='4'/><integer name='height' value='4'/></film></sensor><shape type='rectangle'/>"
+                  "<emitter type='point'><point name='position' x='0' y='0' z='0.01'/><rgb name='intensity' "
+                  "value='3e38'/></emitter></scene>");
+    assert_int_equal(fclose(file), 0);
+    expect_words(f, 0, "render bright.xml -o bright.exr --spp 4", "not finite and left out");
+    expect(f, 0, "render %s -o a.exr --spp 1");
+    assert_null(strstr(f->words, "warning"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outputs_may_be_devices),
         cmocka_unit_test(hangups_stop_fits),
         cmocka_unit_test(fits_take_the_common_options),
+        cmocka_unit_test(usage_errors_are_json_too),
+        cmocka_unit_test(words_help),
+        cmocka_unit_test(tables_are_aligned),
+        cmocka_unit_test(unequal_pictures),
+        cmocka_unit_test(dropped_samples_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
