@@ -38,8 +38,10 @@ rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsig
         const char *magic;
         size_t length;
         rey_result (*read)(rey_context *, const char *, const unsigned char *, size_t, rey_image *);
-    } formats[] = {{"\x76\x2f\x31\x01", 4, rey_exr_read},  {"\x89PNG", 4, rey_png_read}, {"\xff\xd8\xff", 3, rey_jpeg_read},
-                   {"PF", 2, rey_pfm_read},                {"Pf", 2, rey_pfm_read},      {"\x93NUMPY", 6, rey_npy_read_image}};
+    } formats[] = {{"\x76\x2f\x31\x01", 4, rey_exr_read}, {"\x89PNG", 4, rey_png_read},
+                   {"\xff\xd8\xff", 3, rey_jpeg_read},     {"PF", 2, rey_pfm_read},
+                   {"Pf", 2, rey_pfm_read},                {"BM", 2, rey_bmp_read},
+                   {"#?", 2, rey_rgbe_read},               {"\x93NUMPY", 6, rey_npy_read_image}};
     *out = (rey_image){0};
     for (int i = 0; i < COUNT_OF(formats); i++) {
         if (size > formats[i].length && memcmp(bytes, formats[i].magic, formats[i].length) == 0) {
@@ -50,7 +52,8 @@ rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsig
             return result;
         }
     }
-    return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a picture that can be read, expected OpenEXR, PNG, JPEG, PFM or NPY",
+    return rey_fail(ctx, REY_ERROR_FORMAT,
+                    "%s: not a picture that can be read, expected OpenEXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY",
                     name);
 }
 

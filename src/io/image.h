@@ -11,8 +11,8 @@ typedef struct rey_image {
     bool srgb;                   // integers of an sRGB-encoded file, scaled to [0, 1] and not decoded yet
 } rey_image;
 
-// Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, PFM, NPY (f4 or f8, 2 or 3
-// dimensions). The caller frees *out with rey_image_free, also after a failure.
+// Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, BMP (uncompressed), Radiance
+// HDR, PFM, NPY (f4 or f8, 2 or 3 dimensions). The caller frees *out with rey_image_free, also after a failure.
 rey_result rey_image_read(rey_context *ctx, const char *path, rey_image *out);
 rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                                  rey_image *out);
@@ -33,6 +33,8 @@ void rey_image_decode_srgb(rey_image *image); // decodes and clears `srgb`
 rey_result rey_exr_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_bmp_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_rgbe_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                               rey_image *out);
