@@ -391,12 +391,37 @@ static void test_truth_loses_nothing(void **state) {
     rey_fit_result_free(&result);
 }
 
+// Three iterations, no report, into the folder d.
+static rey_result run_short(Fixture *f, bool resume, bool overwrite, int stop, const char *extra, FitResult *result) {
+    char folder[128];
+    Stopper stopper = {stop};
+    const char *sets[] = {f->target_set, "iterations=3", "spp=2", "report_spp=0", extra};
+    snprintf(folder, sizeof folder, "%s/d", f->folder);
+    FitDef def = {.job_path = JOB,
+                  .overrides = sets,
+                  .override_count = extra ? 5 : 4,
+                  .output = folder,
+                  .resume = resume,
+                  .overwrite = overwrite,
+                  .progress = stop_at, .user = &stopper};
+    return rey_fit(f->ctx, &def, result);
+}
+
 static void expect_refusal(Fixture *f, const char *extra, bool resume, const char *words) {
     FitResult result;
-    rey_result code = run_fit(f, "d", resume, 1, extra, &result);
+    rey_result code = run_short(f, resume, false, 1, extra, &result);
     rey_fit_result_free(&result);
     if (code == REY_OK || code == REY_ERROR_CANCELLED || !strstr(rey_error(f->ctx), words)) {
         fail_msg("result %d: '%s', expected '%s'", code, rey_error(f->ctx), words);
+    }
+}
+
+static void expect_run(Fixture *f, bool resume, bool overwrite, const char *extra) {
+    FitResult result;
+    rey_result code = run_short(f, resume, overwrite, -1, extra, &result);
+    rey_fit_result_free(&result);
+    if (code) {
+        fail_msg("%s", rey_error(f->ctx));
     }
 }
 
@@ -404,35 +429,28 @@ static void expect_refusal(Fixture *f, const char *extra, bool resume, const cha
 static void test_folder_is_kept(void **state) {
     Fixture *f = *state;
     FitResult result;
-    char folder[128], job[160];
-    assert_int_equal(run_fit(f, "d", false, 2, "iterations=3", &result), REY_ERROR_CANCELLED);
+    char folder[128], path[160];
+    assert_int_equal(run_short(f, false, false, 2, NULL, &result), REY_ERROR_CANCELLED);
     rey_fit_result_free(&result);
-    expect_refusal(f, "iterations=3", false, "holds 2 iterations of this fit; --resume continues, --overwrite");
+    expect_refusal(f, NULL, false, "holds 2 iterations of this fit; --resume continues, --overwrite");
     expect_refusal(f, "seed=5", false, "--overwrite replaces it");
-    assert_int_equal(run_fit(f, "d", true, -1, "iterations=3", &result), REY_OK);
-    rey_fit_result_free(&result);
-    assert_int_equal(run_fit(f, "d", false, -1, "iterations=3", &result), REY_OK); // the same again
-    rey_fit_result_free(&result);
+    expect_run(f, true, false, NULL);
+    expect_run(f, false, false, NULL); // the same again
     snprintf(folder, sizeof folder, "%s/d", f->folder);
     int other = open(folder, O_RDONLY | O_DIRECTORY);
     assert_true(other >= 0);
     assert_int_equal(flock(other, LOCK_EX | LOCK_NB), 0);
-    expect_refusal(f, "iterations=3", false, "another fit is running");
-    expect_refusal(f, "iterations=3", true, "another fit is running");
+    expect_refusal(f, NULL, false, "another fit is running");
+    expect_refusal(f, NULL, true, "another fit is running");
     close(other);
-    const char *sets[] = {f->target_set, "iterations=2", "seed=5"};
-    FitDef def = {.job_path = JOB, .overrides = sets, .override_count = 3, .output = folder, .overwrite = true};
-    if (rey_fit(f->ctx, &def, &result)) {
-        fail_msg("%s", rey_error(f->ctx));
-    }
-    rey_fit_result_free(&result);
-    snprintf(job, sizeof job, "%s/e/recovered.xml", f->folder); // found out before the work, not after it
+    expect_run(f, false, true, "seed=5");
+    snprintf(path, sizeof path, "%s/e/recovered.xml", f->folder); // found out before the work, not after it
     snprintf(folder, sizeof folder, "%s/e", f->folder);
-    assert_int_equal(mkdir(folder, 0777) || mkdir(job, 0777), 0);
+    assert_int_equal(mkdir(folder, 0777) || mkdir(path, 0777), 0);
     assert_int_equal(run_fit(f, "e", false, 1, NULL, &result), REY_ERROR_IO);
     assert_non_null(strstr(rey_error(f->ctx), "is a folder"));
     rey_fit_result_free(&result);
-    assert_int_equal(rmdir(job), 0);
+    assert_int_equal(rmdir(path), 0);
 }
 
 static void test_fit_errors(void **state) {
