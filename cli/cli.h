@@ -172,3 +172,6 @@ rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *h
 // [-scale, scale], and *scale (may be null) tells the scale.
 rey_result cli_write_image(rey_context *ctx, const char *path, const float *image, int width, int height,
                            bool signed_values, float *scale);
+// The same for a picture of many channels: PNG files get the first three (and image changes), NPY and EXR files all.
+rey_result cli_write_channels(rey_context *ctx, const char *path, float *image, int width, int height, int channels,
+                              const char *const *names);

@@ -62,7 +62,8 @@ static rey_result copy_to_output(rey_context *ctx, const char *path) {
 }
 
 // An EXR needs to seek, so it goes through a temporary file.
-static rey_result write_exr_to_output(rey_context *ctx, const float *image, int width, int height) {
+static rey_result write_exr_to_output(rey_context *ctx, const float *image, int width, int height, int channels,
+                                      const char *const *names) {
     const char *folder = getenv("TMPDIR");
     char path[4096];
     snprintf(path, sizeof path, "%s/reynolds-XXXXXX", folder && folder[0] ? folder : "/tmp");
@@ -71,7 +72,7 @@ static rey_result write_exr_to_output(rey_context *ctx, const float *image, int 
         return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
     }
     close(descriptor);
-    rey_result result = rey_exr_write(ctx, path, image, width, height, 3, NULL);
+    rey_result result = rey_exr_write(ctx, path, image, width, height, channels, names);
     result = result ? result : copy_to_output(ctx, path);
     unlink(path);
     return result;
@@ -81,7 +82,7 @@ rey_result cli_write_image(rey_context *ctx, const char *path, const float *imag
                            bool signed_values, float *scale) {
     int64_t shape[3] = {height, width, 3};
     if (!strcmp(path, "-")) {
-        return write_exr_to_output(ctx, image, width, height);
+        return write_exr_to_output(ctx, image, width, height, 3, NULL);
     }
     switch (cli_image_format(path)) {
     case IMAGE_PNG:
@@ -91,5 +92,27 @@ rey_result cli_write_image(rey_context *ctx, const char *path, const float *imag
         return rey_npy_write(ctx, path, image, shape, 3);
     default:
         return rey_exr_write(ctx, path, image, width, height, 3, NULL);
+    }
+}
+
+rey_result cli_write_channels(rey_context *ctx, const char *path, float *image, int width, int height, int channels,
+                              const char *const *names) {
+    int64_t shape[3] = {height, width, channels};
+    if (channels == 3) {
+        return cli_write_image(ctx, path, image, width, height, false, NULL);
+    }
+    if (!strcmp(path, "-")) {
+        return write_exr_to_output(ctx, image, width, height, channels, names);
+    }
+    switch (cli_image_format(path)) {
+    case IMAGE_PNG:
+        for (int64_t i = 0; i < (int64_t)width * height; i++) {
+            memmove(image + 3 * i, image + channels * i, 3 * sizeof *image);
+        }
+        return rey_png_write(ctx, path, image, width, height);
+    case IMAGE_NPY:
+        return rey_npy_write(ctx, path, image, shape, 3);
+    default:
+        return rey_exr_write(ctx, path, image, width, height, channels, names);
     }
 }

@@ -17,15 +17,19 @@ static void print_json(const Session *s, const rey_stats *stats) {
 }
 
 static rey_result render(Session *s, rey_stats *stats) {
-    float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, 3 * sizeof *image);
-    if (!image) {
-        return REY_ERROR_MEMORY;
+    int channels = rey_channel_count(s->scene);
+    float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, (size_t)channels * sizeof *image);
+    const char **names = rey_alloc_array(s->ctx, (size_t)channels, sizeof *names);
+    rey_result result = image && names ? REY_OK : REY_ERROR_MEMORY;
+    for (int i = 0; i < channels && names; i++) {
+        names[i] = rey_channel_name(s->scene, i);
     }
-    rey_result result = rey_render(s->scene, &s->def, image, stats);
+    result = result ? result : rey_render_channels(s->scene, &s->def, image, stats);
     cli_progress_end(&s->progress);
     if (!result && s->options->output) {
-        result = cli_write_image(s->ctx, s->options->output, image, s->width, s->height, false, NULL);
+        result = cli_write_channels(s->ctx, s->options->output, image, s->width, s->height, channels, names);
     }
+    rey_free(s->ctx, names);
     rey_free(s->ctx, image);
     return result;
 }

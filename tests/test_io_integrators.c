@@ -94,6 +94,18 @@ static void test_integrators(void **state) {
          "shading_samples"},
         {"<integrator type='direct'><integer name='max_depth' value='2'/></integrator>", REY_ERROR_SCENE, "max_depth"},
         {"<integrator type='moment'/>", REY_ERROR_SCENE, "needs a nested integrator"},
+        {"<integrator type='depth'/>", REY_OK, ""},
+        {"<integrator type='aov'><string name='aovs' value='a:depth'/></integrator>", REY_OK, ""},
+        {"<integrator type='aov'/>", REY_ERROR_SCENE, "aovs"},
+        {"<integrator type='aov'><string name='aovs' value='a:dept'/></integrator>", REY_ERROR_SCENE,
+         "there is no quantity 'dept', did you mean 'depth'?"},
+        {"<integrator type='aov'><string name='aovs' value='depth'/></integrator>", REY_ERROR_SCENE,
+         "'depth' in 'aovs', expected NAME:QUANTITY"},
+        {"<integrator type='aov'><string name='aovs' value='a:depth'/><integrator type='path'/><integrator type='path'/>"
+         "</integrator>",
+         REY_ERROR_UNSUPPORTED, "'aov' takes one nested integrator, found two"},
+        {"<integrator type='moment'><integrator type='moment'><integrator type='path'/></integrator></integrator>",
+         REY_ERROR_UNSUPPORTED, "'moment' inside 'moment'"},
         {"<integrator type='volpaht'/>", REY_ERROR_SCENE, "did you mean 'volpath'?"},
     };
     check_cases(false, cases, sizeof cases / sizeof *cases);

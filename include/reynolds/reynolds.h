@@ -186,6 +186,13 @@ REY_API rey_result rey_render(rey_scene *scene, const rey_render_def *def, float
 REY_API rey_result rey_render_sensors(rey_scene *scene, const rey_render_def *def, const int *sensors, int count,
                                       float *const *images, rey_stats *stats);
 
+/* Channels of a picture: R, G, B, and behind them what the scene's integrator ('aov', 'moment') adds, named as in the
+ * files of the format ("img.R", "dd.T", "nn.X", "m2_img.Y"). */
+REY_API int rey_channel_count(const rey_scene *scene); /* at least 3 */
+REY_API const char *rey_channel_name(const rey_scene *scene, int channel); /* null when there is no such channel */
+/* Renders all channels. image: height x width x rey_channel_count floats owned by the caller. stats may be null. */
+REY_API rey_result rey_render_channels(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats);
+
 /* A selection of parameters: vectors over it are the parameters' values one after the other. */
 typedef struct rey_selection {
     const int *params; /* parameter indices, none twice */

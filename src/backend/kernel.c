@@ -1,4 +1,5 @@
 // kernel.c: all kernels of one SIMD width, compiled once per width. Runs one unit of work: the samples of a tile.
+#include "integrator/aov.h"
 #include "integrator/path_adj.h"
 #include "sensor/filter.h"
 
@@ -36,11 +37,49 @@ static int32_t film_weights(const SensorRecord *s, const FilterTable *table, flo
     return n;
 }
 
+// Adds one sample of n channels to the film of the tile.
+KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const double *l, int32_t n, double *film) {
+    const PathJob *job = t->job;
+    int32_t x0 = job->x - job->border, y0 = job->y - job->border;
+    int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
+    if (t->sensor->filter == FILM_BOX) {
+        // A sample counts for the pixel it was drawn in.
+        int32_t number = t->ws.pixel[slot], stride = t->sensor->width + 128;
+        double *pixel = film + ((int64_t)(number / stride - 64 - y0) * width + number % stride - 64 - x0) * n;
+        for (int32_t c = 0; c < n; c++) {
+            pixel[c] += l[c];
+        }
+        return;
+    }
+    float wx[MAX_FOOTPRINT], wy[MAX_FOOTPRINT];
+    int32_t first_x, first_y;
+    int32_t nx = film_weights(t->sensor, filter, (float)t->ws.film_x[slot], x0, x0 + width, &first_x, wx);
+    int32_t ny = film_weights(t->sensor, filter, (float)t->ws.film_y[slot], y0, y0 + height, &first_y, wy);
+    double line[MAX_FOOTPRINT * MOST_AOV_CHANNELS];
+    for (int32_t k = 0; k < nx * n; k++) {
+        line[k] = (double)wx[k / n] * l[k % n];
+    }
+    for (int32_t j = 0; j < ny; j++) {
+        double *row = film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * n;
+        for (int32_t k = 0; k < nx * n; k++) {
+            row[k] += (double)wy[j] * line[k];
+        }
+    }
+}
+
+// CIE XYZ of linear sRGB (white D65), squared.
+static void xyz_squares(const double *rgb, double *out) {
+    out[0] = 0.412453 * rgb[0] + 0.357580 * rgb[1] + 0.180423 * rgb[2];
+    out[1] = 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
+    out[2] = 0.019334 * rgb[0] + 0.119193 * rgb[1] + 0.950227 * rgb[2];
+    for (int c = 0; c < 3; c++) {
+        out[c] *= out[c];
+    }
+}
+
 // Adds the chunk's radiances (or derivatives) to the tile's film.
 static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     PathJob *job = t->job;
-    int32_t x0 = job->x - job->border, y0 = job->y - job->border;
-    int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
     for (int32_t i = 0; i < count; i++) {
         double l[SPEC_N], sum = 0;
         for (int c = 0; c < SPEC_N; c++) {
@@ -51,30 +90,28 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
             job->nonfinite++;
             continue;
         }
-        float x = (float)t->ws.film_x[i], y = (float)t->ws.film_y[i];
-        if (t->sensor->filter == FILM_BOX) {
-            // A sample counts for the pixel it was drawn in.
-            int32_t number = t->ws.pixel[i], stride = t->sensor->width + 128;
-            double *pixel = job->film + ((int64_t)(number / stride - 64 - y0) * width + number % stride - 64 - x0) * SPEC_N;
-            for (int c = 0; c < SPEC_N; c++) {
-                pixel[c] += l[c];
-            }
-            continue;
+        film_add(t, filter, i, l, SPEC_N, job->film);
+        if (job->squares) {
+            double squares[3];
+            xyz_squares(l, squares);
+            film_add(t, filter, i, squares, SPEC_N, job->squares);
         }
-        float wx[MAX_FOOTPRINT], wy[MAX_FOOTPRINT];
-        int32_t first_x, first_y;
-        int32_t nx = film_weights(t->sensor, filter, x, x0, x0 + width, &first_x, wx);
-        int32_t ny = film_weights(t->sensor, filter, y, y0, y0 + height, &first_y, wy);
-        double line[MAX_FOOTPRINT * SPEC_N];
-        for (int32_t k = 0; k < nx * SPEC_N; k++) {
-            line[k] = (double)wx[k / SPEC_N] * l[k % SPEC_N];
+    }
+}
+
+static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count) {
+    double l[MOST_AOV_CHANNELS];
+    int32_t n = 0;
+    for (int32_t i = 0; i < t->scene->aov_count; i++) {
+        n += aov_components(t->scene->aovs[i]);
+    }
+    for (int32_t i = 0; i < count; i++) {
+        for (int32_t c = 0; c < n; c++) {
+            double value = (double)t->ws.channel[c][i];
+            l[c] = value - value == 0 ? value : 0;
+            t->job->nonfinite += value - value != 0;
         }
-        for (int32_t j = 0; j < ny; j++) {
-            double *row = job->film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * SPEC_N;
-            for (int32_t k = 0; k < nx * SPEC_N; k++) {
-                row[k] += (double)wy[j] * line[k];
-            }
-        }
+        film_add(t, filter, i, l, n, t->job->film);
     }
 }
 
@@ -108,6 +145,11 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
 static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32_t count, int32_t *begin) {
     PathJob before = *t->job;
     camera_stage(t, first, count);
+    if (t->job->mode == MODE_AOV) {
+        aov_forward(t, begin, count);
+        film_splat_aovs(t, filter, count);
+        return;
+    }
     path_forward(t, begin);
     if (t->overflow && count > LANES) {
         t->job->paths = before.paths;
@@ -142,7 +184,7 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     int32_t *begin = (int32_t *)((char *)job->workspace + bytes);
     FilterTable filter;
     filter_tabulate(t.sensor, &filter);
-    t.derivative = job->mode != MODE_PRIMAL;
+    t.derivative = job->mode == MODE_REVERSE || job->mode == MODE_FORWARD;
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     int64_t total = (int64_t)job->width * job->height * job->spp;
     for (int64_t first = 0; first < total && (!job->go_on || job->go_on(job->user)); first += t.ws.chunk) {

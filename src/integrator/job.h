@@ -3,7 +3,7 @@
 
 #include "scene/scene.h"
 
-enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD };
+enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV };
 
 // What of a group depends on the selected parameters.
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2 };
@@ -17,6 +17,7 @@ typedef struct PathJob {
     bool sobol;
     // Film of the tile: (width + 2 border) x (height + 2 border) x 3, sums of filter weight times radiance.
     double *film;
+    double *squares;              // the same of the squares of the radiance in XYZ; may be null
     int32_t border;               // pixels by which filters reach over the tile's edge
     // Derivatives: adjoint of the film's sums, for the delivered picture (crop window), and the compact vectors.
     const float *adjoint;

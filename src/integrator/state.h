@@ -71,12 +71,14 @@ typedef struct Workspace {
     SpecRows radiance, adjoint, suffix;
     real *film_x, *film_y;
     int32_t *pixel, *sample;
+    // per slot: aovs
+    real *channel[MOST_AOV_CHANNELS];
 } Workspace;
 
 // Lays the workspace out in a block; with block null only measures. Returns the bytes needed.
 static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
     size_t at = 0;
-    bool derivative = mode != MODE_PRIMAL;
+    bool derivative = mode == MODE_REVERSE || mode == MODE_FORWARD;
     ws->chunk = CHUNK;
     size_t n = (size_t)ws->chunk + 2 * LANES;
     ws->record_capacity = derivative ? CHUNK * RECORDS_PER_PATH : 0;
@@ -128,5 +130,8 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE(ws->film_y, n)
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
+    for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {
+        CARVE(ws->channel[c], n)
+    }
     return at;
 }

@@ -1,9 +1,10 @@
 // build_integrator.c: integrators.
 #include "io/build.h"
 
+#include <stdio.h>
 #include <string.h>
 
-static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb"};
+static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "depth", "aov"};
 
 static const char *integrator_word(void *user, int i) {
     UNUSED(user);
@@ -54,10 +55,142 @@ static rey_result get_depths(Builder *b, rey_xml_node *node, SceneView *view) {
     return REY_OK;
 }
 
-rey_result build_integrator(Builder *b, rey_xml_node *node) {
-    SceneView *view = &b->scene->view;
+// How the work is divided does not concern the scene. Everything else must be known.
+static rey_result get_ignored(Builder *b, rey_xml_node *node) {
     int64_t count;
     double timeout;
+    TRY(rey_xml_get_float(b->ctx, node, "timeout", 0, &timeout));
+    TRY(rey_xml_get_int(b->ctx, node, "block_size", 0, INT32_MAX, 0, &count));
+    TRY(rey_xml_get_int(b->ctx, node, "samples_per_pass", 0, INT32_MAX, 0, &count));
+    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+}
+
+// ---- channels --------------------------------------------------------------------------------------------------------
+
+static rey_result add_channel(Builder *b, const char *prefix, const char *name, char letter, int32_t source,
+                              int32_t component) {
+    char text[256];
+    snprintf(text, sizeof text, "%s%s.%c", prefix, name, letter);
+    Channel *channel = rey_array_push(b->ctx, &b->scene->channels, sizeof *channel, 1);
+    if (!channel) {
+        return REY_ERROR_MEMORY;
+    }
+    *channel = (Channel){rey_strdup(b->ctx, text), source, component};
+    return channel->name ? REY_OK : REY_ERROR_MEMORY;
+}
+
+// Adds a quantity to those of the picture, and its channels.
+static rey_result add_aov(Builder *b, const rey_xml_node *node, const char *name, int32_t kind) {
+    static const char *const components[] = {
+#define AOV(ENUM, name, components) components,
+#include "scene/aovs.inl"
+#undef AOV
+    };
+    SceneView *view = &b->scene->view;
+    int32_t first = 0;
+    for (int32_t i = 0; i < view->aov_count; i++) {
+        first += aov_components(view->aovs[i]);
+    }
+    if (view->aov_count == MOST_AOVS || first + aov_components(kind) > MOST_AOV_CHANNELS) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "more than %d quantities or %d channels", MOST_AOVS,
+                            MOST_AOV_CHANNELS);
+    }
+    view->aovs[view->aov_count++] = kind;
+    for (int32_t c = 0; c < aov_components(kind); c++) {
+        TRY(add_channel(b, "", name, components[kind][c], CHANNEL_AOV, first + c));
+    }
+    return REY_OK;
+}
+
+static const char *aov_word(void *user, int i) {
+    static const char *const names[] = {
+#define AOV(ENUM, name, components) name,
+#include "scene/aovs.inl"
+#undef AOV
+    };
+    UNUSED(user);
+    return i < COUNT_OF(names) && names[i][0] ? names[i] : NULL;
+}
+
+// "NAME:QUANTITY, NAME:QUANTITY, ..."
+static rey_result get_aovs(Builder *b, rey_xml_node *node) {
+    const char *list;
+    TRY(rey_xml_get_string(b->ctx, node, "aovs", "", &list));
+    if (!*list) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'aov' lacks 'aovs', a list of NAME:QUANTITY");
+    }
+    while (*list) {
+        char item[160], *colon;
+        size_t length = strcspn(list, ",");
+        if (length >= sizeof item) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%.40s...' in 'aovs' is too long", list);
+        }
+        memcpy(item, list, length);
+        list += length + (list[length] == ',');
+        while (length > 0 && item[length - 1] == ' ') {
+            length--;
+        }
+        item[length] = '\0';
+        const char *name = item + strspn(item, " ");
+        colon = strchr(item, ':');
+        if (!colon || colon == name) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' in 'aovs', expected NAME:QUANTITY", item);
+        }
+        *colon = '\0';
+        int kind = -1;
+        for (int i = 0; aov_word(NULL, i); i++) {
+            kind = strcmp(colon + 1, aov_word(NULL, i)) == 0 ? i : kind;
+        }
+        if (kind < 0) {
+            return rey_xml_fail_word(b->ctx, node->at, colon + 1, aov_word, NULL, "there is no quantity '%s'", colon + 1);
+        }
+        TRY(add_aov(b, node, name, kind));
+    }
+    return REY_OK;
+}
+
+// Channels of the picture of the integrator inside an `aov` or a `moment`: its name, or a number where it has none.
+static rey_result nested_channels(Builder *b, const rey_xml_node *node, const rey_xml_child *nested) {
+    const char *name = nested->name ? nested->name : "_arg_0";
+    bool moment = is(node, "moment");
+    for (int32_t c = 0; c < 3 && !moment; c++) {
+        TRY(add_channel(b, "", name, "RGB"[c], CHANNEL_COLOUR, c));
+    }
+    for (int32_t c = 0; c < 6 && moment; c++) {
+        TRY(add_channel(b, c < 3 ? "" : "m2_", name, "XYZ"[c % 3], c < 3 ? CHANNEL_MEAN : CHANNEL_SECOND, c % 3));
+    }
+    b->scene->view.moments = moment;
+    return moment || b->scene->view.colour_is_depth ? REY_OK : add_aov(b, node, name, AOV_ALPHA);
+}
+
+static rey_result build_wrapper(Builder *b, rey_xml_node *node) {
+    SceneView *view = &b->scene->view;
+    rey_xml_child *nested = rey_xml_child_of(node, REY_XML_BIT(REY_XML_INTEGRATOR), 0);
+    rey_xml_child *second = rey_xml_child_of(node, REY_XML_BIT(REY_XML_INTEGRATOR), 1);
+    if (second) {
+        return rey_xml_fail(b->ctx, second->at, REY_ERROR_UNSUPPORTED, "'%s' takes one nested integrator, found two",
+                            node->type);
+    }
+    if (!nested && is(node, "moment")) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'moment' needs a nested integrator");
+    }
+    if (nested && (is(nested->node, "aov") || is(nested->node, "moment"))) {
+        return rey_xml_fail(b->ctx, nested->at, REY_ERROR_UNSUPPORTED, "'%s' inside '%s' is not supported",
+                            nested->node->type, node->type);
+    }
+    view->max_depth = nested ? view->max_depth : 0; // no colour
+    if (nested) {
+        TRY(build_integrator(b, nested->node));
+        TRY(nested_channels(b, node, nested));
+    } else {
+        b->scene->integrator = rey_strdup(b->ctx, node->type);
+        TRY(b->scene->integrator ? REY_OK : REY_ERROR_MEMORY);
+    }
+    return is(node, "aov") ? get_aovs(b, node) : REY_OK;
+}
+
+rey_result build_integrator(Builder *b, rey_xml_node *node) {
+    SceneView *view = &b->scene->view;
     bool hide, known = false;
     for (int i = 0; i < COUNT_OF(words); i++) {
         known = known || is(node, words[i]);
@@ -65,23 +198,22 @@ rey_result build_integrator(Builder *b, rey_xml_node *node) {
     if (!known) {
         return build_unknown(b, node, integrator_word, NULL);
     }
-    if (is(node, "moment")) {
-        rey_xml_child *nested = rey_xml_child_of(node, REY_XML_BIT(REY_XML_INTEGRATOR), 0);
-        if (!nested) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'moment' needs a nested integrator");
-        }
-        TRY(build_integrator(b, nested->node));
-        return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    if (is(node, "moment") || is(node, "aov")) {
+        TRY(build_wrapper(b, node));
+        TRY(rey_xml_get_bool(b->ctx, node, "hide_emitters", false, &hide));
+        return get_ignored(b, node);
     }
-    TRY(get_depths(b, node, view));
+    if (is(node, "depth")) {
+        view->colour_is_depth = true;
+        view->aovs[view->aov_count++] = AOV_DEPTH;
+    } else {
+        TRY(get_depths(b, node, view));
+    }
     TRY(rey_xml_get_bool(b->ctx, node, "hide_emitters", false, &hide));
-    TRY(rey_xml_get_float(b->ctx, node, "timeout", 0, &timeout));
-    TRY(rey_xml_get_int(b->ctx, node, "block_size", 0, INT32_MAX, 0, &count));
-    TRY(rey_xml_get_int(b->ctx, node, "samples_per_pass", 0, INT32_MAX, 0, &count));
     view->hide_emitters = hide;
     b->scene->integrator = rey_strdup(b->ctx, node->type);
     if (!b->scene->integrator) {
         return REY_ERROR_MEMORY;
     }
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return get_ignored(b, node);
 }

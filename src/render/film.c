@@ -3,8 +3,8 @@
 
 #include "sensor/filter.h"
 
-FilmPlan rey_film_plan(const SensorRecord *s) {
-    FilmPlan plan = {.sensor = s, .x = s->crop_x, .y = s->crop_y, .width = s->crop_width, .height = s->crop_height};
+FilmPlan rey_film_plan(const SensorRecord *s, int32_t channels) {
+    FilmPlan plan = {.sensor = s, .channels = channels, .x = s->crop_x, .y = s->crop_y, .width = s->crop_width, .height = s->crop_height};
     if (s->sample_border && s->filter != FILM_BOX) {
         int32_t reach = (int32_t)ceilf(s->filter_radius - 0.5f);
         plan.x -= reach;
@@ -19,7 +19,7 @@ FilmPlan rey_film_plan(const SensorRecord *s) {
     plan.rows = (plan.height + plan.tile - 1) / plan.tile;
     plan.border = s->filter == FILM_BOX ? 0 : (int32_t)ceilf(s->filter_radius - 0.5f) + 1;
     int64_t edge = plan.tile + 2 * plan.border;
-    plan.tile_floats = edge * edge * 3;
+    plan.tile_floats = edge * edge * channels;
     return plan;
 }
 
@@ -71,8 +71,9 @@ void rey_film_merge(const FilmPlan *plan, const double *films, const double *col
                     continue;
                 }
                 double weight = scale / (columns[x] * rows[y]);
-                for (int c = 0; c < 3; c++) {
-                    picture[((int64_t)y * s->crop_width + x) * 3 + c] += weight * film[((int64_t)j * width + i) * 3 + c];
+                double *pixel = picture + ((int64_t)y * s->crop_width + x) * plan->channels;
+                for (int c = 0; c < plan->channels; c++) {
+                    pixel[c] += weight * film[((int64_t)j * width + i) * plan->channels + c];
                 }
             }
         }

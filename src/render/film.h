@@ -14,10 +14,11 @@ typedef struct FilmPlan {
     int32_t tile;                // edge of a tile [pixels]
     int32_t columns, rows;
     int32_t border;              // pixels by which the filter reaches over a tile's edge
+    int32_t channels;
     int64_t tile_floats;         // numbers in the film of one full tile, with its border
 } FilmPlan;
 
-FilmPlan rey_film_plan(const SensorRecord *sensor);
+FilmPlan rey_film_plan(const SensorRecord *sensor, int32_t channels);
 Tile rey_film_tile(const FilmPlan *plan, int32_t index);
 
 // Sums of the filter over the region in which samples are drawn, one per column and per row of the delivered picture:

@@ -1,14 +1,11 @@
-// render.c: primal, vector-Jacobian and Jacobian-vector drivers. They check what was asked, cut it into units of work
+// render.c: what all calls share, and the drivers of derivatives. They check what was asked, cut it into units of work
 // that do not depend on the number of threads, and merge the units' results in a fixed order.
-#include "backend/backend.h"
 #include "base/parallel.h"
 #include "math/rng.h"
-#include "render/film.h"
 #include "render/live.h"
+#include "render/render_parts.h"
 #include "render/update.h"
 
-#include <pthread.h>
-#include <stdatomic.h>
 #include <string.h>
 
 // Units of a derivative that have a gradient of their own: fixed, so that sums do not depend on the threads.
@@ -18,27 +15,6 @@ rey_render_def rey_default_render_def(void) {
     return (rey_render_def){.size = sizeof(rey_render_def), .sets = DEFAULT_SETS};
 }
 
-// Everything about one call.
-typedef struct Render {
-    rey_scene *scene;
-    rey_render_def def;
-    const Backend *backend;
-    FilmPlan plan;
-    PathJob job;           // what all units share
-    int32_t tiles, shards;
-    void **workspaces;     // one per worker
-    double *films;         // primal and forward: one per tile
-    double *gradients;     // reverse: one per shard
-    int64_t gradient_size;
-    double *columns, *rows;
-    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, place_at, live
-    float *adjoint;
-    rey_stats stats;
-    double done, total;    // progress
-    atomic_bool cancelled;
-    pthread_mutex_t lock;   // of stats and done, and around progress
-} Render;
-
 static void render_free(Render *r) {
     rey_context *ctx = r->scene->ctx;
     for (int i = 0; r->workspaces && i < ctx->def.threads; i++) {
@@ -46,6 +22,7 @@ static void render_free(Render *r) {
     }
     rey_free(ctx, r->workspaces);
     rey_free(ctx, r->films);
+    rey_free(ctx, r->squares);
     rey_free(ctx, r->gradients);
     rey_free(ctx, r->columns);
     rey_free(ctx, r->rows);
@@ -87,8 +64,8 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
 }
 
 // Checks, brings the scene up to date and prepares what every mode needs.
-static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode) {
-    *r = (Render){.scene = scene};
+rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels) {
+    *r = (Render){.scene = scene, .parts = 1};
     pthread_mutex_init(&r->lock, NULL);
     rey_result result = check_def(scene, def);
     if (result == REY_OK) {
@@ -109,7 +86,7 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
         r->def.spp *= scene->view.split;
     }
     r->backend = rey_backend_cpu(ctx->def.lanes);
-    r->plan = rey_film_plan(sensor);
+    r->plan = rey_film_plan(sensor, channels);
     r->tiles = r->plan.columns * r->plan.rows;
     r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
     r->job.sobol = def->sampler != REY_SAMPLER_INDEPENDENT;
@@ -139,7 +116,7 @@ static rey_result render_begin(Render *r, rey_scene *scene, const rey_render_def
 static bool go_on(void *user) {
     Render *r = user;
     if (r->def.progress && pthread_mutex_trylock(&r->lock) == 0) {
-        if (!r->cancelled && !r->def.progress(r->def.user, r->done / r->total)) {
+        if (!r->cancelled && !r->def.progress(r->def.user, (r->part + r->done / r->total) / r->parts)) {
             r->cancelled = true;
         }
         pthread_mutex_unlock(&r->lock);
@@ -176,10 +153,11 @@ static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
     return !r->cancelled;
 }
 
-static void film_unit(void *argument, int64_t item, int worker) {
+void rey_render_film_unit(void *argument, int64_t item, int worker) {
     Render *r = argument;
     PathJob job = r->job;
     job.film = r->films + item * r->plan.tile_floats;
+    job.squares = r->squares ? r->squares + item * r->plan.tile_floats : NULL;
     run_tile(r, &job, (int32_t)item, worker);
 }
 
@@ -195,7 +173,7 @@ static void gradient_unit(void *argument, int64_t item, int worker) {
     }
 }
 
-static rey_result render_end(Render *r, rey_result result, double start, rey_stats *stats) {
+rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats) {
     if (result == REY_OK && r->cancelled) {
         result = rey_fail(r->scene->ctx, REY_ERROR_CANCELLED, "cancelled");
     }
@@ -214,58 +192,6 @@ static void collect_films(Render *r, int32_t spp, double *picture) {
 
 static int64_t picture_floats(const Render *r) {
     return (int64_t)r->plan.sensor->crop_width * r->plan.sensor->crop_height * 3;
-}
-
-rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats) {
-    double start = rey_seconds();
-    Render r;
-    double *picture = NULL;
-    rey_result result = rey_begin(scene ? scene->ctx : NULL, image != NULL);
-    if (result != REY_OK) {
-        return result;
-    }
-    result = render_begin(&r, scene, def, MODE_PRIMAL);
-    if (result == REY_OK) {
-        picture = rey_alloc_array(scene->ctx, (size_t)picture_floats(&r), sizeof *picture);
-        result = picture ? REY_OK : REY_ERROR_MEMORY;
-    }
-    if (result == REY_OK) {
-        r.job.spp = r.def.spp;
-        r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
-        r.total = r.tiles;
-        rey_parallel_for(scene->ctx->def.threads, r.tiles, film_unit, &r);
-        collect_films(&r, r.def.spp, picture);
-        for (int64_t i = 0; i < picture_floats(&r); i++) {
-            image[i] = (float)picture[i];
-        }
-    }
-    rey_free(scene->ctx, picture);
-    return render_end(&r, result, start, stats);
-}
-
-rey_result rey_render_sensors(rey_scene *scene, const rey_render_def *def, const int *sensors, int count,
-                              float *const *images, rey_stats *stats) {
-    if (!def || count < 0 || (count > 0 && (!sensors || !images))) {
-        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "rey_render_sensors needs a def, sensors and a picture for each");
-    }
-    rey_stats sum = {0};
-    rey_result result = REY_OK;
-    for (int i = 0; i < count && result == REY_OK; i++) {
-        rey_render_def one = *def;
-        rey_stats part = {0};
-        one.sensor = sensors[i];
-        result = rey_render(scene, &one, images[i], &part);
-        sum.seconds += part.seconds;
-        sum.trace_seconds += part.trace_seconds;
-        sum.thread_seconds += part.thread_seconds;
-        sum.paths += part.paths;
-        sum.rays += part.rays;
-        sum.nonfinite += part.nonfinite;
-    }
-    if (stats) {
-        *stats = sum;
-    }
-    return result;
 }
 
 // ---- derivatives -------------------------------------------------------------------------------------------------
@@ -371,7 +297,10 @@ static bool selection_given(rey_selection selection) {
 
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
                                    int32_t mode) {
-    rey_result result = render_begin(r, scene, def, mode);
+    rey_result result = rey_render_begin(r, scene, def, mode, 3);
+    if (result == REY_OK && scene->view.colour_is_depth) {
+        result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the integrator 'depth' has no derivatives");
+    }
     if (result == REY_OK) {
         result = check_terms(scene, def, selection);
     }
@@ -434,7 +363,7 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
             }
         }
     }
-    return render_end(&r, result, start, stats);
+    return rey_render_end(&r, result, start, stats);
 }
 
 rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *tangent,
@@ -462,7 +391,7 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
             memset(one, 0, (size_t)n * sizeof *one);
             memset(r.films, 0, (size_t)r.tiles * (size_t)r.plan.tile_floats * sizeof *r.films);
             r.job.scramble = set_scramble(&r, set);
-            rey_parallel_for(scene->ctx->def.threads, r.tiles, film_unit, &r);
+            rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
             collect_films(&r, r.job.spp, one);
             double mean = 0;
             for (int64_t i = 0; i < n; i++) {
@@ -478,5 +407,5 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
         }
     }
     rey_free(scene->ctx, pictures);
-    return render_end(&r, result, start, stats);
+    return rey_render_end(&r, result, start, stats);
 }

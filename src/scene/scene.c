@@ -103,6 +103,10 @@ void rey_scene_destroy(rey_scene *scene) {
         rey_free(ctx, ARRAY_AT(scene->notes, char *, i));
     }
     rey_array_free(ctx, &scene->notes);
+    for (size_t i = 0; i < scene->channels.count; i++) {
+        rey_free(ctx, ARRAY_AT(scene->channels, Channel, i).name);
+    }
+    rey_array_free(ctx, &scene->channels);
     rey_array_free(ctx, &scene->params);
     rey_array_free(ctx, &scene->aliases);
     rey_free(ctx, scene->arena);

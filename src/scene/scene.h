@@ -89,6 +89,32 @@ typedef struct SensorRecord {
 // What a distant sensor sees.
 enum { SENSOR_AIM_SCENE, SENSOR_AIM_POINT, SENSOR_AIM_SHAPE };
 
+// Quantities of the first surface that a picture may hold beside colour.
+enum {
+#define AOV(ENUM, name, components) AOV_##ENUM,
+#include "scene/aovs.inl"
+#undef AOV
+    AOV_COUNT
+};
+enum { MOST_AOVS = 32, MOST_AOV_CHANNELS = 48 };
+
+static inline int32_t aov_components(int32_t kind) {
+    static const uint8_t counts[] = {
+#define AOV(ENUM, name, components) sizeof(components) - 1,
+#include "scene/aovs.inl"
+#undef AOV
+    };
+    return counts[kind];
+}
+
+// Where the numbers of a picture's channel beyond the first three come from.
+enum { CHANNEL_COLOUR, CHANNEL_AOV, CHANNEL_MEAN, CHANNEL_SECOND }; // the last two: first and second moments in XYZ
+
+typedef struct Channel {
+    char *name;
+    int32_t source, component; // aov: counted through all of them
+} Channel;
+
 // What changed of a shape.
 enum { SHAPE_DIRTY_POSE = 1, SHAPE_DIRTY_VERTICES = 2 };
 
@@ -112,6 +138,8 @@ typedef struct SceneView {
     // direct: of `split` samples in a row, the first light_samples sample a light and the first scatter_samples the
     // scattering function; 0 = every sample does both.
     int32_t split, light_samples, scatter_samples;
+    int32_t aovs[MOST_AOVS], aov_count;
+    bool colour_is_depth, moments; // integrators `depth` and `moment`
     float bounds_centre[3], bounds_half[3], bounds_radius;
     void *embree;             // RTCScene
     int32_t collections;      // number of shapegroups
@@ -149,6 +177,7 @@ struct rey_scene {
     rey_context *ctx;
     SceneView view;
     Array params, aliases;
+    Array channels;           // of Channel: what a picture holds behind R G B
     Array notes;              // of char *: what a user should know about how the scene was read
     // Loading: each array grows by itself; rey_scene_freeze moves all into the arena.
     struct {

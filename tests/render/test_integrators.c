@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -258,9 +259,165 @@ static void test_split(void **state) {
     assert_true(fabs(slope[5] - slope[4]) < 0.03 * slope[4]);
 }
 
+// ---- channels --------------------------------------------------------------------------------------------------------
+
+static int channel(Room room, const char *name) {
+    for (int i = 0; i < rey_channel_count(room.scene); i++) {
+        if (strcmp(rey_channel_name(room.scene, i), name) == 0) {
+            return i;
+        }
+    }
+    fail_msg("there is no channel %s", name);
+    return -1;
+}
+
+static void near(const char *what, int x, int y, double found, double expected, double tolerance) {
+    if (!(fabs(found - expected) <= tolerance)) {
+        fail_msg("%s at pixel %d, %d: %g, expected %g", what, x, y, found, expected);
+    }
+}
+
+enum { CHANNELS = 3 + 4 + 1 + 3 + 2 + 3 + 3 + 3 + 3 + 2 + 2 + 1 + 1 + 3, LAYER_SPP = 64 };
+
+// The wall's quantities at a pixel that it fills. With n = (0, sin 30, cos 30) its plane is n . p = 0.
+static void check_wall(Room room, const float *pixel, int x, int y) {
+    double sine = 0.5, cosine = sqrt(0.75), t = tan(20 * 3.14159265358979 / 180), size = 2.0 / SIZE * t;
+    double dx = (2 * (x + 0.5) / SIZE - 1) * t, dy = (1 - 2 * (y + 0.5) / SIZE) * t; // of a ray of depth 1
+    double depth = 4 * cosine / (cosine - sine * dy), px = dx * depth, py = dy * depth, pz = 4 - depth;
+    double slant = sqrt(1 + dx * dx + dy * dy);
+    struct {
+        const char *name;
+        double expected, tolerance;
+    } rows[] = {
+        {"dd.T", (depth - 0.01) * slant, 0.01}, {"pp.X", px, 0.01}, {"pp.Y", py, 0.01}, {"pp.Z", pz, 0.01},
+        {"ng.X", 0, 1e-5}, {"ng.Y", sine, 1e-5}, {"ng.Z", cosine, 1e-5}, {"ns.X", 0, 1e-5}, {"ns.Y", sine, 1e-5},
+        {"ns.Z", cosine, 1e-5}, {"tu.X", 6, 1e-4}, {"tu.Y", 0, 1e-4}, {"tu.Z", 0, 1e-4}, {"tv.X", 0, 1e-4},
+        {"tv.Y", 6 * cosine, 1e-4}, {"tv.Z", -6 * sine, 1e-4}, {"uv.U", px / 6, 0.002},
+        {"uv.V", (py * cosine - pz * sine) / 6 + 0.5, 0.002}, {"ux.U", size * depth / 6 / sqrt(LAYER_SPP), 1.2e-4},
+        {"ux.V", 0, 1e-6}, {"sh.I", 1, 1e-6}, {"al.R", 0.2, 1e-6}, {"al.G", 0.4, 1e-6}, {"al.B", 0.6, 1e-6},
+        {"img.A", 1, 1e-6},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        near(rows[i].name, x, y, (double)pixel[channel(room, rows[i].name)], rows[i].expected, rows[i].tolerance);
+    }
+    // One pixel down moves v by what the neighbouring centre's v differs, to second order.
+    double below = dy - size, next = 4 * cosine / (cosine - sine * below);
+    double slope = ((below * next - py) * cosine - (4 - next - pz) * sine) / 6 / sqrt(LAYER_SPP);
+    near("uy.V", x, y, (double)pixel[channel(room, "uy.V")], slope, 0.1 * fabs(slope));
+}
+
+static void test_layers(void **state) {
+    (void)state;
+    static float image[NUMBERS / 3 * CHANNELS], colour[NUMBERS];
+    for (int hidden = 0; hidden < 2; hidden++) {
+        rey_define define = {"hide", hidden ? "true" : "false"};
+        Room room = room_open("layers_of.xml", &define, 1);
+        rey_render_def def = rey_default_render_def();
+        rey_stats stats;
+        def.spp = LAYER_SPP;
+        assert_int_equal(rey_channel_count(room.scene), CHANNELS);
+        assert_null(rey_channel_name(room.scene, CHANNELS));
+        assert_string_equal(rey_channel_name(room.scene, 2), "B");
+        ok(room, rey_render_channels(room.scene, &def, image, &stats));
+        assert_int_equal(stats.nonfinite, 0);
+        ok(room, rey_render(room.scene, &def, colour, NULL));
+        for (int i = 0; i < NUMBERS / 3; i++) {
+            assert_memory_equal(image + i * CHANNELS, colour + 3 * i, 3 * sizeof *colour);
+            assert_memory_equal(image + i * CHANNELS, image + i * CHANNELS + channel(room, "img.R"), 3 * sizeof *colour);
+        }
+        check_wall(room, image + (2 * SIZE + 9) * CHANNELS, 9, 2);
+        check_wall(room, image + (8 * SIZE + 10) * CHANNELS, 10, 8);
+        // The lamp: hidden in colour and alpha, a surface to the others.
+        const float *lamp = image + (3 * SIZE + 3) * CHANNELS, *nothing = image + 11 * SIZE * CHANNELS;
+        near("sh.I", 3, 3, (double)lamp[channel(room, "sh.I")], 2, 1e-6);
+        near("img.A", 3, 3, (double)lamp[channel(room, "img.A")], hidden ? 0 : 1, 1e-6);
+        near("R", 3, 3, (double)lamp[0], hidden ? 0 : 3, 1e-6);
+        for (int c = 0; c < CHANNELS; c++) {
+            near(rey_channel_name(room.scene, c), 0, 11, (double)nothing[c], 0, 0);
+        }
+        room_close(room);
+    }
+}
+
+static rey_scene *load_text(rey_context *ctx, const char *integrator, const char *rest) {
+    char path[64];
+    rey_scene *scene;
+    snprintf(path, sizeof path, "/tmp/reynolds_channels_%ld.xml", (long)getpid());
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f,
+            "<scene version='3.0.0'>%s<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='4'/>"
+            "<integer name='height' value='4'/></film></sensor>%s</scene>",
+            integrator, rest);
+    assert_int_equal(fclose(f), 0);
+    rey_result result = rey_scene_load(ctx, path, NULL, 0, &scene);
+    unlink(path);
+    if (result) {
+        fail_msg("%s", rey_error(ctx));
+    }
+    return scene;
+}
+
+// Half of the light of a random sky passes: the second moment is what a coin says.
+static void test_moments(void **state) {
+    (void)state;
+    rey_context *ctx;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    rey_scene *scene = load_text(ctx, "<integrator type='moment'><integrator type='path'/></integrator>",
+                                 "<shape type='rectangle'><transform name='to_world'><scale value='50'/>"
+                                 "<translate z='1'/></transform><bsdf type='mask'><float name='opacity' value='0.5'/>"
+                                 "<bsdf type='diffuse'><rgb name='reflectance' value='0 0 0'/></bsdf></bsdf></shape>"
+                                 "<emitter type='constant'><rgb name='radiance' value='2 1 0.5'/></emitter>");
+    static const double rgb[] = {2, 1, 0.5};
+    static const double rows[3][3] = {
+        {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
+    float image[4 * 4 * 9];
+    rey_render_def def = rey_default_render_def();
+    def.spp = 4096;
+    assert_int_equal(rey_channel_count(scene), 9);
+    assert_string_equal(rey_channel_name(scene, 3), "_arg_0.X");
+    assert_string_equal(rey_channel_name(scene, 8), "m2__arg_0.Z");
+    assert_int_equal(rey_render_channels(scene, &def, image, NULL), REY_OK);
+    for (int i = 0; i < 16; i++) {
+        for (int c = 0; c < 3; c++) {
+            double xyz = rows[c][0] * rgb[0] + rows[c][1] * rgb[1] + rows[c][2] * rgb[2];
+            near("mean", i % 4, i / 4, (double)image[9 * i + c], 0.5 * rgb[c], 0.02 * rgb[c]);
+            near("mean XYZ", i % 4, i / 4, (double)image[9 * i + 3 + c], 0.5 * xyz, 0.02 * xyz);
+            near("second moment", i % 4, i / 4, (double)image[9 * i + 6 + c], 0.5 * xyz * xyz, 0.02 * xyz * xyz);
+        }
+    }
+    rey_scene_destroy(scene);
+    rey_context_destroy(ctx);
+}
+
+static void test_depth(void **state) {
+    (void)state;
+    rey_context *ctx;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    rey_scene *scene = load_text(ctx, "<integrator type='depth'/>",
+                                 "<shape type='rectangle'><transform name='to_world'><scale value='50'/>"
+                                 "<rotate y='1' angle='180'/><translate z='3'/></transform></shape>");
+    float image[4 * 4 * 3];
+    double gradient[3];
+    int param = rey_param_find(scene, "shape_0.bsdf.reflectance.value");
+    rey_render_def def = rey_default_render_def();
+    def.spp = 64;
+    assert_int_equal(rey_channel_count(scene), 3);
+    assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
+    for (int i = 0; i < 48; i++) {
+        assert_true(image[i] > 2.99f && image[i] < 3.6f && image[i] == image[i / 3 * 3]);
+    }
+    near("depth", 1, 1, (double)image[15], 2.99 * sqrt(1 + 2 * pow(0.25 * tan(0.3), 2)), 0.1);
+    assert_int_equal(rey_vjp(scene, &def, (rey_selection){&param, 1}, image, gradient, NULL, NULL), REY_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(rey_error(ctx), "'depth' has no derivatives"));
+    rey_scene_destroy(scene);
+    rey_context_destroy(ctx);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_corridor), cmocka_unit_test(test_corridor_roulette),
                                        cmocka_unit_test(test_through), cmocka_unit_test(test_through_gradient),
-                                       cmocka_unit_test(test_split)};
+                                       cmocka_unit_test(test_split),            cmocka_unit_test(test_layers),
+                                       cmocka_unit_test(test_moments),          cmocka_unit_test(test_depth)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,37 @@
+// render_parts.h: what pictures (picture.c) and derivatives (render.c) share. Private to src/render.
+#pragma once
+
+#include "backend/backend.h"
+#include "render/film.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+// Everything about one call.
+typedef struct Render {
+    rey_scene *scene;
+    rey_render_def def;
+    const Backend *backend;
+    FilmPlan plan;
+    PathJob job;           // what all units share
+    int32_t tiles, shards;
+    void **workspaces;     // one per worker
+    double *films;         // primal and forward: one per tile
+    double *squares;       // the same of second moments, or null
+    double *gradients;     // reverse: one per shard
+    int64_t gradient_size;
+    double *columns, *rows;
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, live
+    float *adjoint;
+    rey_stats stats;
+    double done, total;    // progress
+    int part, parts;       // this call is number `part` of `parts` equal ones
+    atomic_bool cancelled;
+    pthread_mutex_t lock;   // of stats and done, and around progress
+} Render;
+
+// Checks, brings the scene up to date and prepares what every mode needs. rey_render_end follows in any case.
+rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels);
+rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats);
+// One tile into its film; fits rey_parallel_for.
+void rey_render_film_unit(void *render, int64_t tile, int worker);
