@@ -5,9 +5,11 @@ Every statement in a function named *_adj (and in the sink and the backward swee
 derivative is mutated: its contribution is dropped, or its sign is flipped. The tests of leaves, kinds, lights or whole
 renders must fail for each. All mutants are compiled into one program, in which the environment variable REY_MUTANT
 turns one of them on: nothing is rebuilt between them.
-Usage: scripts/mutate.py [--sample N] [--seed N] [--file PART] [--part K/N] [--jobs N] [--list]
-Works in a copy of the tree; exit status 1 when a mutant survives that is not listed as equivalent below."""
+Usage: scripts/mutate.py [--sample N] [--seed N] [--file PART] [--part K/N] [--jobs N] [--tree DIR] [--quick] [--list]
+Works in a copy of the tree, which --tree keeps for further runs; exit status 1 when a mutant survives that is not listed
+as equivalent below."""
 import argparse
+import json
 import os
 import pathlib
 import random
@@ -151,7 +153,7 @@ def instrument(tree):
     return mutants
 
 
-def fails(tree, test, arguments, mutant, limit=600):
+def fails(tree, test, arguments, mutant, limit=3600):
     """Whether a test fails; it is stopped at its first complaint."""
     process = subprocess.Popen([str(tree / "build/bin" / test), *arguments], stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True, errors="replace",
@@ -170,14 +172,14 @@ def fails(tree, test, arguments, mutant, limit=600):
         process.wait()
 
 
-def killed_by(tree, name, mutant):
+def killed_by(tree, name, mutant, quick=False):
     attempts = [(test, []) for test in LEAVES]
     stem = pathlib.Path(name).stem.replace("_adj", "").replace("_lobes", "")
     if name.startswith("src/bsdf/") and mutant:
         attempts.insert(0, ("test_kinds_adjoint", [stem]))
     if name.startswith(("src/shape/", "src/integrator/")):
         attempts = []
-    for test, arguments in attempts + [(test, []) for test in RENDERS]:
+    for test, arguments in attempts + [(test, []) for test in RENDERS if not quick]:
         if fails(tree, test, arguments, mutant):
             return test
     return None
@@ -198,6 +200,7 @@ def prepare(tree, jobs):
     if killed_by(tree, "", 0):
         print("the tests must pass before anything is mutated", file=sys.stderr)
         return None
+    (tree / "mutants.json").write_text(json.dumps(mutants))
     return mutants
 
 
@@ -208,11 +211,15 @@ def main():
     parser.add_argument("--file", default="", help="only files whose path contains this")
     parser.add_argument("--part", default="1/1", help="K/N: every N-th mutant from the K-th")
     parser.add_argument("--jobs", type=int, default=2, help="compilers at a time")
+    parser.add_argument("--quick", action="store_true", help="only the tests of leaves, kinds and lights")
+    parser.add_argument("--tree", default="", help="where to build, kept and used again (default: a temporary folder)")
     parser.add_argument("--list", action="store_true", help="print the mutants and stop")
     args = parser.parse_args()
-    tree = pathlib.Path(tempfile.mkdtemp(prefix="reynolds_mutants_"))
+    tree = pathlib.Path(args.tree or tempfile.mkdtemp(prefix="reynolds_mutants_"))
     try:
-        if args.list:
+        if (tree / "mutants.json").exists():
+            mutants = json.loads((tree / "mutants.json").read_text())
+        elif args.list:
             shutil.copytree(ROOT / "src", tree / "src", dirs_exist_ok=True)
             mutants = instrument(tree)
         else:
@@ -227,7 +234,7 @@ def main():
         for number, name, line, kind, text in chosen[part - 1::parts]:
             verdict = ""
             if not args.list:
-                test = killed_by(tree, name, number)
+                test = killed_by(tree, name, number, args.quick)
                 known = [why for part_of_line, why in EQUIVALENT.items() if part_of_line in text]
                 verdict = f": killed by {test}" if test else f": equivalent: {known[0]}" if known else ": SURVIVED"
                 survivors += verdict == ": SURVIVED"
@@ -235,7 +242,8 @@ def main():
         print(f"{len(chosen[part - 1::parts])} mutants, {survivors} survived")
         return 1 if survivors else 0
     finally:
-        shutil.rmtree(tree, ignore_errors=True)
+        if not args.tree:
+            shutil.rmtree(tree, ignore_errors=True)
 
 
 if __name__ == "__main__":

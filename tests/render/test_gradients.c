@@ -1,262 +1,12 @@
-// Whole renders through the public interface: every parameter of a room with every kind, forward mode per image block
-// against correlated finite differences; reverse against forward; threads; widths; analytic anchors.
-#include "io/image.h"
+// Whole renders through the public interface: reverse mode against forward mode for every parameter of the rooms, saved
+// scenes, threads, widths, refusals, analytic anchors. Derivatives against differences: test_differences.c.
+#include "rooms.h"
+
 #include "math/rng.h"
-#include "reynolds/reynolds.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
-#include <cmocka.h>
-
-enum { SIZE = 24, NUMBERS = SIZE * SIZE * 3, SPP = 32, SEEDS = 12, BLOCKS_ACROSS = 3, BLOCKS = 9, LARGEST = 1024 };
-
-typedef struct Room {
-    rey_context *ctx;
-    rey_scene *scene;
-} Room;
-
-static char texels_path[64], sky_path[64];
-
-// splitmix64
-static double uniform(uint64_t *state) {
-    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
-
-static int write_pictures(void **state) {
-    UNUSED(state);
-    rey_context *ctx;
-    float texels[4 * 3 * 3], sky[8 * 5 * 3];
-    uint64_t random = 1;
-    for (int i = 0; i < COUNT_OF(texels); i++) {
-        texels[i] = (float)(0.2 + 0.6 * uniform(&random));
-    }
-    for (int i = 0; i < COUNT_OF(sky); i++) {
-        sky[i] = (float)(0.1 + 0.6 * uniform(&random));
-    }
-    snprintf(texels_path, sizeof texels_path, "/tmp/reynolds_texels_%ld.exr", (long)getpid());
-    snprintf(sky_path, sizeof sky_path, "/tmp/reynolds_sky_%ld.exr", (long)getpid());
-    rey_result result = rey_context_create(NULL, &ctx);
-    if (result == REY_OK) {
-        result = rey_exr_write(ctx, texels_path, texels, 4, 3, 3, NULL);
-    }
-    if (result == REY_OK) {
-        result = rey_exr_write(ctx, sky_path, sky, 8, 5, 3, NULL);
-    }
-    rey_context_destroy(ctx);
-    return result != REY_OK;
-}
-
-static int remove_pictures(void **state) {
-    UNUSED(state);
-    unlink(texels_path);
-    unlink(sky_path);
-    return 0;
-}
-
-static Room room_open(const char *file, int threads, int lanes) {
-    char path[1024];
-    snprintf(path, sizeof path, "%s/%s", RENDER_DIR, file);
-    rey_define defines[] = {{"texels", texels_path}, {"sky", sky_path}};
-    rey_context_def def = rey_default_context_def();
-    def.threads = threads;
-    def.lanes = lanes;
-    Room room;
-    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    bool pictures = strcmp(file, "shapes.xml") != 0 && strcmp(file, "closed.xml") != 0 && strcmp(file, "disc.xml") != 0;
-    if (rey_scene_load(room.ctx, path, defines, pictures ? 2 : 0, &room.scene) != REY_OK) {
-        fail_msg("%s", rey_error(room.ctx));
-    }
-    return room;
-}
-
-static void room_close(Room room) {
-    rey_scene_destroy(room.scene);
-    rey_context_destroy(room.ctx);
-}
-
-static rey_render_def def_make(int spp, uint32_t seed, int sets) {
-    rey_render_def def = rey_default_render_def();
-    def.spp = spp;
-    def.seed = seed;
-    def.sets = sets;
-    def.terms = REY_TERM_INTERIOR;
-    return def;
-}
-
-static void ok(Room room, rey_result result) {
-    if (result != REY_OK) {
-        fail_msg("%s", rey_error(room.ctx));
-    }
-}
-
-// Mean over pixels and channels of each block.
-static void blocks_of(const float *image, double *blocks) {
-    enum { ACROSS = SIZE / BLOCKS_ACROSS };
-    memset(blocks, 0, BLOCKS * sizeof *blocks);
-    for (int i = 0; i < SIZE * SIZE; i++) {
-        int block = i / SIZE / ACROSS * BLOCKS_ACROSS + i % SIZE / ACROSS;
-        for (int c = 0; c < 3; c++) {
-            blocks[block] += (double)image[3 * i + c] / (3.0 * ACROSS * ACROSS);
-        }
-    }
-}
-
-// Renders the scene moved by theta along the direction.
-static void moved(Room room, int param, const float *start, const float *tangent, int count, double theta,
-                  uint32_t seed, double *blocks) {
-    static float image[NUMBERS];
-    float values[LARGEST];
-    for (int i = 0; i < count; i++) {
-        values[i] = start[i] + (float)(theta * (double)tangent[i]);
-    }
-    rey_render_def def = def_make(SPP, seed, 1);
-    ok(room, rey_param_set(room.scene, param, values, count));
-    ok(room, rey_render(room.scene, &def, image, NULL));
-    blocks_of(image, blocks);
-}
-
-typedef struct Sum {
-    double n, mean, m2;
-} Sum;
-
-static void sum_add(Sum *s, double x) {
-    double d = x - s->mean;
-    s->n++;
-    s->mean += d / s->n;
-    s->m2 += d * (x - s->mean);
-}
-
-// The statistic of a difference of means, made normal [wallace1959].
-static double z_of(const Sum *a, const Sum *b) {
-    double error2 = a->m2 / (a->n - 1) / a->n + b->m2 / (b->n - 1) / b->n, difference = a->mean - b->mean;
-    double floor = 1e-5 * (fabs(a->mean) + fabs(b->mean)) + 1e-7;
-    error2 += floor * floor;
-    double t2 = difference * difference / error2, degrees = a->n - 1;
-    double z = sqrt(degrees * log1p(t2 / degrees)) * (8 * degrees + 1) / (8 * degrees + 3);
-    return difference < 0 ? -z : z;
-}
-
-typedef struct Score {
-    double sum, worst;
-    int n;
-} Score;
-
-// How far parameters are moved, and on which side when they are at the end of their range.
-static double step_of(const rey_param_info *info, const float *start, int *side) {
-    double largest = 0;
-    bool at_low = false, at_high = false;
-    for (int i = 0; i < info->count; i++) {
-        largest = fmax(largest, fabs((double)start[i]));
-        at_low |= start[i] - 0.02f * fabsf(start[i]) <= info->low;
-        at_high |= start[i] + 0.02f * fabsf(start[i]) >= info->high;
-    }
-    *side = at_low ? 1 : at_high ? -1 : 0;
-    if (info->count == 16) {
-        return 0.01; // radians
-    }
-    // Texture coordinates move over texels' edges, where values have kinks.
-    return (strstr(info->name, "to_uv") ? 0.001 : 0.02) * (largest > 0 ? largest : 1);
-}
-
-// A direction in which the parameter moves: positive numbers, or a turn of a pose.
-static void fill_tangent(const rey_param_info *info, const float *start, uint64_t *random, float *tangent) {
-    for (int i = 0; i < info->count; i++) {
-        tangent[i] = (float)(0.5 + 0.5 * uniform(random));
-    }
-    if (info->count != 16) {
-        return;
-    }
-    const float w[3] = {tangent[0], tangent[1], tangent[2]};
-    for (int column = 0; column < 4; column++) {
-        for (int row = 0; row < 3; row++) {
-            int next = (row + 1) % 3, last = (row + 2) % 3;
-            tangent[4 * row + column] = w[next] * start[4 * last + column] - w[last] * start[4 * next + column];
-        }
-    }
-    memset(tangent + 12, 0, 4 * sizeof *tangent);
-}
-
-static void check_param(Room room, int param, Score *score) {
-    static float derivative[NUMBERS];
-    rey_param_info info;
-    rey_param_get_info(room.scene, param, &info);
-    assert_true(info.count <= LARGEST);
-    float start[LARGEST], tangent[LARGEST];
-    uint64_t random = (uint64_t)param + 77;
-    memcpy(start, rey_param_values(room.scene, param), (size_t)info.count * sizeof *start);
-    int side, count = (int)info.count;
-    double h = step_of(&info, start, &side);
-    fill_tangent(&info, start, &random, tangent);
-    Sum forward[BLOCKS] = {{0}}, differences[BLOCKS] = {{0}};
-    for (uint32_t seed = 0; seed < SEEDS; seed++) {
-        double a[BLOCKS], b[BLOCKS], c[BLOCKS];
-        if (side) {
-            moved(room, param, start, tangent, count, 0, seed, a);
-            moved(room, param, start, tangent, count, side * h, seed, b);
-            moved(room, param, start, tangent, count, 2 * side * h, seed, c);
-        } else {
-            moved(room, param, start, tangent, count, -h, seed, a);
-            moved(room, param, start, tangent, count, h, seed, b);
-        }
-        ok(room, rey_param_set(room.scene, param, start, count));
-        for (int i = 0; i < BLOCKS; i++) {
-            sum_add(differences + i, side ? side * (-3 * a[i] + 4 * b[i] - c[i]) / (2 * h) : (b[i] - a[i]) / (2 * h));
-        }
-        rey_render_def def = def_make(SPP, seed + 1000, 1);
-        ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, derivative, NULL, NULL));
-        blocks_of(derivative, a);
-        for (int i = 0; i < BLOCKS; i++) {
-            sum_add(forward + i, a[i]);
-        }
-    }
-    double largest = 0, worst = 0;
-    for (int i = 0; i < BLOCKS; i++) {
-        double z = z_of(forward + i, differences + i);
-        largest = fmax(largest, fabs(forward[i].mean));
-        worst = fabs(z) > fabs(worst) ? z : worst;
-        score->sum += z;
-        score->n++;
-    }
-    score->worst = fmax(score->worst, fabs(worst));
-    if (fabs(worst) > 4) {
-        print_message("%-40s largest block %10.3g, worst z %6.2f\n", info.name, largest, worst);
-    }
-}
-
-static bool has_interior(const Room room, int param) {
-    rey_param_info info;
-    rey_param_get_info(room.scene, param, &info);
-    // Of the rooms' normals only the lantern's turn away from the camera.
-    int jumps = strncmp(info.name, "lantern.", 8) == 0 ? 0 : REY_TERM_TERMINATOR;
-    // Nothing stands in the way of lights with this name.
-    int shadows = strncmp(info.name, "moving_", 7) == 0 ? REY_TERM_INDIRECT : 0;
-    return (info.terms & ~jumps & ~shadows) == REY_TERM_INTERIOR;
-}
-
-static void test_differences(void **state) {
-    Room room = room_open(*state, 2, 0);
-    Score score = {0};
-    for (int i = 0; i < rey_param_count(room.scene); i++) {
-        if (has_interior(room, i)) {
-            check_param(room, i, &score);
-        }
-    }
-    double p = erfc(score.worst / sqrt(2)), threshold = -expm1(log1p(-0.01) / score.n);
-    print_message("%d blocks, largest |z| %.2f, sum / sqrt(n) %.2f\n", score.n, score.worst,
-                  score.sum / sqrt(score.n));
-    room_close(room);
-    assert_true(p > threshold);
-    assert_true(fabs(score.sum) / sqrt(score.n) < 3);
-}
+enum { SPP = 32 };
 
 static int all_interior(Room room, int *params) {
     int n = 0;
@@ -478,7 +228,8 @@ static void test_difference_noise(void **state) {
 #define ONE_ROOM(test, file) {#test " " file, test, NULL, NULL, (void *)(uintptr_t)(file)}
 #define EVERY_ROOM(test)                                                                                               \
     ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml"), ONE_ROOM(test, "principled.xml"),                 \
-        ONE_ROOM(test, "layers.xml"), ONE_ROOM(test, "lights.xml")
+        ONE_ROOM(test, "layers.xml"), ONE_ROOM(test, "lights.xml"), ONE_ROOM(test, "tiles.xml"), \
+        ONE_ROOM(test, "edges.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
@@ -486,7 +237,6 @@ int main(void) {
         cmocka_unit_test(test_attached_variance),    cmocka_unit_test(test_difference_noise),
         cmocka_unit_test(test_incomplete_is_refused), EVERY_ROOM(test_saved_renders_the_same),
         EVERY_ROOM(test_threads_change_nothing),
-        EVERY_ROOM(test_widths),                     EVERY_ROOM(test_reverse_is_forward),
-        EVERY_ROOM(test_differences)};
+        EVERY_ROOM(test_widths),                     EVERY_ROOM(test_reverse_is_forward)};
     return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
 }

@@ -1,0 +1,152 @@
+// rooms.h: what the tests of whole renders share: the scenes of this folder and the pictures that they show, render
+// settings, and the numbers of a test's own random sequence.
+#pragma once
+
+#include "io/image.h"
+#include "reynolds/reynolds.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { SIZE = 24, NUMBERS = SIZE * SIZE * 3 };
+
+typedef struct Room {
+    rey_context *ctx;
+    rey_scene *scene;
+} Room;
+
+// splitmix64
+static inline double uniform(uint64_t *state) {
+    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+// The pictures that scenes ask for by name: random values in a range, only its ends, or the more the nearer the middle.
+typedef enum PictureSort { ANY_VALUES, ONLY_ENDS, BRIGHT_MIDDLE } PictureSort;
+
+typedef struct Picture {
+    const char *name;
+    int width, height, channels;
+    double low, high;
+    PictureSort sort;
+} Picture;
+
+static const Picture pictures[] = {{"texels", 4, 3, 3, 0.2, 0.8, ANY_VALUES},
+                                   {"sky", 8, 5, 3, 0.1, 0.7, ANY_VALUES},
+                                   {"grains", 3, 2, 1, 0.3, 0.7, ANY_VALUES},
+                                   {"holes", 3, 3, 1, 0, 1, ONLY_ENDS},
+                                   {"dawn", 8, 5, 3, 0.05, 2, BRIGHT_MIDDLE}};
+
+static inline double picture_value(const Picture *p, int k, double u) {
+    int x = k / p->channels % p->width, y = k / p->channels / p->width;
+    double across = 1 - fabs(2 * (x + 0.5) / p->width - 1), down = (y + 0.5) / p->height;
+    if (p->sort == BRIGHT_MIDDLE) {
+        u = across * across * (1 - 0.8 * down) * (0.7 + 0.3 * u);
+    }
+    return p->low + (p->high - p->low) * (p->sort == ONLY_ENDS ? u < 0.25 : u);
+}
+
+enum { PICTURES = COUNT_OF(pictures), PATH = 64 };
+
+static inline void picture_path(int i, char path[PATH]) {
+    snprintf(path, PATH, "/tmp/reynolds_%s_%ld.exr", pictures[i].name, (long)getpid());
+}
+
+static inline int write_pictures(void **state) {
+    UNUSED(state);
+    rey_context *ctx;
+    uint64_t random = 1;
+    rey_result result = rey_context_create(NULL, &ctx);
+    for (int i = 0; i < PICTURES && result == REY_OK; i++) {
+        const Picture *p = pictures + i;
+        float values[128];
+        char path[PATH];
+        for (int k = 0; k < p->width * p->height * p->channels; k++) {
+            values[k] = (float)picture_value(p, k, uniform(&random));
+        }
+        picture_path(i, path);
+        result = rey_exr_write(ctx, path, values, p->width, p->height, p->channels, NULL);
+    }
+    rey_context_destroy(ctx);
+    return result != REY_OK;
+}
+
+static inline int remove_pictures(void **state) {
+    UNUSED(state);
+    for (int i = 0; i < PICTURES; i++) {
+        char path[PATH];
+        picture_path(i, path);
+        unlink(path);
+    }
+    return 0;
+}
+
+// A scene of this folder with those pictures that its text names.
+static inline Room room_open(const char *file, int threads, int lanes) {
+    static char text[1 << 16], paths[PICTURES][PATH];
+    char path[1024];
+    snprintf(path, sizeof path, "%s/%s", RENDER_DIR, file);
+    FILE *f = fopen(path, "r");
+    assert_non_null(f);
+    size_t length = fread(text, 1, sizeof text - 1, f);
+    fclose(f);
+    text[length] = 0;
+    rey_define defines[PICTURES];
+    int count = 0;
+    for (int i = 0; i < PICTURES; i++) {
+        char asked[32];
+        snprintf(asked, sizeof asked, "$%s", pictures[i].name);
+        if (strstr(text, asked)) {
+            picture_path(i, paths[i]);
+            defines[count++] = (rey_define){pictures[i].name, paths[i]};
+        }
+    }
+    rey_context_def def = rey_default_context_def();
+    def.threads = threads;
+    def.lanes = lanes;
+    Room room;
+    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
+    if (rey_scene_load(room.ctx, path, defines, count, &room.scene) != REY_OK) {
+        fail_msg("%s", rey_error(room.ctx));
+    }
+    return room;
+}
+
+static inline void room_close(Room room) {
+    rey_scene_destroy(room.scene);
+    rey_context_destroy(room.ctx);
+}
+
+static inline rey_render_def def_make(int spp, uint32_t seed, int sets) {
+    rey_render_def def = rey_default_render_def();
+    def.spp = spp;
+    def.seed = seed;
+    def.sets = sets;
+    def.terms = REY_TERM_INTERIOR;
+    return def;
+}
+
+static inline void ok(Room room, rey_result result) {
+    if (result != REY_OK) {
+        fail_msg("%s", rey_error(room.ctx));
+    }
+}
+
+// Whether the interior term is all that the parameter needs in these rooms.
+static inline bool has_interior(const Room room, int param) {
+    rey_param_info info;
+    rey_param_get_info(room.scene, param, &info);
+    // Of the rooms' normals only the lantern's turn away from the camera.
+    int jumps = strncmp(info.name, "lantern.", 8) == 0 ? 0 : REY_TERM_TERMINATOR;
+    // Nothing stands in the way of lights with this name.
+    int shadows = strncmp(info.name, "moving_", 7) == 0 ? REY_TERM_INDIRECT : 0;
+    return (info.terms & ~jumps & ~shadows) == REY_TERM_INTERIOR;
+}

@@ -1,0 +1,258 @@
+// The derivative with respect to every parameter of a room, forward mode per image block, against finite differences on
+// the same samples. Seeds are added until the standard error of what is left is at most 2 % of the blocks' RMS; all of
+// it is judged together. Arguments are the rooms' files.
+//
+// Where the choice of samples depends on the parameter, differences jump, and their variance grows as the step shrinks:
+// those parameters are tried again with larger steps (and a formula of higher order), and with more samples.
+#include "rooms.h"
+
+#include <malloc.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { BLOCKS_ACROSS = 3, BLOCKS = 9, LARGEST = 1024 };
+
+// Standard error over RMS at which sampling stops, and at most; error of the differences themselves over RMS.
+static const double aim = 0.018, bound = 0.02, truncation = 0.003;
+// The RMS counts as at least this much of the picture, per unit of relative change of the parameter.
+static const double least = 0.015;
+
+// One way of taking differences.
+typedef struct Effort {
+    int spp, fewest, most;
+    double step, one_sided_step; // over the size of the values
+    bool high_order;
+} Effort;
+
+static const Effort efforts[] = {{16, 6, 8, 0.02, 0.02, false}, {128, 6, 120, 0.1, 0.06, true}};
+
+// Mean over pixels and channels of each block.
+static void blocks_of(const float *image, double *blocks) {
+    enum { ACROSS = SIZE / BLOCKS_ACROSS };
+    memset(blocks, 0, BLOCKS * sizeof *blocks);
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        int block = i / SIZE / ACROSS * BLOCKS_ACROSS + i % SIZE / ACROSS;
+        for (int c = 0; c < 3; c++) {
+            blocks[block] += (double)image[3 * i + c] / (3.0 * ACROSS * ACROSS);
+        }
+    }
+}
+
+// A parameter, the direction in which it moves, and how far.
+typedef struct Move {
+    int param, count, spp;
+    float start[LARGEST], tangent[LARGEST];
+    double h, scale; // step; size of the values
+    bool one_sided, high_order;
+} Move;
+
+// A pose turns about an axis.
+static void turn(Move *m) {
+    const float w[3] = {m->tangent[0], m->tangent[1], m->tangent[2]};
+    for (int column = 0; column < 4; column++) {
+        for (int row = 0; row < 3; row++) {
+            int next = (row + 1) % 3, last = (row + 2) % 3;
+            m->tangent[4 * row + column] = w[next] * m->start[4 * last + column] - w[last] * m->start[4 * next + column];
+        }
+    }
+    memset(m->tangent + 12, 0, 4 * sizeof *m->tangent);
+    m->scale = 1;
+    m->h = 0.01; // radians
+}
+
+static Move move_make(Room room, int param, const Effort *effort) {
+    Move m = {.param = param, .spp = effort->spp, .high_order = effort->high_order};
+    rey_param_info info;
+    rey_param_get_info(room.scene, param, &info);
+    assert_true(info.count <= LARGEST);
+    m.count = (int)info.count;
+    memcpy(m.start, rey_param_values(room.scene, param), (size_t)m.count * sizeof *m.start);
+    uint64_t random = (uint64_t)param + 77;
+    for (int i = 0; i < m.count; i++) { // what is at the end of its range moves away from it
+        float x = m.start[i], step = 2.01f * (float)effort->step * fabsf(x);
+        bool low = x - step <= info.low, high = x + step >= info.high;
+        double t = 0.5 + 0.5 * uniform(&random);
+        m.tangent[i] = (float)(high && !low ? -t : t);
+        m.one_sided |= low || high;
+        m.scale = fmax(m.scale, fabs((double)x));
+    }
+    m.scale = m.scale > 0 ? m.scale : 1;
+    // Texture coordinates move over texels' edges, where values have kinks.
+    m.h = (strstr(info.name, "to_uv") ? 0.001 : m.one_sided ? effort->one_sided_step : effort->step) * m.scale;
+    if (m.count == 16) {
+        turn(&m);
+    }
+    return m;
+}
+
+// Renders the scene moved by theta along the direction.
+static void moved(Room room, const Move *m, double theta, uint32_t seed, double *blocks) {
+    static float image[NUMBERS];
+    float values[LARGEST];
+    for (int i = 0; i < m->count; i++) {
+        values[i] = m->start[i] + (float)(theta * (double)m->tangent[i]);
+    }
+    rey_render_def def = def_make(m->spp, seed, 1);
+    ok(room, rey_param_set(room.scene, m->param, values, m->count));
+    ok(room, rey_render(room.scene, &def, image, NULL));
+    blocks_of(image, blocks);
+}
+
+// d(blocks) / d theta by differences, and the level of the picture.
+static void difference(Room room, const Move *m, uint32_t seed, double *d, double *level) {
+    static const struct {
+        int n, at[4];
+        double weight[4];
+    } rules[] = {{2, {-1, 1}, {-0.5, 0.5}},
+                 {4, {-2, -1, 1, 2}, {1 / 12.0, -8 / 12.0, 8 / 12.0, -1 / 12.0}},
+                 {3, {0, 1, 2}, {-1.5, 2, -0.5}},
+                 {4, {0, 1, 2, 3}, {-11 / 6.0, 3, -1.5, 1 / 3.0}}};
+    int rule = 2 * m->one_sided + m->high_order;
+    memset(d, 0, BLOCKS * sizeof *d);
+    *level = 0;
+    for (int k = 0; k < rules[rule].n; k++) {
+        double blocks[BLOCKS];
+        moved(room, m, rules[rule].at[k] * m->h, seed, blocks);
+        for (int i = 0; i < BLOCKS; i++) {
+            d[i] += rules[rule].weight[k] * blocks[i] / m->h;
+            *level += k == 0 ? blocks[i] / BLOCKS : 0;
+        }
+    }
+    ok(room, rey_param_set(room.scene, m->param, m->start, m->count));
+}
+
+typedef struct Sum {
+    double n, mean, m2;
+} Sum;
+
+static void sum_add(Sum *s, double x) {
+    double d = x - s->mean;
+    s->n++;
+    s->mean += d / s->n;
+    s->m2 += d * (x - s->mean);
+}
+
+static double sum_error2(const Sum *s) { return s->m2 / (s->n - 1) / s->n; }
+
+// Derivatives of the blocks, and their differences from the quotients.
+typedef struct Blocks {
+    Sum forward[BLOCKS], off[BLOCKS];
+    double level;
+} Blocks;
+
+// RMS over the blocks of the derivative, and of the standard error.
+static double rms_of(const Blocks *b, const Move *m, double *error) {
+    double square = 0, error2 = 0;
+    for (int i = 0; i < BLOCKS; i++) {
+        square += b->forward[i].mean * b->forward[i].mean / BLOCKS;
+        error2 += sum_error2(b->off + i) / BLOCKS;
+    }
+    *error = sqrt(error2);
+    return fmax(sqrt(square), least * b->level / m->scale);
+}
+
+// The mean over its standard error, made normal [wallace1959].
+static double z_of(const Sum *off, double rms) {
+    double error2 = sum_error2(off) + (truncation * rms) * (truncation * rms), degrees = off->n - 1;
+    double t2 = off->mean * off->mean / error2;
+    double z = sqrt(degrees * log1p(t2 / degrees)) * (8 * degrees + 1) / (8 * degrees + 3);
+    return off->mean < 0 ? -z : z;
+}
+
+typedef struct Score {
+    double sum, worst;
+    int n, noisy, judged;
+} Score;
+
+// Adds seeds; whether the standard error became small enough.
+static bool compare(Room room, int param, const Effort *effort, Score *score, bool last) {
+    static float derivative[NUMBERS];
+    Move m = move_make(room, param, effort);
+    Blocks blocks = {.level = 0};
+    double rms = 0, error = 0, worst = 0;
+    int seed = 0;
+    for (; seed < effort->most && (seed < effort->fewest || error > aim * rms); seed++) {
+        double quotient[BLOCKS], forward[BLOCKS];
+        difference(room, &m, (uint32_t)seed, quotient, &blocks.level);
+        rey_render_def def = def_make(effort->spp, (uint32_t)seed, 1);
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, m.tangent, derivative, NULL, NULL));
+        blocks_of(derivative, forward);
+        for (int i = 0; i < BLOCKS; i++) {
+            sum_add(blocks.forward + i, forward[i]);
+            sum_add(blocks.off + i, forward[i] - quotient[i]);
+        }
+        rms = seed ? rms_of(&blocks, &m, &error) : 0;
+    }
+    bool quiet = error <= bound * rms;
+    if (!quiet && !last) {
+        return false;
+    }
+    score->judged++;
+    for (int i = 0; i < BLOCKS; i++) {
+        double z = z_of(blocks.off + i, rms);
+        worst = fabs(z) > fabs(worst) ? z : worst;
+        score->sum += z;
+        score->n++;
+    }
+    score->worst = fmax(score->worst, fabs(worst));
+    if (fabs(worst) > 4 || !quiet || getenv("REYNOLDS_TEST_VERBOSE")) {
+        rey_param_info info;
+        rey_param_get_info(room.scene, param, &info);
+        print_message("%-44s RMS %10.3g, standard error %6.2f %%, %3d x %3d samples, worst z %6.2f\n", info.name, rms,
+                      rms > 0 ? 100 * error / rms : 0, seed, effort->spp, worst);
+    }
+    return quiet;
+}
+
+// In the strict rooms every parameter is judged, in the others those that are quiet at little effort: there samples that
+// move meet edges of shapes and lights. Each slot of a function is quiet in a strict room.
+typedef struct RoomCase {
+    const char *file;
+    bool strict;
+} RoomCase;
+
+static const RoomCase rooms[] = {{"tiles.xml", true},      {"edges.xml", true},       {"materials.xml", false},
+                                 {"shapes.xml", false},    {"principled.xml", false}, {"layers.xml", false},
+                                 {"lights.xml", false}};
+
+static void test_differences(void **state) {
+    const RoomCase *r = *state;
+    Room room = room_open(r->file, 1, 0);
+    Score score = {0};
+    int params = 0;
+    for (int i = 0; i < rey_param_count(room.scene); i++) {
+        if (has_interior(room, i)) {
+            params++;
+            if (!compare(room, i, efforts, &score, false) && r->strict) {
+                score.noisy += !compare(room, i, efforts + 1, &score, true);
+            }
+        }
+    }
+    double p = erfc(score.worst / sqrt(2)), threshold = -expm1(log1p(-0.01 / COUNT_OF(rooms)) / score.n);
+    print_message("%d of %d parameters, %d blocks, largest |z| %.2f, sum / sqrt(n) %.2f\n", score.judged, params, score.n,
+                  score.worst, score.sum / sqrt(score.n));
+    room_close(room);
+    assert_int_equal(score.noisy, 0);
+    assert_true(2 * score.judged > params);
+    assert_true(p > threshold);
+    assert_true(fabs(score.sum) / sqrt(score.n) < 3);
+}
+
+// The rooms whose names are given, all without a name.
+int main(int argc, char **argv) {
+    // Thousands of short renders: their memory is kept.
+    mallopt(M_MMAP_THRESHOLD, 1 << 30);
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
+    struct CMUnitTest tests[COUNT_OF(rooms)];
+    size_t count = 0;
+    for (int i = 0; i < COUNT_OF(rooms); i++) {
+        bool wanted = argc < 2;
+        for (int k = 1; k < argc; k++) {
+            wanted |= strcmp(argv[k], rooms[i].file) == 0;
+        }
+        if (wanted) {
+            tests[count++] = (struct CMUnitTest){rooms[i].file, test_differences, NULL, NULL, (void *)(uintptr_t)(rooms + i)};
+        }
+    }
+    return _cmocka_run_group_tests("differences", tests, count, write_pictures, remove_pictures);
+}
