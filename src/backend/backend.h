@@ -1,11 +1,12 @@
 // backend.h: where kernels run: a handful of functions. Nothing outside this folder knows which backend is in use.
 #pragma once
 
-#include "integrator/job.h"
+#include "integrator/particle_job.h"
 
 typedef struct Backend {
     size_t (*workspace_bytes)(int32_t mode); // without the groups' offsets
     void (*run)(PathJob *job);
+    void (*run_particles)(ParticleJob *job);
 } Backend;
 
 // The CPU's kernels of a SIMD width: 1, 8 or 16.

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "depth", "aov"};
+static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "depth", "aov", "ptracer"};
 
 static const char *integrator_word(void *user, int i) {
     UNUSED(user);
@@ -177,6 +177,10 @@ static rey_result build_wrapper(Builder *b, rey_xml_node *node) {
     if (nested && (is(nested->node, "aov") || is(nested->node, "moment"))) {
         return rey_xml_fail(b->ctx, nested->at, REY_ERROR_UNSUPPORTED, "'%s' inside '%s' is not supported",
                             nested->node->type, node->type);
+    }
+    if (nested && is(node, "moment") && is(nested->node, "ptracer")) {
+        return rey_xml_fail(b->ctx, nested->at, REY_ERROR_UNSUPPORTED,
+                            "'ptracer' inside 'moment' is not supported: its pixels have no samples of their own");
     }
     view->max_depth = nested ? view->max_depth : 0; // no colour
     if (nested) {

@@ -81,7 +81,7 @@ static bool is_known_plugin(const char *type) {
         "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
         "sunsky", "timed_sunsky",
         "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
-        "batch", "volume", "blackbody", "regular", "irregular", "ptracer",
+        "batch", "volume", "blackbody", "regular", "irregular", 
         "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
         "heterogeneous", "gridvolume", "constvolume"};
     for (int i = 0; i < COUNT_OF(known); i++) {

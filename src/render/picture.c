@@ -1,6 +1,7 @@
 // picture.c: pictures, in colour and with more channels. Quantities of the first surface take a pass of their own.
 #include "base/parallel.h"
 #include "math/rng.h"
+#include "render/particles.h"
 #include "render/render_parts.h"
 
 #include <string.h>
@@ -26,6 +27,7 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
     Render r;
     rey_stats one = {0};
     rey_result result = rey_render_begin(&r, scene, def, pass.mode, pass.channels);
+    SceneView lights = scene->view;
     if (result == REY_OK && pass.squares) {
         r.squares = rey_alloc_array(scene->ctx, (size_t)r.tiles * (size_t)r.plan.tile_floats, sizeof(double));
         result = r.squares ? REY_OK : REY_ERROR_MEMORY;
@@ -36,6 +38,11 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
         r.job.spp = r.def.spp;
         r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
         r.total = r.tiles;
+        if (rey_traces_particles(scene) && (lights.max_depth < 0 || lights.max_depth > 1)) {
+            // What the sensor sees of lights directly; particles bring all the rest.
+            lights.max_depth = 1;
+            r.job.scene = &lights;
+        }
         rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
         rey_film_merge(&r.plan, r.films, r.columns, r.rows, 1.0 / r.def.spp, pass.picture);
         if (pass.squares) {
@@ -96,7 +103,8 @@ static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int
     const SceneView *view = &scene->view;
     rey_context *ctx = scene->ctx;
     bool wide = channels > 3, aovs = view->aov_count && (wide || view->colour_is_depth);
-    int parts = !view->colour_is_depth + aovs;
+    bool particles = rey_traces_particles(scene) && (view->max_depth < 0 || view->max_depth > 1);
+    int parts = !view->colour_is_depth + aovs + particles;
     layers->aov_count = aov_channels(view);
     layers->colour = rey_alloc_array(ctx, (size_t)pixels * 3, sizeof(double));
     layers->squares = wide && view->moments ? rey_alloc_array(ctx, (size_t)pixels * 3, sizeof(double)) : NULL;
@@ -107,6 +115,11 @@ static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int
     rey_result result = REY_OK;
     if (!view->colour_is_depth) {
         result = run_pass(scene, def, (Pass){MODE_PRIMAL, 3, 0, parts, layers->colour, layers->squares}, stats);
+    }
+    if (result == REY_OK && particles) {
+        rey_stats one = {0};
+        result = rey_render_particles(scene, def, 1, parts, layers->colour, &one);
+        add_stats(stats, &one);
     }
     if (result == REY_OK && aovs) {
         Pass pass = {MODE_AOV, layers->aov_count, parts - 1, parts, layers->aovs, NULL};

@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "math/rng.h"
 #include "render/live.h"
+#include "render/particles.h"
 #include "render/render_parts.h"
 #include "render/update.h"
 
@@ -124,23 +125,21 @@ static bool go_on(void *user) {
     return !r->cancelled;
 }
 
-// Runs one tile and books its counts; false when the caller cancelled.
-static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
+bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker) {
     if (!go_on(r)) {
         return false;
     }
-    Tile t = rey_film_tile(&r->plan, tile);
-    job->x = t.x;
-    job->y = t.y;
-    job->width = t.width;
-    job->height = t.height;
     job->workspace = r->workspaces[worker];
     job->go_on = go_on;
     job->user = r;
     job->paths = job->rays = job->nonfinite = 0;
     job->trace_seconds = 0;
     double start = rey_thread_seconds();
-    r->backend->run(job);
+    if (particles) {
+        r->backend->run_particles(particles);
+    } else {
+        r->backend->run(job);
+    }
     double seconds = rey_thread_seconds() - start;
     pthread_mutex_lock(&r->lock);
     r->stats.paths += job->paths;
@@ -151,6 +150,15 @@ static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
     r->done += 1;
     pthread_mutex_unlock(&r->lock);
     return !r->cancelled;
+}
+
+static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
+    Tile t = rey_film_tile(&r->plan, tile);
+    job->x = t.x;
+    job->y = t.y;
+    job->width = t.width;
+    job->height = t.height;
+    return rey_render_run(r, job, NULL, worker);
 }
 
 void rey_render_film_unit(void *argument, int64_t item, int worker) {
@@ -298,8 +306,9 @@ static bool selection_given(rey_selection selection) {
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
                                    int32_t mode) {
     rey_result result = rey_render_begin(r, scene, def, mode, 3);
-    if (result == REY_OK && scene->view.colour_is_depth) {
-        result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the integrator 'depth' has no derivatives");
+    if (result == REY_OK && (scene->view.colour_is_depth || rey_traces_particles(scene))) {
+        result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
+                          "the integrator '%s' has no derivatives, 'path' has", scene->integrator);
     }
     if (result == REY_OK) {
         result = check_terms(scene, def, selection);

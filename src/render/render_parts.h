@@ -33,5 +33,7 @@ typedef struct Render {
 // Checks, brings the scene up to date and prepares what every mode needs. rey_render_end follows in any case.
 rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels);
 rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats);
+// Runs a unit of work and books its counts; false when the caller cancelled. particles: of which job is the part, or null.
+bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker);
 // One tile into its film; fits rey_parallel_for.
 void rey_render_film_unit(void *render, int64_t tile, int worker);
