@@ -24,7 +24,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 FILES = ["src/bsdf/*.h", "src/math/fresnel.h", "src/math/microfacet.h", "src/math/vec.h", "src/emitter/emitter.h",
          "src/scene/texture.h", "src/scene/texture_gradient.h", "src/scene/sink.h", "src/shape/*.h",
          "src/integrator/path_adj.h"]
-LEAVES, RENDERS = ["test_math_leaves", "test_kinds_adjoint", "test_lights"], ["test_gradients"]
+LEAVES, RENDERS = ["test_math_leaves", "test_kinds_adjoint", "test_lights"], ["test_gradients", "test_differences"]
 
 FUNCTION = re.compile(r"^(?:KFN|static|static NOINLINE) (\w+) .*?\b(\w+_adj|\w+_adj_real|sink_add\w*|path_backward|forward_flush|"
                       r"slot_adjoint|surface_values)\(")
@@ -102,7 +102,7 @@ def mutations(text, returns):
     if CALL.match(text):
         return [("drop", ";")]
     m = DECLARE.match(text)
-    if m and not re.search(r", \w+ =", m[4]) and not m[4].endswith("_zero()"):
+    if m and not re.search(r", \w+ =", m[4]) and not m[4].endswith(("_zero()", "f_set(0)")):
         return [("sign", f"{m[2]} {m[3]} = " + FLIPPED[m[2]].format(sign="SIGN", x=m[4]) + ";")]
     m = RETURN.match(text)
     if m and returns in FLIPPED and not m[2].endswith("_zero()"):

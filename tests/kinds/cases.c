@@ -82,7 +82,7 @@ int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool tex
         t.kind = TEXTURE_CHECKERBOARD;
         t.to_uv = uniform(r) < 0.5 ? add_to_uv(c, r) : -1;
         t.child[0] = case_texture(c, r, p, owner, uniform(r) < 0.5);
-        t.child[1] = case_texture(c, r, p, owner, false);
+        t.child[1] = case_texture(c, r, p, owner, p->type == PARAM_HEIGHT);
         t.channels = 3;
     } else if (sort < 0.85) {
         t.kind = TEXTURE_BITMAP;

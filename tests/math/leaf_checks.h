@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-enum { LEAF_MAX = 8 }; // most inputs or outputs of a leaf
+enum { LEAF_MAX = 12 }; // most inputs or outputs of a leaf
 
 // value tolerances: |float - double| <= relative * |double| + absolute.
 typedef struct LeafInfo {
@@ -36,7 +36,10 @@ typedef struct LeafInfo {
     L(ATAN2, f_atan2, 2, 1, false, 0, 4e-7, 0)                                                                         \
     L(ACOS, f_acos, 1, 1, false, 0, 4e-7, 0)                                                                           \
     L(ERFINV, f_erfinv, 1, 1, false, 1e-5, 1e-7, 0)                                                                    \
-    L(ERF, f_erf, 1, 1, false, 2e-6, 3e-7, 0)
+    L(ERF, f_erf, 1, 1, false, 2e-6, 3e-7, 0)                                                                          \
+    L(CROSS, v3_cross, 6, 3, true, 1e-6, 1e-6, 2e-6)                                                                   \
+    L(NORMALIZE, v3_normalize, 3, 3, true, 1e-6, 1e-7, 1e-5)                                                           \
+    L(TO_LOCAL, frame_to_local, 12, 3, true, 1e-6, 1e-6, 2e-6)
 
 #define LEAF_ENUM(id, name, ...) LEAF_##id,
 enum { LEAVES(LEAF_ENUM) LEAF_COUNT };

@@ -19,6 +19,7 @@ KFN void put3(Float *p, Vec3 v) {
     p[1] = v.y;
     p[2] = v.z;
 }
+KFN Frame frame_at(const Float *p) { return (Frame){.s = at3(p), .t = at3(p + 3), .n = at3(p + 6)}; }
 // The normal on v's own side: masking is then decided by v alone.
 KFN Vec3 up(void) { return v3(f_set(0), f_set(0), f_set(1)); }
 
@@ -63,6 +64,13 @@ static void leaf_value(int leaf, const Float *in, Float *out) {
         put3(out, microfacet_sample(&mf, up(), in[2], in[3]));
         break;
     }
+    case LEAF_CROSS: put3(out, v3_cross(at3(in), at3(in + 3))); break;
+    case LEAF_NORMALIZE: put3(out, v3_normalize(at3(in))); break;
+    case LEAF_TO_LOCAL: {
+        Frame f = frame_at(in);
+        put3(out, frame_to_local(&f, at3(in + 9)));
+        break;
+    }
     case LEAF_EXP: out[0] = f_exp(in[0]); break;
     case LEAF_LOG: out[0] = f_log(in[0]); break;
     case LEAF_SINCOS: f_sincos(in[0], &out[0], &out[1]); break;
@@ -101,6 +109,29 @@ static void leaf_adj(int leaf, const Float *in, const Float *dout, Float *din) {
         microfacet_alpha_adj(in[0], du, &din[0]);
         microfacet_alpha_adj(in[1], dv, &din[1]);
         put3(din + 2, d3);
+        break;
+    }
+    case LEAF_CROSS: {
+        Vec3 da = at3(din), db = at3(din + 3);
+        v3_cross_adj(at3(in), at3(in + 3), at3(dout), &da, &db);
+        put3(din, da);
+        put3(din + 3, db);
+        break;
+    }
+    case LEAF_NORMALIZE: {
+        Vec3 da = at3(din);
+        v3_normalize_adj(at3(in), at3(dout), &da);
+        put3(din, da);
+        break;
+    }
+    case LEAF_TO_LOCAL: {
+        Frame f = frame_at(in), df = frame_at(din);
+        Vec3 dv = at3(din + 9);
+        frame_to_local_adj(&f, at3(in + 9), at3(dout), &df, &dv);
+        put3(din, df.s);
+        put3(din + 3, df.t);
+        put3(din + 6, df.n);
+        put3(din + 9, dv);
         break;
     }
     default: break;
