@@ -10,16 +10,16 @@
 // Share of such normals: none for pictures (floor = 0), and none where the other side's index ratio e is at least 1.
 KFN Float critical_share(Float e, real floor) { return f_zero_unless(m_lt(e, f_set(1)), f_set(floor)); }
 
+// (c e)^2 = e^2 - s^2 with the sine s between wi and m: for small e the cosines are all near 1 and have no digits left.
 KFN Float critical_pdf(Vec3 wi, Vec3 m, Float e) {
-    Float a = v3_dot(wi, m), c2e2 = a * a - (1.0f - e) * (1.0f + e);
+    Float a = v3_dot(wi, m), s = v3_length(v3_cross(wi, m)), c2e2 = (e - s) * (e + s);
     // The smallest c is that of rounding.
     Float ce = f_max(f_safe_sqrt(c2e2), f_set(1e-6f));
     return f_zero_unless(m_gt(c2e2, f_set(0)) & m_gt(a, f_set(0)), INV_TWO_PI * a / (e * ce));
 }
 
 KFN Vec3 critical_sample(Vec3 wi, Float e, Vec2 u) {
-    Float a = f_min(f_safe_sqrt((1.0f - e) * (1.0f + e) + f_sqr(e * u.x)), f_set(1));
-    Float sine, cosine, r = f_safe_sqrt((1.0f - a) * (1.0f + a));
+    Float sine, cosine, r = e * f_safe_sqrt((1.0f - u.x) * (1.0f + u.x)), a = f_safe_sqrt((1.0f - r) * (1.0f + r));
     f_sincos(TWO_PI * u.y, &sine, &cosine);
     Frame frame = frame_from_normal(wi);
     return frame_to_world(&frame, v3(r * cosine, r * sine, a));
