@@ -81,11 +81,24 @@ static void test_blackbody(void **state) {
     assert_true(fabs(rey_blackbody(456, 5000) / 10997.9 - 1) < 1e-5);
     assert_true(fabs(rey_blackbody(700, 5000) / 11812 - 1) < 1e-5);
     assert_true(rey_blackbody(350, 5000) == 0 && rey_blackbody(840, 5000) == 0 && rey_blackbody(500, 0) == 0);
-    double cold[3], warm[3];
-    rey_blackbody_to_rgb(2800, warm);
-    rey_blackbody_to_rgb(6504, cold);
+    double cold[3], warm[3], slope[3], more[3], less[3];
+    rey_blackbody_to_rgb(2800, 0, 1000, warm, NULL);
+    rey_blackbody_to_rgb(6504, 0, 1000, cold, slope);
     assert_true(warm[0] > warm[1] && warm[1] > warm[2] && cold[0] > warm[0]);
     assert_true(fabs(cold[0] / cold[1] - 1.06028) < 1e-4 && fabs(cold[2] / cold[1] - 1.05314) < 1e-4); // close to white
+    rey_blackbody_to_rgb(6505, 0, 1000, more, NULL);
+    rey_blackbody_to_rgb(6503, 0, 1000, less, NULL);
+    for (int c = 0; c < 3; c++) {
+        assert_true(fabs((more[c] - less[c]) / 2 / slope[c] - 1) < 1e-6);
+    }
+    rey_blackbody_to_rgb(900, 0, 1000, warm, slope); // more yellow than sRGB
+    assert_true(warm[0] > 0 && slope[0] > 0 && warm[2] == 0 && slope[2] == 0);
+    rey_blackbody_to_rgb(5000, 360, 560, less, NULL);
+    rey_blackbody_to_rgb(5000, 560.1, 830, more, NULL);
+    rey_blackbody_to_rgb(5000, 0, 1000, warm, NULL);
+    assert_true(fabs((less[1] + more[1]) / warm[1] - 1) < 1e-12 && less[1] > 0 && more[1] > 0);
+    rey_blackbody_to_rgb(0, 0, 1000, warm, slope);
+    assert_true(warm[0] == 0 && slope[0] == 0);
 }
 
 static void test_materials(void **state) {

@@ -10,10 +10,10 @@ EMITTER_SLOTS(Area, AREA_PARAMS)
 KFN LightSample area_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
     const ShapeRecord *shape = scene->shapes + l->e->shape;
     Int id = l->many ? EMITTER_FIELD(scene, l->id, shape) : i_set(l->e->shape);
-    Hit hit = l->many ? mesh_sample_many(scene, id, u) : shape_sample(scene, l->e->shape, ref, u);
-    Interaction si = shape_interaction(scene, l->many ? SHAPE_MESH : shape->kind, shape->flags, &hit);
+    Hit hit = l->many ? shape_sample_many(scene, shape->kind, id, ref, u) : shape_sample(scene, l->e->shape, ref, u);
+    Interaction si = shape_interaction(scene, shape->kind, shape->flags, &hit);
     LightSample s = light_at_point(ref, si.p);
-    s.pdf = l->many ? area_density(ref, s.d, &si, SHAPE_FLOAT(scene, id, area))
+    s.pdf = l->many ? shape_pdf_many(scene, shape->kind, id, ref, s.d, &si)
                     : shape_pdf(scene, l->e->shape, ref, s.d, &si);
     s.uv = l->e->attributes ? (Vec2){hit.u, hit.v} : si.uv;
     s.prim = hit.prim;

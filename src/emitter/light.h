@@ -94,11 +94,27 @@ KFN void light_sink_add(Sink *sink, Int at, Float d, Mask m) {
     sink_add(sink, i_max(at, i_set(0)), d, m);
 }
 
+// Of lights whose colour is a black body's: the adjoint of the temperature.
+KFN void light_blackbody_adj(const SceneView *scene, const Light *l, int slot, Spec d, Sink *sink, Mask m) {
+    Int texture = light_slot(scene, l, slot), at = light_constant(scene, l, slot) + BLACKBODY_SLOPE;
+    Int child = i_gather((const int32_t *)scene->textures, texture * (int32_t)(sizeof(TextureNode) / 4) +
+                                                               (int32_t)(offsetof(TextureNode, child) / 4));
+    Float sum = f_set(0);
+    for (int c = 0; c < SPEC_N; c++) {
+        sum = sum + d.c[c] * theta_at(scene, at + c);
+    }
+    light_sink_add(sink, i_gather(sink->texture_at, child), sum, m);
+}
+
 // Accumulates the adjoint of light_colour into the sink and into duv (may be null).
 KFN void light_colour_adj(const SceneView *scene, const Light *l, int slot, TexCoord uv, Spec d, Vec2 *duv, Sink *sink,
                           Mask m) {
     if (!l->many) {
         texture_adj(scene, l->e->slot[slot], uv, d, duv, sink, m);
+        return;
+    }
+    if (scene->textures[l->e->slot[slot]].kind == TEXTURE_BLACKBODY) { // of one, so of all in the family
+        light_blackbody_adj(scene, l, slot, d, sink, m);
         return;
     }
     Int at = i_gather(sink->texture_at, light_slot(scene, l, slot));

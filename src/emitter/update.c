@@ -5,8 +5,10 @@
 #include "emitter/table.h"
 
 enum {
-    SORTS = 64,         // combinations of the flags of shapes
-    SMALLEST_FAMILY = 2 // lights from which on gathering pays
+    FLAG_SORTS = 64,     // combinations of the flags of shapes
+    BLACK_SORTS = 4,     // of which colours are those of black bodies
+    MOST_FAMILIES = 32,  // further ones stay alone
+    SMALLEST_FAMILY = 2  // lights from which on gathering pays
 };
 
 rey_result rey_emitter_update(rey_scene *scene, int32_t id) {
@@ -18,37 +20,48 @@ rey_result rey_emitter_update(rey_scene *scene, int32_t id) {
 }
 
 // Lights whose numbers can be gathered belong to one family when kernels treat them alike: the same kind, all textures
-// constant and, for surfaces, a mesh with the same flags. Returns the number of that sort, -1 for the others.
+// constant, the same ones of black bodies and, for surfaces, the same flags and a kind of shape that can do it. Returns
+// the number of that sort, -1 for the others.
 static int32_t family_sort(const SceneView *view, const EmitterRecord *e) {
     const EmitterKind *kind = rey_emitter_kinds + e->kind;
+    int32_t black = 0;
     for (int i = 0; i < kind->param_count; i++) {
         EmitterParamType type = kind->params[i].type;
         bool colour = type == EMITTER_PARAM_EMISSION || type == EMITTER_PARAM_COLOUR;
         const TextureNode *t = view->textures + e->slot[i];
-        if (colour && (t->kind != TEXTURE_CONSTANT || t->channels != 3)) {
+        if (colour && ((t->kind != TEXTURE_CONSTANT && t->kind != TEXTURE_BLACKBODY) || t->channels != 3)) {
             return -1;
         }
+        black |= colour && t->kind == TEXTURE_BLACKBODY ? (i > 0 ? 2 : 1) : 0;
     }
+    int32_t first = (e->kind * BLACK_SORTS + black) * SHAPE_KIND_COUNT * FLAG_SORTS;
     if (kind->form == EMITTER_IS_DELTA) {
-        return e->kind * SORTS;
+        return first;
     }
     const ShapeRecord *shape = view->shapes + e->shape;
-    bool mesh = kind->form == EMITTER_IS_SURFACE && shape->kind == SHAPE_MESH;
-    return mesh ? e->kind * SORTS + (shape->flags & (SORTS - 1)) : -1;
+    bool known = kind->form == EMITTER_IS_SURFACE && shape_samples_many(shape->kind);
+    return known ? first + shape->kind * FLAG_SORTS + (shape->flags & (FLAG_SORTS - 1)) : -1;
 }
 
 // A family is named by its first member.
 static void find_families(SceneView *view) {
-    int32_t first[EMITTER_KIND_COUNT * SORTS], count[EMITTER_KIND_COUNT * SORTS] = {0};
+    int32_t sorts[MOST_FAMILIES], first[MOST_FAMILIES], count[MOST_FAMILIES] = {0}, n = 0;
     for (int64_t i = 0; i < view->emitters_count; i++) {
-        int32_t sort = family_sort(view, view->emitters + i);
-        if (sort >= 0 && count[sort]++ == 0) {
-            first[sort] = (int32_t)i;
+        int32_t sort = family_sort(view, view->emitters + i), k = 0;
+        while (k < n && sorts[k] != sort) {
+            k++;
         }
+        if (k == n && sort >= 0 && n < MOST_FAMILIES) {
+            sorts[n] = sort;
+            first[n] = (int32_t)i;
+            n++;
+        }
+        view->emitters[i].family = k < n ? k : -1;
+        count[k < n ? k : 0] += k < n;
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
-        int32_t sort = family_sort(view, view->emitters + i);
-        view->emitters[i].family = sort >= 0 && count[sort] >= SMALLEST_FAMILY ? first[sort] : -1;
+        int32_t *family = &view->emitters[i].family;
+        *family = *family >= 0 && count[*family] >= SMALLEST_FAMILY ? first[*family] : -1;
     }
 }
 

@@ -95,6 +95,11 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
 // A texture that reads a mesh's attribute; and, once all shapes and textures are known, who finds what where.
 rey_result build_attribute_texture(Builder *b, rey_xml_node *node, int32_t texture);
 rey_result build_attribute_tables(Builder *b);
+// A spectrum as an object.
+rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
+// Appends a texture node with identity mapping; *theta has room for count numbers. Where a texture came from.
+rey_result build_add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta);
+rey_result build_note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture);
 // A constant number that is no parameter.
 rey_result build_number(Builder *b, float value, int32_t *out);
 // A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.

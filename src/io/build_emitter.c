@@ -5,7 +5,10 @@
 
 #include <string.h>
 
-static const char *const pose_why = "moving a light moves its shadows and its outline";
+static const char *const pose_why = "moving a light moves its shadows";
+static const char *const beam_why = "without a soft edge the border of the beam is a jump";
+static const char *const picture_why = "moving a projector moves its shadows and the border of the picture, which is a jump";
+static const char *const texture_why = "moving a light moves its shadows and the texture, which jumps";
 
 static const char *emitter_word(void *user, int i) {
     UNUSED(user);
@@ -36,15 +39,20 @@ static float constant_value(const Builder *b, int32_t texture) {
     return ARRAY_AT(b->scene->build.theta, float, ARRAY_AT(b->scene->build.textures, TextureNode, texture).theta);
 }
 
-// A number whose default is a fraction of the one before. Where the two agree, what lies between them is a jump.
+// Where a beam's two angles agree, what lies between them is a jump.
+static bool is_hard(const Builder *b, int32_t fraction, int32_t whole) {
+    return constant_value(b, fraction) >= constant_value(b, whole);
+}
+
+// A number whose default is a fraction of the one before.
 static rey_result fraction_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, const char *path, int32_t whole,
                                 int32_t *out) {
     TRY(number_slot(b, node, p, (double)(p->value * constant_value(b, whole)), path, out));
-    for (size_t i = 0; constant_value(b, *out) >= constant_value(b, whole) && i < b->scene->params.count; i++) {
+    for (size_t i = 0; is_hard(b, *out, whole) && i < b->scene->params.count; i++) {
         Param *param = &ARRAY_AT(b->scene->params, Param, i);
         if (param->texture == whole || param->texture == *out) {
             param->terms |= REY_TERM_PRIMARY | REY_TERM_INDIRECT;
-            param->why = "without a soft edge the border of the beam is a jump";
+            param->why = beam_why;
         }
     }
     return REY_OK;
@@ -203,6 +211,29 @@ static rey_result image_slot(Builder *b, rey_xml_node *node, const EmitterParam 
 
 // ---- lights ------------------------------------------------------------------------------------------------------
 
+static bool texture_jumps(const Builder *b, int32_t texture) {
+    const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, texture);
+    return t->kind == TEXTURE_CHECKERBOARD || (t->kind == TEXTURE_BITMAP && t->filter == FILTER_NEAREST);
+}
+
+// What a light casts moves with it: the parameter for its place, which comes after what it casts.
+static Param place_param(const Builder *b, const EmitterKind *kind, const EmitterRecord *e, int32_t id, int place) {
+    Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_INDIRECT, .why = pose_why, .emitter = id,
+               .place = place};
+    for (int i = place - 1; i >= 0 && kind->params[place].type == EMITTER_PARAM_POSE; i--) {
+        EmitterParamType type = kind->params[i].type;
+        const char *why = type == EMITTER_PARAM_FOV                                                    ? picture_why
+                          : type == EMITTER_PARAM_FRACTION && is_hard(b, e->slot[i], e->slot[i - 1]) ? beam_why
+                          : type <= EMITTER_PARAM_COLOUR && texture_jumps(b, e->slot[i])             ? texture_why
+                                                                                                     : NULL;
+        if (why) {
+            p.terms |= REY_TERM_PRIMARY;
+            p.why = why;
+        }
+    }
+    return p;
+}
+
 // Brings the rows of the kind's parameters into the record's slots.
 static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *kind, int32_t id, const char *path,
                              EmitterRecord *e) {
@@ -210,8 +241,7 @@ static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *
         const EmitterParam *row = kind->params + i;
         char name[MAX_PATH_NAME];
         build_join(name, path, row->name);
-        Param place = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_INDIRECT, .why = pose_why, .emitter = id,
-                       .place = i};
+        Param place = place_param(b, kind, e, id, i);
         int32_t *slot = &e->slot[i];
         switch (row->type) {
         case EMITTER_PARAM_EMISSION:

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-static rey_result note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture) {
+rey_result build_note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture) {
     TextureSource *s = rey_array_push(b->ctx, &b->source->textures, sizeof *s, 1);
     if (!s) {
         return REY_ERROR_MEMORY;
@@ -13,8 +13,7 @@ static rey_result note_source(Builder *b, rey_xml_node *node, const char *proper
     return REY_OK;
 }
 
-// Appends a texture node with identity mapping; *theta has room for count numbers.
-static rey_result add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta) {
+rey_result build_add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta) {
     rey_scene *scene = b->scene;
     int32_t at = rey_scene_append(scene, &scene->build.theta, sizeof(float), count);
     *id = rey_scene_append(scene, &scene->build.textures, sizeof(TextureNode), 1);
@@ -38,7 +37,7 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
                           int count, const char *path, int32_t *out) {
     float *theta;
     char name[MAX_PATH_NAME];
-    TRY(add_texture(b, TEXTURE_CONSTANT, count, out, &theta));
+    TRY(build_add_texture(b, TEXTURE_CONSTANT, count, out, &theta));
     TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     t->channels = count;
     for (int i = 0; i < count; i++) {
@@ -57,21 +56,14 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
         return REY_ERROR_MEMORY;
     }
     TRY(rey_scene_add_alias(b->scene, path, param));
-    return note_source(b, node, property, *out);
+    return build_note_source(b, node, property, *out);
 }
 
 rey_result build_number(Builder *b, float value, int32_t *out) {
     float *theta;
-    TRY(add_texture(b, TEXTURE_CONSTANT, 1, out, &theta));
+    TRY(build_add_texture(b, TEXTURE_CONSTANT, 1, out, &theta));
     theta[0] = value;
     return REY_OK;
-}
-
-static const char *texture_word(void *user, int i) {
-    static const char *const words[] = {"bitmap", "checkerboard", "mesh_attribute", "rawconstant", "srgb", "uniform", "d65", "blackbody",
-                                        "regular", "irregular"};
-    UNUSED(user);
-    return i < COUNT_OF(words) ? words[i] : NULL;
 }
 
 // The image's values: RGB or one channel, linear.
@@ -139,7 +131,7 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
     float *theta;
     int64_t count = (int64_t)image.width * image.height * image.channels;
     if (result == REY_OK) {
-        result = add_texture(b, TEXTURE_BITMAP, count, out, &theta);
+        result = build_add_texture(b, TEXTURE_BITMAP, count, out, &theta);
     }
     if (result == REY_OK) {
         memcpy(theta, image.data, (size_t)count * sizeof *theta);
@@ -160,7 +152,7 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
         result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR && wrap != WRAP_CLAMP);
     }
     rey_image_free(b->ctx, &image);
-    return result == REY_OK ? note_source(b, node, NULL, *out) : result;
+    return result == REY_OK ? build_note_source(b, node, NULL, *out) : result;
 }
 
 static rey_result build_checkerboard(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
@@ -172,12 +164,12 @@ static rey_result build_checkerboard(Builder *b, rey_xml_node *node, TextureUse 
     TRY(build_slot(b, node, "color0", use, &c0, 1, name, &child[0]));
     build_join(name, path, "color1");
     TRY(build_slot(b, node, "color1", use, &c1, 1, name, &child[1]));
-    TRY(add_texture(b, TEXTURE_CHECKERBOARD, 0, out, &theta));
+    TRY(build_add_texture(b, TEXTURE_CHECKERBOARD, 0, out, &theta));
     TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     t->child[0] = child[0];
     t->child[1] = child[1];
     TRY(bitmap_to_uv(b, node, path, *out, false));
-    return note_source(b, node, NULL, *out);
+    return build_note_source(b, node, NULL, *out);
 }
 
 static rey_result build_attribute(Builder *b, rey_xml_node *node, const char *path, int32_t *out) {
@@ -191,48 +183,12 @@ static rey_result build_attribute(Builder *b, rey_xml_node *node, const char *pa
     if (ARRAY_AT(b->scene->build.textures, TextureNode, scale).kind != TEXTURE_CONSTANT) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'scale' of a mesh_attribute must be a number");
     }
-    TRY(add_texture(b, TEXTURE_ATTRIBUTE, 0, out, &theta));
+    TRY(build_add_texture(b, TEXTURE_ATTRIBUTE, 0, out, &theta));
     TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     t->child[0] = scale;
     t->channels = 3;
     TRY(build_attribute_texture(b, node, *out));
-    return note_source(b, node, NULL, *out);
-}
-
-// Spectra written as objects become constants.
-static rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
-    double rgb[3] = {1, 1, 1};
-    int count = 3;
-    const char *property = NULL;
-    if (strcmp(node->type, "rawconstant") == 0 || strcmp(node->type, "uniform") == 0) {
-        rey_xml_property *p = rey_xml_find(node, "value");
-        property = "value";
-        if (p && p->kind == REY_XML_VECTOR_VALUE) {
-            TRY(rey_xml_get_vec3(b->ctx, node, "value", rgb, rgb));
-        } else {
-            TRY(rey_xml_get_float(b->ctx, node, "value", 1, &rgb[0]));
-            rgb[1] = rgb[2] = rgb[0];
-            count = use.real ? 1 : 3;
-        }
-    } else if (strcmp(node->type, "srgb") == 0) {
-        property = "color";
-        TRY(rey_xml_require(b->ctx, node, "color"));
-        TRY(rey_xml_get_colour(b->ctx, node, "color", use.colour, rgb, rgb));
-        bool unbounded;
-        TRY(rey_xml_get_bool(b->ctx, node, "unbounded", false, &unbounded));
-    } else if (strcmp(node->type, "d65") == 0) {
-        double scale;
-        TRY(rey_xml_get_float(b->ctx, node, "scale", 1, &scale));
-        if (rey_xml_has(node, "color")) {
-            TRY(rey_xml_get_colour(b->ctx, node, "color", REY_COLOUR_EMISSION, rgb, rgb));
-        }
-        for (int k = 0; k < 3; k++) {
-            rgb[k] *= scale;
-        }
-    } else {
-        return build_unknown(b, node, texture_word, NULL);
-    }
-    return build_constant(b, node, property, use, rgb, count, path, out);
+    return build_note_source(b, node, NULL, *out);
 }
 
 // A texture that several slots share needs the terms of all of them.

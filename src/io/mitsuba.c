@@ -78,10 +78,10 @@ static bool is_known_plugin(const char *type) {
     static const char *const known[] = {
         "thindielectric", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
         "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
-        "dielectric", "conductor", "plastic", "roughplastic", "directional", "spot", "projector", "directionalarea",
+        "dielectric", "conductor", "plastic", "roughplastic",
         "sunsky", "timed_sunsky",
         "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
-        "batch", "volume", "blackbody", "regular", "irregular", 
+        "batch", "volume",
         "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
         "heterogeneous", "gridvolume", "constvolume"};
     for (int i = 0; i < COUNT_OF(known); i++) {

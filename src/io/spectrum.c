@@ -8,48 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-enum { SHORTEST = 360, LONGEST = 830, STEP = 5, ENTRIES = (LONGEST - SHORTEST) / STEP + 1, SAMPLES = 1000 };
-
-static const double observer[ENTRIES][4] = {
-#include "io/spectrum_tables.inl"
-};
-
-// Integral of the y curve over the range, by which a spectrum of 1 has Y = 1.
-static const double y_integral = 106.7502593994140625;
-
-static const double xyz_to_rgb[3][3] = {
-    {3.240479, -1.537150, -0.498535}, {-0.969256, 1.875991, 0.041556}, {0.055648, -0.204043, 1.057311}};
-
-static double table_value(double wavelength, int column) {
-    if (!(wavelength >= SHORTEST && wavelength <= LONGEST)) {
-        return 0;
-    }
-    double position = (wavelength - SHORTEST) / STEP;
-    int i = (int)position < ENTRIES - 2 ? (int)position : ENTRIES - 2;
-    double t = position - i;
-    return observer[i][column] * (1 - t) + observer[i + 1][column] * t;
-}
-
-void rey_cie1931(double wavelength, double xyz[3]) {
-    for (int i = 0; i < 3; i++) {
-        xyz[i] = table_value(wavelength, i);
-    }
-}
-
-double rey_d65(double wavelength) {
-    return table_value(wavelength, 3);
-}
-
-// Planck's law: L = 2 h c^2 / lambda^5 / (exp(h c / (lambda k T)) - 1), CODATA 2018 constants.
-double rey_blackbody(double wavelength, double temperature) {
-    const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
-    if (!(wavelength >= SHORTEST && wavelength <= LONGEST) || !(temperature > 0)) {
-        return 0;
-    }
-    double metres = wavelength * 1e-9;
-    double per_metre = 2 * h * c * c / pow(metres, 5) / expm1(h * c / (metres * k * temperature));
-    return per_metre * 1e-9;
-}
+enum { SAMPLES = 1000 };
 
 double rey_luminance(const double rgb[3]) {
     return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
@@ -68,25 +27,6 @@ static double pair_value(const rey_spectrum *s, double wavelength, int *at) {
     return s->values[*at] * (1 - t) + s->values[*at + 1] * t;
 }
 
-static double sample_wavelength(int i) {
-    return SHORTEST + (LONGEST - SHORTEST) * (i / (double)(SAMPLES - 1));
-}
-
-// Adds one of the SAMPLES equally spaced samples of a spectrum to its colour.
-static void add_sample(double xyz[3], double wavelength, double value) {
-    double weight = value * (LONGEST - SHORTEST) / (y_integral * SAMPLES), cmf[3];
-    rey_cie1931(wavelength, cmf);
-    for (int i = 0; i < 3; i++) {
-        xyz[i] += weight * cmf[i];
-    }
-}
-
-static void to_rgb(const double xyz[3], double rgb[3]) {
-    for (int i = 0; i < 3; i++) {
-        rgb[i] = xyz_to_rgb[i][0] * xyz[0] + xyz_to_rgb[i][1] * xyz[1] + xyz_to_rgb[i][2] * xyz[2];
-    }
-}
-
 static void clip(double rgb[3], double high) {
     for (int i = 0; i < 3; i++) {
         rgb[i] = rgb[i] > 0 ? (rgb[i] < high ? rgb[i] : high) : 0;
@@ -97,11 +37,11 @@ static void integrate(const rey_spectrum *s, bool under_d65, double rgb[3]) {
     double xyz[3] = {0};
     int at = 0;
     for (int i = 0; i < SAMPLES; i++) {
-        double wavelength = sample_wavelength(i);
+        double wavelength = rey_colour_wavelength(i, SAMPLES);
         double value = pair_value(s, wavelength, &at);
-        add_sample(xyz, wavelength, under_d65 ? value * rey_d65(wavelength) * REY_D65_SCALE : value);
+        rey_colour_add(xyz, wavelength, under_d65 ? value * rey_d65(wavelength) * REY_D65_SCALE : value, SAMPLES);
     }
-    to_rgb(xyz, rgb);
+    rey_xyz_to_rgb(xyz, rgb);
 }
 
 void rey_spectrum_to_rgb(const rey_spectrum *s, rey_colour_use use, double rgb[3]) {
@@ -110,7 +50,7 @@ void rey_spectrum_to_rgb(const rey_spectrum *s, rey_colour_use use, double rgb[3
         clip(rgb, use == REY_COLOUR_REFLECTANCE ? 1 : INFINITY);
     } else if (use == REY_COLOUR_EMISSION) {
         const double equal_energy[3] = {s->flat, s->flat, s->flat};
-        to_rgb(equal_energy, rgb);
+        rey_xyz_to_rgb(equal_energy, rgb);
     } else {
         rgb[0] = rgb[1] = rgb[2] = s->flat;
     }
@@ -123,16 +63,6 @@ void rey_spectrum_to_rgb_unweighted(const rey_spectrum *s, double rgb[3]) {
     } else {
         rgb[0] = rgb[1] = rgb[2] = s->flat;
     }
-}
-
-void rey_blackbody_to_rgb(double temperature, double rgb[3]) {
-    double xyz[3] = {0};
-    for (int i = 0; i < SAMPLES; i++) {
-        double wavelength = sample_wavelength(i);
-        add_sample(xyz, wavelength, rey_blackbody(wavelength, temperature));
-    }
-    to_rgb(xyz, rgb);
-    clip(rgb, INFINITY);
 }
 
 // ---- text files --------------------------------------------------------------------------------------------------

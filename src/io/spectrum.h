@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/context.h"
+#include "math/colour.h"
 
 // A spectrum as written: count 0 is the constant `flat`; otherwise count >= 2 pairs with strictly ascending
 // wavelengths [nm], linear between them and 0 outside. The arrays belong to whoever made the spectrum.
@@ -26,17 +27,6 @@ void rey_spectrum_to_rgb(const rey_spectrum *spectrum, rey_colour_use use, doubl
 void rey_spectrum_to_rgb_unweighted(const rey_spectrum *spectrum, double rgb[3]);
 
 double rey_luminance(const double rgb[3]); // Y of linear sRGB
-
-// CIE 1931 2 degree colour matching functions at a wavelength [nm], linear between 5 nm steps, 0 outside 360..830.
-void rey_cie1931(double wavelength, double xyz[3]);
-// Relative power of CIE illuminant D65 (100 at 560 nm), 0 outside 360..830 nm. Times REY_D65_SCALE it has Y = 1.
-double rey_d65(double wavelength);
-#define REY_D65_SCALE (1.0 / 98.99741751876255)
-// Spectral radiance of a black body of that temperature [K], in kW m^-2 sr^-1 um^-1 (= W m^-2 sr^-1 nm^-1), 0 outside
-// 360..830 nm.
-double rey_blackbody(double wavelength, double temperature);
-// Linear sRGB of a black body's emission.
-void rey_blackbody_to_rgb(double temperature, double rgb[3]);
 
 // Reads a text file of `wavelength value` lines with # comments. *out borrows *storage, which the caller frees with
 // rey_free. In the memory form, file is the name in messages.

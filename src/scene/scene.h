@@ -7,7 +7,10 @@
 
 enum { MAX_SLOTS = 16, MAX_CONFIG = 4, MAX_CHILDREN = 2, MAX_EMITTER_SLOTS = 5 };
 
-enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_ATTRIBUTE };
+enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_ATTRIBUTE, TEXTURE_BLACKBODY };
+// What a black body derives from its temperature, in theta: colour, derivative, the temperature that these belong to; and
+// the wavelengths that it emits.
+enum { BLACKBODY_SLOPE = 3, BLACKBODY_BUILT = 6, BLACKBODY_RANGE = 7, BLACKBODY_NUMBERS = 9 };
 enum { FILTER_NEAREST, FILTER_BILINEAR };
 enum { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
 
@@ -17,7 +20,7 @@ typedef struct TextureNode {
     int32_t width, height, channels; // channels 1 or 3
     int32_t filter, wrap;
     int32_t to_uv;    // theta offset of a row-major 3 x 3 matrix, -1 = identity
-    int32_t child[2]; // checkerboard: color0, color1; mesh_attribute: scale, -1
+    int32_t child[2]; // checkerboard: color0, color1; mesh_attribute: scale, -1; blackbody: temperature, -1
     int32_t attribute; // mesh_attribute: its first entry in `attributes`
     int32_t per_face;
 } TextureNode;

@@ -162,7 +162,7 @@ KFN Spec luminance_adj(Float d) {
 
 static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
-    if (t->kind == TEXTURE_CONSTANT) {
+    if (t->kind == TEXTURE_CONSTANT || t->kind == TEXTURE_BLACKBODY) {
         const float *v = scene->theta + t->theta;
         Spec s;
         for (int c = 0; c < SPEC_N; c++) {
@@ -215,7 +215,15 @@ KFN Float texture_eval_real(const SceneView *scene, int32_t id, TexCoord uv) {
 KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
     const TextureNode *t = scene->textures + id;
     return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD ||
-           t->kind == TEXTURE_ATTRIBUTE;
+           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY;
+}
+
+KFN void blackbody_adj(const SceneView *scene, const TextureNode *t, Spec d, Sink *sink, Mask m) {
+    const float *slope = scene->theta + t->theta + BLACKBODY_SLOPE;
+    int32_t at = sink->texture_at[t->child[0]];
+    if (at >= 0) {
+        sink_add_uniform(sink, at, d.c[0] * (real)slope[0] + d.c[1] * (real)slope[1] + d.c[2] * (real)slope[2], m);
+    }
 }
 
 // Accumulates the adjoint d of texture_eval into the sink and into duv (may be null).
@@ -234,6 +242,8 @@ static NOINLINE void texture_adj(const SceneView *scene, int32_t id, TexCoord uv
         bitmap_adj(scene, id, (Vec2){uv.x, uv.y}, d, duv, sink, m);
     } else if (t->kind == TEXTURE_ATTRIBUTE) {
         attribute_adj(scene, id, uv.hit, d, sink, m);
+    } else if (t->kind == TEXTURE_BLACKBODY) {
+        blackbody_adj(scene, t, d, sink, m);
     } else {
         Mask first = checkerboard_first(scene, t, (Vec2){uv.x, uv.y});
         texture_adj(scene, t->child[0], uv, d, duv, sink, m & first);

@@ -73,6 +73,20 @@ KFN Hit disk_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     return hit_at(id, v3(q.x * t[0] + q.y * t[1] + t[3], q.x * t[4] + q.y * t[5] + t[7], q.x * t[8] + q.y * t[9] + t[11]));
 }
 
+// Of a disk per lane.
+KFN Hit disk_sample_many(const SceneView *scene, Int id, Vec3 ref, Vec2 u) {
+    Int at = SHAPE_FIELD(scene, id, table);
+    UNUSED(ref);
+    Vec2 q = warp_uniform_disk(u);
+    Float p[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = q.x * table_at(scene, at + 4 * k) + q.y * table_at(scene, at + 4 * k + 1) + table_at(scene, at + 4 * k + 3);
+    }
+    Hit hit = hit_at(0, v3(p[0], p[1], p[2]));
+    hit.shape = id;
+    return hit;
+}
+
 KFN Float disk_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
     return area_density(ref, d, si, f_set(scene->shapes[id].area));
 }

@@ -64,6 +64,20 @@ KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     }
 }
 
+// With a shape of the same kind per lane, of kinds that know how.
+KFN bool shape_samples_many(int32_t kind) { return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK; }
+
+KFN Hit shape_sample_many(const SceneView *scene, int32_t kind, Int id, Vec3 ref, Vec2 u) {
+    return kind == SHAPE_SPHERE ? sphere_sample_many(scene, id, ref, u)
+           : kind == SHAPE_DISK ? disk_sample_many(scene, id, ref, u)
+                                : mesh_sample_many(scene, id, u);
+}
+
+KFN Float shape_pdf_many(const SceneView *scene, int32_t kind, Int id, Vec3 ref, Vec3 d, const Interaction *si) {
+    return kind == SHAPE_SPHERE ? sphere_pdf_many(scene, id, ref, d, si)
+                                : area_density(ref, d, si, SHAPE_FLOAT(scene, id, area));
+}
+
 // Density per solid angle with which shape_sample finds the point si along d.
 KFN Float shape_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
     switch (scene->shapes[id].kind) {

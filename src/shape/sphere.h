@@ -66,25 +66,20 @@ typedef struct SphereCone {
     Mask outside;
 } SphereCone;
 
-KFN SphereCone sphere_cone(const SceneView *scene, int32_t id, Vec3 ref) {
-    const float *t = scene->tables + scene->shapes[id].table;
-    real radius = (real)t[3];
+KFN SphereCone sphere_cone(Vec3 centre, Float radius, Vec3 ref) {
     SphereCone c;
-    c.to_centre = v3_sub(v3(f_set(t[0]), f_set(t[1]), f_set(t[2])), ref);
+    c.to_centre = v3_sub(centre, ref);
     c.d2 = v3_dot(c.to_centre, c.to_centre);
     c.distance = f_sqrt(c.d2);
-    c.outside = m_gt(c.distance, f_set(radius * 1.0001f));
+    c.outside = m_gt(c.distance, radius * 1.0001f);
     Float sin2_max = f_min(radius * radius / f_max(c.d2, f_set(1e-30f)), f_set(1));
     c.one_minus_cos = sin2_max / (1.0f + f_safe_sqrt(1.0f - sin2_max));
     return c;
 }
 
 // Uniform in that cone, from outside; uniform over the area, from inside.
-KFN Hit sphere_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
-    const float *t = scene->tables + scene->shapes[id].table;
-    Vec3 centre = v3(f_set(t[0]), f_set(t[1]), f_set(t[2]));
-    real radius = (real)t[3];
-    SphereCone c = sphere_cone(scene, id, ref);
+KFN Vec3 sphere_sample_point(Vec3 centre, Float radius, Vec3 ref, Vec2 u) {
+    SphereCone c = sphere_cone(centre, radius, ref);
     Float drop = u.x * c.one_minus_cos; // 1 - cos of the sampled angle
     Float cos_theta = 1.0f - drop, sin2 = drop * (2.0f - drop), sine, cosine;
     f_sincos(TWO_PI * u.y, &sine, &cosine);
@@ -93,13 +88,34 @@ KFN Hit sphere_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     Float sin_theta = f_safe_sqrt(sin2);
     Vec3 direction = frame_to_world(&frame, v3(sin_theta * cosine, sin_theta * sine, cos_theta));
     Float t_hit = c.distance * cos_theta - f_safe_sqrt(radius * radius - c.d2 * sin2);
-    Vec3 outside_point = v3_madd(ref, t_hit, direction);
-    Vec3 inside_point = v3_madd(centre, f_set(radius), warp_uniform_sphere(u));
-    return hit_at(id, v3_select(c.outside, outside_point, inside_point));
+    return v3_select(c.outside, v3_madd(ref, t_hit, direction), v3_madd(centre, radius, warp_uniform_sphere(u)));
+}
+
+KFN Float sphere_density(Vec3 centre, Float radius, Vec3 ref, Vec3 d, const Interaction *si, Float area) {
+    SphereCone c = sphere_cone(centre, radius, ref);
+    return f_select(c.outside, f_safe_rcp(TWO_PI * c.one_minus_cos), area_density(ref, d, si, area));
+}
+
+KFN Hit sphere_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
+    const float *t = scene->tables + scene->shapes[id].table;
+    return hit_at(id, sphere_sample_point(v3(f_set(t[0]), f_set(t[1]), f_set(t[2])), f_set(t[3]), ref, u));
 }
 
 KFN Float sphere_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {
-    SphereCone c = sphere_cone(scene, id, ref);
-    Float inside = area_density(ref, d, si, f_set(scene->shapes[id].area));
-    return f_select(c.outside, f_safe_rcp(TWO_PI * c.one_minus_cos), inside);
+    const float *t = scene->tables + scene->shapes[id].table;
+    return sphere_density(v3(f_set(t[0]), f_set(t[1]), f_set(t[2])), f_set(t[3]), ref, d, si,
+                          f_set(scene->shapes[id].area));
+}
+
+// Of a sphere per lane.
+KFN Hit sphere_sample_many(const SceneView *scene, Int id, Vec3 ref, Vec2 u) {
+    Int at = SHAPE_FIELD(scene, id, table);
+    Hit hit = hit_at(0, sphere_sample_point(table_v3(scene, at), table_at(scene, at + 3), ref, u));
+    hit.shape = id;
+    return hit;
+}
+
+KFN Float sphere_pdf_many(const SceneView *scene, Int id, Vec3 ref, Vec3 d, const Interaction *si) {
+    Int at = SHAPE_FIELD(scene, id, table);
+    return sphere_density(table_v3(scene, at), table_at(scene, at + 3), ref, d, si, SHAPE_FLOAT(scene, id, area));
 }

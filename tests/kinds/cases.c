@@ -3,6 +3,7 @@
 
 #include "emitter/table.h"
 #include "emitter/update.h"
+#include "math/colour.h"
 #include "shape/update.h"
 #include "shape/shape.h"
 
@@ -285,8 +286,19 @@ static void invert_pose(const double *m, double *inverse) {
     }
 }
 
+static void update_blackbodies(KindCase *c) {
+    for (int i = 0; i < c->texture_count; i++) {
+        const TextureNode *t = c->textures + i;
+        if (t->kind == TEXTURE_BLACKBODY) {
+            double *numbers = c->theta + t->theta;
+            rey_blackbody_to_rgb(c->theta[c->textures[t->child[0]].theta], 0, 1000, numbers, numbers + BLACKBODY_SLOPE);
+        }
+    }
+}
+
 void case_update_light(KindCase *c) {
     const CaseEmitter *e = &c->emitter;
+    update_blackbodies(c);
     if (e->table < 0) {
         return;
     }
@@ -346,6 +358,16 @@ static int32_t add_number(KindCase *c, Random *r, const EmitterParam *row, int o
     return id;
 }
 
+static int add_blackbody(KindCase *c, Random *r, int owner) {
+    static const ParamDesc number = {PARAM_REAL, "temperature", 1, 1100, 1700, "", ""};
+    const double numbers[BLACKBODY_NUMBERS] = {0};
+    int id = c->texture_count++, child = case_texture(c, r, &number, owner, false);
+    c->textures[id] = (TextureNode){.kind = TEXTURE_BLACKBODY, .theta = c->theta_count, .width = 1, .height = 1, .channels = 3,
+                                    .to_uv = -1, .child = {child, -1}};
+    add_fixed(c, numbers, BLACKBODY_NUMBERS);
+    return id;
+}
+
 static void add_rows(KindCase *c, Random *r, bool textured, const double rotation[9]) {
     const EmitterKind *kind = rey_emitter_kinds + c->emitter.kind;
     const double zero[3] = {0}, position[3] = {0.3, -0.2, 0.5};
@@ -354,6 +376,8 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
         int32_t *slot = &c->emitter.slot[i];
         switch (row->type) {
         case EMITTER_PARAM_EMISSION:
+            *slot = uniform(r) < 0.3 ? add_blackbody(c, r, i) : case_texture(c, r, &radiance, i, textured);
+            break;
         case EMITTER_PARAM_COLOUR:
             *slot = case_texture(c, r, &radiance, i, textured);
             break;
@@ -374,6 +398,15 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
         }
         c->emitter.places |= (row->type >= EMITTER_PARAM_POSITION) << i;
     }
+}
+
+// Whether lights like this one come in families.
+static bool can_gather(const KindCase *c, int light) {
+    bool can = light != LIGHT_CYLINDER && light != LIGHT_CONSTANT && light != LIGHT_ENVMAP;
+    for (int i = 0; i < c->texture_count; i++) {
+        can &= c->textures[i].kind == TEXTURE_CONSTANT || c->textures[i].kind == TEXTURE_BLACKBODY;
+    }
+    return can;
 }
 
 void case_make_light(KindCase *c, Random *r, int light, bool textured) {
@@ -398,6 +431,8 @@ void case_make_light(KindCase *c, Random *r, int light, bool textured) {
     } else {
         make_cylinder(c, rotation, scale);
     }
+    update_blackbodies(c);
+    c->emitter.gathered = can_gather(c, light) && uniform(r) < 0.6;
 }
 
 // ---- directions and reports --------------------------------------------------------------------------------------

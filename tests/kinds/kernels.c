@@ -243,16 +243,21 @@ static void put_light(LightDraw *to, const LightSample *s, int lane) {
     to->valid = i_lane(s->valid, lane) != 0;
 }
 
+static Light light_of(const KindCase *c, const View *view) {
+    return (Light){&view->emitter, i_set(0), c->emitter.gathered};
+}
+
 static void run_light_sample(const KindCase *c, int n, LightDraw *d) {
     View view;
     view_make(c, &view);
+    Light light = light_of(c, &view);
     for (int first = 0; first < n; first += LANES) {
         Vec3 ref;
         Vec2 u;
         GATHER3(ref, d[AT(lane)].ref);
         GATHER(u.x, d[AT(lane)].u[0]);
         GATHER(u.y, d[AT(lane)].u[1]);
-        LightSample s = emitter_sample(&view.scene, &view.emitter, ref, u);
+        LightSample s = emitter_sample_as(&view.scene, &light, ref, u);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             put_light(d + first + lane, &s, lane);
         }
@@ -358,13 +363,14 @@ static void run_light_pdf(const KindCase *c, int n, LightDraw *draws) {
 static void run_light_eval(const KindCase *c, int n, LightDraw *d) {
     View view;
     view_make(c, &view);
+    Light light = light_of(c, &view);
     for (int first = 0; first < n; first += LANES) {
         Vec2 uv;
         Float distance;
         GATHER(uv.x, d[AT(lane)].uv[0]);
         GATHER(uv.y, d[AT(lane)].uv[1]);
         GATHER(distance, d[AT(lane)].distance);
-        Spec l = emitter_eval(&view.scene, &view.emitter, texcoord(uv, NULL), distance);
+        Spec l = emitter_eval_as(&view.scene, &light, texcoord(uv, NULL), distance);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             put_spec(d[first + lane].radiance, l, lane);
         }
@@ -376,6 +382,7 @@ static void light_adjoint(const KindCase *c, int n, const LightDraw *d, Adjoint 
     View view;
     view_make(c, &view);
     Sink sink = sink_make(&view, c, gradient, tangent);
+    Light light = light_of(c, &view);
     for (int first = 0; first < n; first += LANES) {
         Vec2 uv;
         Float distance;
@@ -386,13 +393,13 @@ static void light_adjoint(const KindCase *c, int n, const LightDraw *d, Adjoint 
         sink.derivative = f_set(0);
         LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
         GATHER3(move.d, a[AT(lane)].dwo);
-        emitter_adj(&view.scene, 0, texcoord(uv, NULL), distance, spec_zero_unless(m, gather_df(a, first, n)),
-                    moves ? &move : NULL, &sink, m);
+        emitter_adj_as(&view.scene, &light, texcoord(uv, NULL), distance, spec_zero_unless(m, gather_df(a, first, n)),
+                       moves ? &move : NULL, &sink, m);
         if (moves) {
             Vec3 ref, direction;
             GATHER3(ref, d[AT(lane)].ref);
             GATHER3(direction, d[AT(lane)].d);
-            emitter_move_adj(&view.scene, 0, ref, direction, distance, &move, &sink, m);
+            emitter_move_adj_as(&view.scene, &light, ref, direction, distance, &move, &sink, m);
         }
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             a[first + lane].forward = (double)f_lane(sink.derivative, lane);

@@ -4,12 +4,15 @@
 
 #include "scene/scene.h"
 
+#include <stdbool.h>
+
 enum { CASE_THETA = 768, CASE_TEXTURES = 48, CASE_BSDFS = 4, CASE_SHAPES = 2, CASE_TABLES = 1024 };
 
 // No float in here: the double build reads the same bytes.
 typedef struct CaseEmitter {
     int32_t kind, shape, slot[MAX_EMITTER_SLOTS], table;
     int32_t places; // bits: slots that are positions or poses
+    bool gathered;  // handled as one of a family
 } CaseEmitter;
 typedef struct CaseShape {
     int32_t kind, flags, triangle_count, positions, uvs, table, area_cdf;

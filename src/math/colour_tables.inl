@@ -1,4 +1,4 @@
-// spectrum_tables.inl: CIE 1931 2 degree colour matching functions and CIE standard illuminant D65 (100 at 560 nm),
+// colour_tables.inl: CIE 1931 2 degree colour matching functions and CIE standard illuminant D65 (100 at 560 nm),
 // 360 to 830 nm in steps of 5 nm: x, y, z, D65. Source: CIE 015 and ISO/CIE 11664-1, 11664-2.
 {0.0001299, 3.917e-06, 0.0006061, 46.6383}, // 360
 {0.0002321, 6.965e-06, 0.001086, 49.3637}, // 365
