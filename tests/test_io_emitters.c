@@ -61,7 +61,7 @@ static void test_refusals(void **state) {
         {"<emitter type='spot'><float name='cutoff_angle' value='120'/></emitter>", "cutoff_angle is 120"},
         {"<emitter type='spot'><texture name='beam_width' type='checkerboard'/></emitter>", "must be a number"},
         {"<emitter type='spot'><float name='angle' value='20'/></emitter>", "angle"},
-        {"<emitter type='sportlight'/>", "spot"},
+        {"<emitter type='spott'/>", "spot'"},
         {POINT("<spectrum type='blackbody' name='intensity'/>"), "lacks 'temperature'"},
         {POINT("<spectrum type='blackbody' name='intensity'><float name='temperature' value='-3'/></spectrum>"),
          "temperature is -3"},
