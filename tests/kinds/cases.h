@@ -49,6 +49,8 @@ extern const char *const light_names[LIGHT_COUNT];
 void case_make_light(KindCase *c, Random *r, int light, bool textured);
 // Brings derived tables up to date with theta (poses, environment maps).
 void case_update_light(KindCase *c);
+// Appends n numbers in the range of a parameter row; returns where they begin.
+int case_values(KindCase *c, Random *r, const ParamDesc *p, int n, int owner);
 // Appends a texture with values in the range of a parameter row; returns its number.
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured);
 // Sets all values of a parameter of the root; names that it does not have are passed over.
