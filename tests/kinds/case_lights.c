@@ -223,8 +223,13 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
 // Whether lights like this one come in families.
 static bool can_gather(const KindCase *c, int light) {
     bool can = light != LIGHT_CYLINDER && light != LIGHT_CONSTANT && light != LIGHT_ENVMAP;
-    for (int i = 0; i < c->texture_count; i++) {
-        can &= c->textures[i].kind == TEXTURE_CONSTANT || c->textures[i].kind == TEXTURE_BLACKBODY;
+    const EmitterKind *kind = rey_emitter_kinds + c->emitter.kind;
+    for (int i = 0; i < kind->param_count; i++) {
+        EmitterParamType type = kind->params[i].type;
+        const TextureNode *t = c->textures + c->emitter.slot[i];
+        if (type == EMITTER_PARAM_EMISSION || type == EMITTER_PARAM_COLOUR) {
+            can &= (t->kind == TEXTURE_CONSTANT && t->channels == 3) || t->kind == TEXTURE_BLACKBODY;
+        }
     }
     return can;
 }
