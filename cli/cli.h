@@ -172,6 +172,7 @@ rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *h
 // [-scale, scale], and *scale (may be null) tells the scale.
 rey_result cli_write_image(rey_context *ctx, const char *path, const float *image, int width, int height,
                            bool signed_values, float *scale);
-// The same for a picture of many channels: PNG files get the first three (and image changes), NPY and EXR files all.
-rey_result cli_write_channels(rey_context *ctx, const char *path, float *image, int width, int height, int channels,
-                              const char *const *names);
+// A film's picture: NPY and EXR files get all channels, the latter as `component` (REY_COMPONENT_*), PNG files the colours
+// and alpha.
+rey_result cli_write_film(rey_context *ctx, const char *path, const float *film, int width, int height, int channels,
+                          const char *const *names, int component);

@@ -63,7 +63,7 @@ static rey_result copy_to_output(rey_context *ctx, const char *path) {
 
 // An EXR needs to seek, so it goes through a temporary file.
 static rey_result write_exr_to_output(rey_context *ctx, const float *image, int width, int height, int channels,
-                                      const char *const *names) {
+                                      const char *const *names, int component) {
     const char *folder = getenv("TMPDIR");
     char path[4096];
     snprintf(path, sizeof path, "%s/reynolds-XXXXXX", folder && folder[0] ? folder : "/tmp");
@@ -72,7 +72,7 @@ static rey_result write_exr_to_output(rey_context *ctx, const float *image, int 
         return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
     }
     close(descriptor);
-    rey_result result = rey_exr_write(ctx, path, image, width, height, channels, names);
+    rey_result result = rey_exr_write_as(ctx, path, image, width, height, channels, names, component);
     result = result ? result : copy_to_output(ctx, path);
     unlink(path);
     return result;
@@ -82,7 +82,7 @@ rey_result cli_write_image(rey_context *ctx, const char *path, const float *imag
                            bool signed_values, float *scale) {
     int64_t shape[3] = {height, width, 3};
     if (!strcmp(path, "-")) {
-        return write_exr_to_output(ctx, image, width, height, 3, NULL);
+        return write_exr_to_output(ctx, image, width, height, 3, NULL, REY_COMPONENT_FLOAT32);
     }
     switch (cli_image_format(path)) {
     case IMAGE_PNG:
@@ -95,24 +95,59 @@ rey_result cli_write_image(rey_context *ctx, const char *path, const float *imag
     }
 }
 
-rey_result cli_write_channels(rey_context *ctx, const char *path, float *image, int width, int height, int channels,
-                              const char *const *names) {
-    int64_t shape[3] = {height, width, channels};
-    if (channels == 3) {
-        return cli_write_image(ctx, path, image, width, height, false, NULL);
+static int film_colours(const char *const *names) {
+    return names[0][0] == 'Y' ? 1 : 3;
+}
+
+static bool has_alpha(int channels, const char *const *names) {
+    int colours = film_colours(names);
+    return channels > colours && !strcmp(names[colours], "A");
+}
+
+// Linear RGB and alpha, 1 where the film has none, of a film's picture.
+static void film_rgba(const float *film, int channels, const char *const *names, float rgba[4]) {
+    static const float rows[3][3] = {{3.240479f, -1.537150f, -0.498535f}, {-0.969256f, 1.875991f, 0.041556f},
+                                     {0.055648f, -0.204043f, 1.057311f}}; // of CIE XYZ
+    int colours = film_colours(names);
+    for (int c = 0; c < 3; c++) {
+        rgba[c] = colours == 1          ? film[0]
+                  : names[0][0] == 'X' ? rows[c][0] * film[0] + rows[c][1] * film[1] + rows[c][2] * film[2]
+                                        : film[c];
     }
+    rgba[3] = has_alpha(channels, names) ? film[colours] : 1;
+}
+
+static rey_result write_film_png(rey_context *ctx, const char *path, const float *film, int width, int height,
+                                 int channels, const char *const *names) {
+    size_t pixels = (size_t)width * (size_t)height;
+    float *image = rey_alloc_array(ctx, pixels, 4 * sizeof *image), rgba[4];
+    if (!image) {
+        return REY_ERROR_MEMORY;
+    }
+    bool alpha = has_alpha(channels, names);
+    size_t kept = alpha ? 4 : 3;
+    for (size_t i = 0; i < pixels; i++) {
+        film_rgba(film + i * (size_t)channels, channels, names, rgba);
+        memcpy(image + kept * i, rgba, kept * sizeof *rgba);
+    }
+    rey_result result = alpha ? rey_png_write_alpha(ctx, path, image, width, height)
+                              : rey_png_write(ctx, path, image, width, height);
+    rey_free(ctx, image);
+    return result;
+}
+
+rey_result cli_write_film(rey_context *ctx, const char *path, const float *film, int width, int height, int channels,
+                          const char *const *names, int component) {
+    int64_t shape[3] = {height, width, channels};
     if (!strcmp(path, "-")) {
-        return write_exr_to_output(ctx, image, width, height, channels, names);
+        return write_exr_to_output(ctx, film, width, height, channels, names, component);
     }
     switch (cli_image_format(path)) {
     case IMAGE_PNG:
-        for (int64_t i = 0; i < (int64_t)width * height; i++) {
-            memmove(image + 3 * i, image + channels * i, 3 * sizeof *image);
-        }
-        return rey_png_write(ctx, path, image, width, height);
+        return write_film_png(ctx, path, film, width, height, channels, names);
     case IMAGE_NPY:
-        return rey_npy_write(ctx, path, image, shape, 3);
+        return rey_npy_write(ctx, path, film, shape, 3);
     default:
-        return rey_exr_write(ctx, path, image, width, height, channels, names);
+        return rey_exr_write_as(ctx, path, film, width, height, channels, names, component);
     }
 }

@@ -17,17 +17,18 @@ static void print_json(const Session *s, const rey_stats *stats) {
 }
 
 static rey_result render(Session *s, rey_stats *stats) {
-    int channels = rey_channel_count(s->scene);
+    int channels = rey_film_channel_count(s->scene, s->def.sensor);
     float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, (size_t)channels * sizeof *image);
     const char **names = rey_alloc_array(s->ctx, (size_t)channels, sizeof *names);
     rey_result result = image && names ? REY_OK : REY_ERROR_MEMORY;
     for (int i = 0; i < channels && names; i++) {
-        names[i] = rey_channel_name(s->scene, i);
+        names[i] = rey_film_channel_name(s->scene, s->def.sensor, i);
     }
-    result = result ? result : rey_render_channels(s->scene, &s->def, image, stats);
+    result = result ? result : rey_render_film(s->scene, &s->def, image, stats);
     cli_progress_end(&s->progress);
     if (!result && s->options->output) {
-        result = cli_write_channels(s->ctx, s->options->output, image, s->width, s->height, channels, names);
+        result = cli_write_film(s->ctx, s->options->output, image, s->width, s->height, channels, names,
+                                rey_film_component(s->scene, s->def.sensor));
     }
     rey_free(s->ctx, names);
     rey_free(s->ctx, image);

@@ -193,6 +193,17 @@ REY_API const char *rey_channel_name(const rey_scene *scene, int channel); /* nu
 /* Renders all channels. image: height x width x rey_channel_count floats owned by the caller. stats may be null. */
 REY_API rey_result rey_render_channels(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats);
 
+/* The picture that a sensor's film asks for (pixel_format): R G B, Y, or X Y Z, then A where it has alpha (1 where a
+ * path met a surface that does not merely let light pass, or shows an environment; colours are multiplied by it), then
+ * what the integrator adds, as behind the third channel of rey_render_channels. */
+REY_API int rey_film_channel_count(const rey_scene *scene, int sensor); /* 0 when there is no such sensor */
+REY_API const char *rey_film_channel_name(const rey_scene *scene, int sensor, int channel); /* null when there is none */
+/* component_format, of files: 16 or 32 bits of floating point, or unsigned integers of 32. 32 where the scene is silent. */
+enum { REY_COMPONENT_FLOAT16, REY_COMPONENT_FLOAT32, REY_COMPONENT_UINT32 };
+REY_API int rey_film_component(const rey_scene *scene, int sensor); /* REY_COMPONENT_*, -1 when there is no such sensor */
+/* Renders def->sensor. image: height x width x rey_film_channel_count floats owned by the caller. stats may be null. */
+REY_API rey_result rey_render_film(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats);
+
 /* A selection of parameters: vectors over it are the parameters' values one after the other. */
 typedef struct rey_selection {
     const int *params; /* parameter indices, none twice */

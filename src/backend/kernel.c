@@ -3,7 +3,7 @@
 #include "integrator/path_adj.h"
 #include "sensor/filter.h"
 
-enum { MAX_FOOTPRINT = 32 }; // pixels that a filter may cover along one axis
+enum { MAX_FOOTPRINT = 2 * MOST_FILTER_RADIUS + 2 }; // pixels that a filter may cover along one axis
 
 enum { FILTER_STEPS = 1024 }; // entries of the tabulated filter over its radius
 
@@ -44,8 +44,8 @@ KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const doub
     int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
     if (t->sensor->filter == FILM_BOX) {
         // A sample counts for the pixel it was drawn in.
-        int32_t number = t->ws.pixel[slot], stride = t->sensor->width + 128;
-        double *pixel = film + ((int64_t)(number / stride - 64 - y0) * width + number % stride - 64 - x0) * n;
+        int32_t number = t->ws.pixel[slot], margin = filter_margin(t->sensor), stride = t->sensor->width + 2 * margin;
+        double *pixel = film + ((int64_t)(number / stride - margin - y0) * width + number % stride - margin - x0) * n;
         for (int32_t c = 0; c < n; c++) {
             pixel[c] += l[c];
         }
@@ -55,14 +55,18 @@ KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const doub
     int32_t first_x, first_y;
     int32_t nx = film_weights(t->sensor, filter, (float)t->ws.film_x[slot], x0, x0 + width, &first_x, wx);
     int32_t ny = film_weights(t->sensor, filter, (float)t->ws.film_y[slot], y0, y0 + height, &first_y, wy);
-    double line[MAX_FOOTPRINT * MOST_AOV_CHANNELS];
-    for (int32_t k = 0; k < nx * n; k++) {
-        line[k] = (double)wx[k / n] * l[k % n];
-    }
-    for (int32_t j = 0; j < ny; j++) {
-        double *row = film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * n;
-        for (int32_t k = 0; k < nx * n; k++) {
-            row[k] += (double)wy[j] * line[k];
+    enum { BLOCK = 32 };
+    double line[BLOCK * MOST_AOV_CHANNELS];
+    for (int32_t x = 0; x < nx; x += BLOCK) {
+        int32_t numbers = (nx - x < BLOCK ? nx - x : BLOCK) * n;
+        for (int32_t k = 0; k < numbers; k++) {
+            line[k] = (double)wx[x + k / n] * l[k % n];
+        }
+        for (int32_t j = 0; j < ny; j++) {
+            double *row = film + ((int64_t)(first_y + j - y0) * width + first_x + x - x0) * n;
+            for (int32_t k = 0; k < numbers; k++) {
+                row[k] += (double)wy[j] * line[k];
+            }
         }
     }
 }
@@ -91,6 +95,10 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
             continue;
         }
         film_add(t, filter, i, l, SPEC_N, job->film);
+        if (job->coverage) {
+            const double coverage[2] = {(double)t->ws.coverage[i], 1};
+            film_add(t, filter, i, coverage, 2, job->coverage);
+        }
         if (job->squares) {
             double squares[3];
             xyz_squares(l, squares);
@@ -119,9 +127,11 @@ static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count)
 static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) {
     const SensorRecord *s = t->sensor;
     int32_t right = s->crop_x + s->crop_width, bottom = s->crop_y + s->crop_height;
+    const int32_t margin = filter_margin(s), stride = s->width + 2 * margin;
     for (int32_t i = 0; i < count; i++) {
-        float wx[MAX_FOOTPRINT] = {1}, wy[MAX_FOOTPRINT] = {1}, delta[SPEC_N] = {0};
-        int32_t first_x = t->ws.pixel[i] % (s->width + 128) - 64, first_y = t->ws.pixel[i] / (s->width + 128) - 64;
+        float wx[MAX_FOOTPRINT], wy[MAX_FOOTPRINT], delta[SPEC_N] = {0};
+        wx[0] = wy[0] = 1;
+        int32_t first_x = t->ws.pixel[i] % stride - margin, first_y = t->ws.pixel[i] / stride - margin;
         int32_t nx = first_x >= s->crop_x && first_x < right, ny = first_y >= s->crop_y && first_y < bottom;
         if (s->filter != FILM_BOX) {
             nx = film_weights(s, filter, (float)t->ws.film_x[i], s->crop_x, right, &first_x, wx);

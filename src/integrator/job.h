@@ -18,6 +18,7 @@ typedef struct PathJob {
     // Film of the tile: (width + 2 border) x (height + 2 border) x 3, sums of filter weight times radiance.
     double *film;
     double *squares;              // the same of the squares of the radiance in XYZ; may be null
+    double *coverage;             // the same of alpha and of 1, two numbers per pixel; may be null
     int32_t border;               // pixels by which filters reach over the tile's edge
     // Derivatives: adjoint of the film's sums, for the delivered picture (crop window), and the compact vectors.
     const float *adjoint;

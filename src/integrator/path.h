@@ -94,6 +94,9 @@ KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
     return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(pdf, light_pdf));
 }
 
+// Alpha of a path is 1 where an environment shows, and where the path meets a surface that does not merely let it pass.
+KFN void cover(Tracer *t, Int slot, Mask m) { f_scatter(t->ws.coverage, slot, f_set(1), m); }
+
 // Paths that left the scene: the environment, weighed against having been sampled as a light.
 static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
     const SceneView *scene = t->scene;
@@ -307,6 +310,9 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     play_roulette(t, key, bounce, &w);
     w.d = frame_to_world(&si->sh, w.sample.wo);
     append_paths(t, v, si, &w, next_count);
+    if (t->job->coverage) {
+        cover(t, v->slot, v->m & ~mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL)));
+    }
     if (record >= 0) {
         record_onward(t, record, &w);
     }
@@ -341,6 +347,9 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         emission = spec_zero_unless(lit, spec_scale(emitter_eval(scene, e, texcoord(si.uv, &v.hit), f_set(1)), mis));
         if (!t->derivative) {
             slot_add(t, v.slot, spec_mul(v.beta, emission), lit);
+        }
+        if (t->job->coverage) {
+            cover(t, v.slot, lit);
         }
     }
     int32_t record = -1;
@@ -419,6 +428,9 @@ static void shadow_stage(Tracer *t) {
 // Runs the chunk's paths to their ends. begin: scratch of group count + 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
+    for (int32_t i = 0; t->job->coverage && i < t->active; i++) {
+        t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters;
+    }
     int32_t groups = (int32_t)scene->groups_count + 1;
     for (int32_t bounce = 0; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {

@@ -4,6 +4,7 @@
 #include "accel/trace.h"
 #include "integrator/state.h"
 #include "math/rng.h"
+#include "sensor/filter.h"
 #include "sensor/sensor.h"
 
 #include <time.h>
@@ -55,23 +56,24 @@ KFN SampleKey slot_key(const Tracer *t, Int slot) {
 static void camera_stage(Tracer *t, int64_t first, int32_t count) {
     PathJob *job = t->job;
     Paths *p = &t->ws.paths[0];
+    const int32_t margin = filter_margin(t->sensor);
     for (int32_t i = 0; i < count; i++) {
         int64_t at = first + i;
         int32_t pixel = (int32_t)(at / job->spp);
         // Numbers of pixels of the whole film with room for a border, so that they do not depend on the tiles.
-        int32_t x = job->x + pixel % job->width + 64, y = job->y + pixel / job->width + 64;
-        t->ws.pixel[i] = y * (t->sensor->width + 128) + x;
+        int32_t x = job->x + pixel % job->width + margin, y = job->y + pixel / job->width + margin;
+        t->ws.pixel[i] = y * (t->sensor->width + 2 * margin) + x;
         t->ws.sample[i] = (int32_t)(at % job->spp);
     }
     for (int32_t i = 0; i < count; i += LANES) {
         Int slot = i_iota() + i;
         SampleKey key = slot_key(t, slot);
         Vec2 jitter = rng_2d(&key, dimension(0, PURPOSE_FILM));
-        Int stride = i_set(t->sensor->width + 128);
+        Int stride = i_set(t->sensor->width + 2 * margin);
         Int pixel = i_load(t->ws.pixel + i);
         Int y = pixel / stride;
         Int x = pixel - y * stride;
-        Float film_x = f_from_i(x - 64) + jitter.x, film_y = f_from_i(y - 64) + jitter.y;
+        Float film_x = f_from_i(x - margin) + jitter.x, film_y = f_from_i(y - margin) + jitter.y;
         f_store(t->ws.film_x + i, film_x);
         f_store(t->ws.film_y + i, film_y);
         Vec2 lens = {f_set(0), f_set(0)};

@@ -35,6 +35,9 @@ enum {
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe)
 
+// Of a camera sample: where it lies on the film, and its alpha.
+#define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
+
 #define DECLARE_FLOAT(name) real *name;
 #define DECLARE_SPEC(name) SpecRows name;
 #define DECLARE_INT(name) int32_t *name;
@@ -66,10 +69,10 @@ typedef struct Workspace {
     // per ray of the current bounce
     int32_t *hit_shape, *hit_prim, *hit_instance, *hit_group, *order;
     real *hit_u, *hit_v, *hit_x, *hit_y, *hit_z;
-    // per slot: radiance (or derivative), film's adjoint, radiance of the path behind a vertex, film position, pixel and
-    // sample numbers
+    // per slot: radiance (or derivative), film's adjoint, radiance of the path behind a vertex, film position, alpha, pixel
+    // and sample numbers
     SpecRows radiance, adjoint, suffix;
-    real *film_x, *film_y;
+    SAMPLE_FLOATS(DECLARE_FLOAT)
     int32_t *pixel, *sample;
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
@@ -126,8 +129,8 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE_SPEC(ws->radiance, n)
     CARVE_SPEC(ws->adjoint, n)
     CARVE_SPEC(ws->suffix, n)
-    CARVE(ws->film_x, n)
-    CARVE(ws->film_y, n)
+#define CARVE_SAMPLE(name) CARVE(ws->name, n)
+    SAMPLE_FLOATS(CARVE_SAMPLE)
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
     for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {

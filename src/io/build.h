@@ -127,5 +127,6 @@ enum { SENSOR_OF_BATCH = -2 };
 rey_result build_target_shape(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 // A pose that turns +z into the property `direction`.
 rey_result build_direction(Builder *b, rey_xml_node *node, double matrix[16]);
+rey_result build_film(Builder *b, rey_xml_node *node, SensorRecord *s); // node may be null
 rey_result build_sampler(Builder *b, rey_xml_node *node, SensorRecord *s);
 rey_result build_integrator(Builder *b, rey_xml_node *node);

@@ -68,9 +68,10 @@ static rey_result failed(Stream *s, exr_result_t code) {
                     exr_get_default_error_message(code));
 }
 
-// Which channels of the file become the picture's: R G B, or Y, or (layer.)R G B, or all.
+// Which channels of the file become the picture's: R G B, or X Y Z, or Y, or (layer.)R G B, or all.
 typedef struct ChannelChoice {
     int count;
+    bool xyz;                  // to be converted
     int at[EXR_MOST_CHANNELS]; // for each channel of the file, its place in the picture, -1 = dropped
 } ChannelChoice;
 
@@ -79,9 +80,40 @@ static const char *base_name(const char *name) {
     return dot ? dot + 1 : name;
 }
 
+// The places of the unlayered channels that are called by three letters; true when all three are there.
+static bool choose_three(const exr_attr_chlist_t *list, const char *letters, ChannelChoice *choice) {
+    int found = 0;
+    for (int i = 0; i < list->num_channels; i++) {
+        const char *name = list->entries[i].name.str, *at = name[0] && !name[1] ? strchr(letters, name[0]) : NULL;
+        choice->at[i] = at ? (int)(at - letters) : -1;
+        found += at != NULL;
+    }
+    choice->count = found == 3 ? 3 : 0;
+    return found == 3;
+}
+
+// Linear sRGB of CIE XYZ, white D65.
+static void xyz_to_rgb(rey_image *image) {
+    static const float rows[3][3] = {{3.240479f, -1.537150f, -0.498535f}, {-0.969256f, 1.875991f, 0.041556f},
+                                     {0.055648f, -0.204043f, 1.057311f}};
+    for (int64_t i = 0; i < (int64_t)image->width * image->height; i++) {
+        float *p = image->data + 3 * i, xyz[3] = {p[0], p[1], p[2]};
+        for (int c = 0; c < 3; c++) {
+            p[c] = rows[c][0] * xyz[0] + rows[c][1] * xyz[1] + rows[c][2] * xyz[2];
+        }
+    }
+}
+
 static ChannelChoice choose_channels(const exr_attr_chlist_t *list) {
     static const char *const rgb[] = {"R", "G", "B"};
     ChannelChoice choice = {0};
+    if (choose_three(list, "RGB", &choice)) {
+        return choice;
+    }
+    if (choose_three(list, "XYZ", &choice)) {
+        choice.xyz = true;
+        return choice;
+    }
     for (int layered = 0; layered < 2 && choice.count == 0; layered++) {
         bool taken[4] = {false};
         for (int i = 0; i < list->num_channels; i++) {
@@ -206,6 +238,9 @@ static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
         return result;
     }
     code = storage == EXR_STORAGE_TILED ? read_tiles(file, &choice, out) : read_scanlines(file, &window, &choice, out);
+    if (code == EXR_ERR_SUCCESS && choice.xyz) {
+        xyz_to_rgb(out);
+    }
     return code == EXR_ERR_SUCCESS ? REY_OK : failed(s, code);
 }
 
@@ -288,6 +323,14 @@ static exr_result_t write_chunks(exr_context_t file, const float *data, int widt
 
 rey_result rey_exr_write(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
                          const char *const *names) {
+    return rey_exr_write_as(ctx, path, data, width, height, channels, names, REY_COMPONENT_FLOAT32);
+}
+
+rey_result rey_exr_write_as(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
+                            const char *const *names, int component) {
+    static const exr_pixel_type_t types[] = {[REY_COMPONENT_FLOAT16] = EXR_PIXEL_HALF,
+                                             [REY_COMPONENT_FLOAT32] = EXR_PIXEL_FLOAT,
+                                             [REY_COMPONENT_UINT32] = EXR_PIXEL_UINT};
     static const char *const rgb[] = {"R", "G", "B"}, *const grey[] = {"Y"};
     int order[EXR_MOST_CHANNELS], part;
     Stream stream = {.ctx = ctx, .name = path};
@@ -306,7 +349,7 @@ rey_result rey_exr_write(rey_context *ctx, const char *path, const float *data, 
         code = exr_initialize_required_attr_simple(file, 0, width, height, EXR_COMPRESSION_ZIP);
     }
     for (int c = 0; c < channels && code == EXR_ERR_SUCCESS; c++) {
-        code = exr_add_channel(file, 0, names[order[c]], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
+        code = exr_add_channel(file, 0, names[order[c]], types[component], EXR_PERCEPTUALLY_LINEAR, 1, 1);
     }
     code = code == EXR_ERR_SUCCESS ? exr_write_header(file) : code;
     code = code == EXR_ERR_SUCCESS ? write_chunks(file, data, width, height, channels, order) : code;

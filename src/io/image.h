@@ -44,8 +44,13 @@ rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned
 // float32, ZIP. names: one per channel, null = R G B (or Y for one).
 rey_result rey_exr_write(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
                          const char *const *names);
+// The same with components of another kind: REY_COMPONENT_*.
+rey_result rey_exr_write_as(rey_context *ctx, const char *path, const float *data, int width, int height, int channels,
+                            const char *const *names, int component);
 // 8 bits, sRGB-encoded from linear RGB.
 rey_result rey_png_write(rey_context *ctx, const char *path, const float *rgb, int width, int height);
+// The same with alpha, by which the colours are multiplied in `rgba` and are not in the file.
+rey_result rey_png_write_alpha(rey_context *ctx, const char *path, const float *rgba, int width, int height);
 // Mean over channels in blue (negative), white (0), red; *scale is the value of full colour: the 99.5th percentile of
 // |value|, or the largest when that is 0.
 rey_result rey_png_write_signed(rey_context *ctx, const char *path, const float *rgb, int width, int height,

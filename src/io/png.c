@@ -99,16 +99,16 @@ rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char 
     return result;
 }
 
-rey_result rey_png_encode(rey_context *ctx, const unsigned char *rgb8, int width, int height, unsigned char **bytes,
-                          size_t *size) {
+static rey_result encode(rey_context *ctx, const unsigned char *pixels, png_uint_32 format, int width, int height,
+                         unsigned char **bytes, size_t *size) {
     png_image png = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height,
-                     .format = PNG_FORMAT_RGB};
+                     .format = format};
     png_alloc_size_t length = PNG_IMAGE_PNG_SIZE_MAX(png);
     *bytes = rey_alloc(ctx, length);
     if (!*bytes) {
         return REY_ERROR_MEMORY;
     }
-    if (!png_image_write_to_memory(&png, *bytes, &length, 0, rgb8, 0, NULL)) {
+    if (!png_image_write_to_memory(&png, *bytes, &length, 0, pixels, 0, NULL)) {
         rey_free(ctx, *bytes);
         *bytes = NULL;
         return rey_fail(ctx, REY_ERROR_MEMORY, "a PNG could not be encoded: %s", png.message);
@@ -117,10 +117,16 @@ rey_result rey_png_encode(rey_context *ctx, const unsigned char *rgb8, int width
     return REY_OK;
 }
 
-static rey_result write_rgb8(rey_context *ctx, const char *path, const unsigned char *rgb8, int width, int height) {
+rey_result rey_png_encode(rey_context *ctx, const unsigned char *rgb8, int width, int height, unsigned char **bytes,
+                          size_t *size) {
+    return encode(ctx, rgb8, PNG_FORMAT_RGB, width, height, bytes, size);
+}
+
+static rey_result write_pixels(rey_context *ctx, const char *path, const unsigned char *pixels, png_uint_32 format,
+                               int width, int height) {
     unsigned char *bytes = NULL;
     size_t size = 0;
-    rey_result result = rey_png_encode(ctx, rgb8, width, height, &bytes, &size);
+    rey_result result = encode(ctx, pixels, format, width, height, &bytes, &size);
     if (result == REY_OK) {
         result = rey_file_write(ctx, path, bytes, size);
     }
@@ -135,8 +141,27 @@ rey_result rey_png_write(rey_context *ctx, const char *path, const float *rgb, i
         return REY_ERROR_MEMORY;
     }
     rey_image_to_srgb8(rgb, pixels, rgb8);
-    rey_result result = write_rgb8(ctx, path, rgb8, width, height);
+    rey_result result = write_pixels(ctx, path, rgb8, PNG_FORMAT_RGB, width, height);
     rey_free(ctx, rgb8);
+    return result;
+}
+
+rey_result rey_png_write_alpha(rey_context *ctx, const char *path, const float *rgba, int width, int height) {
+    int64_t pixels = (int64_t)width * height;
+    unsigned char *rgba8 = rey_alloc_array(ctx, (size_t)pixels, 4);
+    if (!rgba8) {
+        return REY_ERROR_MEMORY;
+    }
+    for (int64_t i = 0; i < pixels; i++) {
+        float alpha = fminf(fmaxf(rgba[4 * i + 3], 0), 1), rgb[3];
+        for (int c = 0; c < 3; c++) {
+            rgb[c] = alpha > 0 ? rgba[4 * i + c] / alpha : 0;
+        }
+        rey_image_to_srgb8(rgb, 1, rgba8 + 4 * i);
+        rgba8[4 * i + 3] = (unsigned char)(255 * alpha + 0.5f);
+    }
+    rey_result result = write_pixels(ctx, path, rgba8, PNG_FORMAT_RGBA, width, height);
+    rey_free(ctx, rgba8);
     return result;
 }
 
@@ -172,7 +197,7 @@ rey_result rey_png_write_signed(rey_context *ctx, const char *path, const float 
         }
     }
     *scale = full;
-    rey_result result = write_rgb8(ctx, path, rgb8, width, height);
+    rey_result result = write_pixels(ctx, path, rgb8, PNG_FORMAT_RGB, width, height);
     rey_free(ctx, rgb8);
     rey_free(ctx, sorted);
     return result;

@@ -15,6 +15,8 @@ FilmPlan rey_film_plan(const SensorRecord *s, int32_t channels) {
     // Small pictures get small tiles, so that there is work for several threads.
     int64_t pixels = (int64_t)plan.width * plan.height;
     plan.tile = pixels > 128 * 128 ? 32 : pixels > 32 * 32 ? 16 : 8;
+    // Tiles hold what the filter carries over their edges: wide filters get larger ones.
+    plan.tile = s->filter_radius > 12 ? 128 : plan.tile;
     plan.columns = (plan.width + plan.tile - 1) / plan.tile;
     plan.rows = (plan.height + plan.tile - 1) / plan.tile;
     plan.border = s->filter == FILM_BOX ? 0 : (int32_t)ceilf(s->filter_radius - 0.5f) + 1;
@@ -34,16 +36,16 @@ Tile rey_film_tile(const FilmPlan *plan, int32_t index) {
 
 // Integral of the filter around a pixel over [low, high), by the midpoint rule on a fine grid.
 static double filter_integral(const SensorRecord *s, int32_t pixel, int32_t low, int32_t high) {
-    enum { STEPS = 256 };
+    const int steps = s->filter_radius > 12 ? 4096 : 256;
     if (s->filter == FILM_BOX) {
         return 1;
     }
     double centre = pixel + 0.5, radius = s->filter_radius;
     double a = fmax(centre - radius, low), b = fmin(centre + radius, high), sum = 0;
-    for (int i = 0; i < STEPS; i++) {
-        sum += (double)filter_eval(s, (float)(a + (b - a) * (i + 0.5) / STEPS - centre));
+    for (int i = 0; i < steps; i++) {
+        sum += (double)filter_eval(s, (float)(a + (b - a) * (i + 0.5) / steps - centre));
     }
-    return sum * (b - a) / STEPS;
+    return sum * (b - a) / steps;
 }
 
 void rey_film_norms(const FilmPlan *plan, double *columns, double *rows) {

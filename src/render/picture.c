@@ -6,11 +6,11 @@
 
 #include <string.h>
 
-// One pass: a picture of so many channels, assigned, and the second moments of its colours, or null.
+// One pass: a picture of so many channels, assigned, and the second moments of its colours and its alpha, or null.
 typedef struct Pass {
     int32_t mode, channels;
     int part, parts;
-    double *picture, *squares;
+    double *picture, *squares, *alpha;
 } Pass;
 
 static void add_stats(rey_stats *sum, const rey_stats *part) {
@@ -32,6 +32,11 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
         r.squares = rey_alloc_array(scene->ctx, (size_t)r.tiles * (size_t)r.plan.tile_floats, sizeof(double));
         result = r.squares ? REY_OK : REY_ERROR_MEMORY;
     }
+    if (result == REY_OK && pass.alpha) {
+        size_t numbers = (size_t)(r.plan.tile_floats / r.plan.channels) * 2;
+        r.coverage = rey_alloc_array(scene->ctx, (size_t)r.tiles * numbers, sizeof(double));
+        result = r.coverage ? REY_OK : REY_ERROR_MEMORY;
+    }
     if (result == REY_OK) {
         r.part = pass.part;
         r.parts = pass.parts;
@@ -47,6 +52,10 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
         rey_film_merge(&r.plan, r.films, r.columns, r.rows, 1.0 / r.def.spp, pass.picture);
         if (pass.squares) {
             rey_film_merge(&r.plan, r.squares, r.columns, r.rows, 1.0 / r.def.spp, pass.squares);
+        }
+        if (pass.alpha) {
+            FilmPlan two = rey_film_plan(r.plan.sensor, 2);
+            rey_film_merge(&two, r.coverage, r.columns, r.rows, 1.0 / r.def.spp, pass.alpha);
         }
     }
     result = rey_render_end(&r, result, start, &one);
@@ -65,6 +74,7 @@ static int32_t aov_channels(const SceneView *view) {
 // What the passes found, for all pixels.
 typedef struct Layers {
     double *colour, *squares, *aovs; // 3, 3 and aov_count numbers per pixel
+    double *alpha;                   // 2, the caller's; or null
     int32_t aov_count;
 } Layers;
 
@@ -114,7 +124,7 @@ static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int
     }
     rey_result result = REY_OK;
     if (!view->colour_is_depth) {
-        result = run_pass(scene, def, (Pass){MODE_PRIMAL, 3, 0, parts, layers->colour, layers->squares}, stats);
+        result = run_pass(scene, def, (Pass){MODE_PRIMAL, 3, 0, parts, layers->colour, layers->squares, layers->alpha}, stats);
     }
     if (result == REY_OK && particles) {
         rey_stats one = {0};
@@ -122,7 +132,7 @@ static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int
         add_stats(stats, &one);
     }
     if (result == REY_OK && aovs) {
-        Pass pass = {MODE_AOV, layers->aov_count, parts - 1, parts, layers->aovs, NULL};
+        Pass pass = {MODE_AOV, layers->aov_count, parts - 1, parts, layers->aovs, NULL, NULL};
         result = run_pass(scene, def, pass, stats);
     }
     for (int64_t i = 0; i < pixels * 3 && result == REY_OK && view->colour_is_depth; i++) {
@@ -131,9 +141,9 @@ static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int
     return result;
 }
 
-static rey_result render_channels(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image,
-                                  rey_stats *stats) {
-    Layers layers = {0};
+rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image, double *alpha,
+                              rey_stats *stats) {
+    Layers layers = {.alpha = alpha};
     rey_stats sum = {0};
     int width = 0, height = 0;
     rey_result result = rey_begin(scene ? scene->ctx : NULL, image != NULL);
@@ -158,7 +168,7 @@ static rey_result render_channels(rey_scene *scene, const rey_render_def *def, i
 }
 
 rey_result rey_render(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats) {
-    return render_channels(scene, def, 3, image, stats);
+    return rey_render_picture(scene, def, 3, image, NULL, stats);
 }
 
 int rey_channel_count(const rey_scene *scene) {
@@ -174,7 +184,7 @@ const char *rey_channel_name(const rey_scene *scene, int channel) {
 }
 
 rey_result rey_render_channels(rey_scene *scene, const rey_render_def *def, float *image, rey_stats *stats) {
-    return render_channels(scene, def, rey_channel_count(scene), image, stats);
+    return rey_render_picture(scene, def, rey_channel_count(scene), image, NULL, stats);
 }
 
 rey_result rey_render_sensors(rey_scene *scene, const rey_render_def *def, const int *sensors, int count,

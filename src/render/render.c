@@ -24,6 +24,7 @@ static void render_free(Render *r) {
     rey_free(ctx, r->workspaces);
     rey_free(ctx, r->films);
     rey_free(ctx, r->squares);
+    rey_free(ctx, r->coverage);
     rey_free(ctx, r->gradients);
     rey_free(ctx, r->columns);
     rey_free(ctx, r->rows);
@@ -166,6 +167,7 @@ void rey_render_film_unit(void *argument, int64_t item, int worker) {
     PathJob job = r->job;
     job.film = r->films + item * r->plan.tile_floats;
     job.squares = r->squares ? r->squares + item * r->plan.tile_floats : NULL;
+    job.coverage = r->coverage ? r->coverage + item * (r->plan.tile_floats / r->plan.channels * 2) : NULL;
     run_tile(r, &job, (int32_t)item, worker);
 }
 

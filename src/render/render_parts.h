@@ -18,6 +18,7 @@ typedef struct Render {
     void **workspaces;     // one per worker
     double *films;         // primal and forward: one per tile
     double *squares;       // the same of second moments, or null
+    double *coverage;      // the same of alpha and of 1, or null
     double *gradients;     // reverse: one per shard
     int64_t gradient_size;
     double *columns, *rows;
@@ -35,5 +36,9 @@ rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *d
 rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats);
 // Runs a unit of work and books its counts; false when the caller cancelled. particles: of which job is the part, or null.
 bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker);
+// A picture of `channels` channels: R G B and what the integrator adds. alpha: two numbers per pixel, whose ratio it is;
+// or null.
+rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image, double *alpha,
+                              rey_stats *stats);
 // One tile into its film; fits rey_parallel_for.
 void rey_render_film_unit(void *render, int64_t tile, int worker);

@@ -71,6 +71,11 @@ typedef struct EmitterRecord {
 } EmitterRecord;
 
 enum { FILM_BOX, FILM_TENT, FILM_GAUSSIAN, FILM_MITCHELL, FILM_CATMULLROM, FILM_LANCZOS };
+enum { MOST_FILTER_RADIUS = 256 }; // pixels
+
+// What the files of a film hold.
+enum { PIXEL_RGB, PIXEL_RGBA, PIXEL_LUMINANCE, PIXEL_LUMINANCE_ALPHA, PIXEL_XYZ, PIXEL_XYZA, PIXEL_FORMATS };
+enum { COMPONENT_FLOAT16, COMPONENT_FLOAT32, COMPONENT_UINT32 };
 
 typedef struct SensorRecord {
     int32_t kind;
@@ -80,6 +85,7 @@ typedef struct SensorRecord {
     int32_t width, height;    // full film [pixels]
     int32_t crop_x, crop_y, crop_width, crop_height;
     int32_t filter, sample_border, sampler, spp;
+    int32_t pixel_format, component_format;
     float filter_radius, filter_a, filter_b; // gaussian: stddev; mitchell: B, C
     float near_clip, far_clip;
     int32_t medium;

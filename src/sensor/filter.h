@@ -36,6 +36,11 @@ static inline float filter_eval(const SensorRecord *s, float x) {
     }
 }
 
+// Room around the film in the numbers of pixels: samples may be drawn as far beyond it as the filter reaches.
+static inline int32_t filter_margin(const SensorRecord *s) {
+    return s->filter_radius > 60 ? MOST_FILTER_RADIUS + 64 : 64;
+}
+
 // Pixels whose centre lies within the filter of position x: first and, exclusive, last.
 static inline void filter_range(const SensorRecord *s, float x, int32_t *first, int32_t *last) {
     *first = (int32_t)ceilf(x - 0.5f - s->filter_radius);
