@@ -15,8 +15,8 @@ typedef struct FitDef {
     const char *job_path;
     const char *const *overrides; // "key=value"
     int override_count;
-    const char *output; // folder, null = the job's
-    const char *command; // what the user typed, for the report; may be null
+    const char *output;  // folder, null = the job's
+    const char *command; // the command line, for the report; may be null
     bool resume;
     bool overwrite; // start again where the folder holds another fit, or this one unfinished
     bool seed_given; // seed replaces the job's
@@ -83,11 +83,23 @@ typedef struct Fit {
 
 // Path of a file in the output folder; freed with rey_free.
 char *rey_fit_output_path(const Fit *fit, const char *name);
+rey_result rey_fit_make_folder(rey_context *ctx, const char *path);
 // Makes the folder, locks it against other fits, and refuses to replace an earlier fit unasked.
 rey_result rey_fit_folder_open(Fit *fit);
 void rey_fit_folder_close(Fit *fit);
 // How table and report render a view; the user may cancel.
 rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set, int spp);
+
+// The iterations that are left, with checkpoints; records REY_ERROR_CANCELLED when the user stops it.
+rey_result rey_fit_optimise(Fit *fit);
+double rey_fit_mean_loss(const FitState *state, int end, int count); // of the `count` iterations before `end`
+int rey_fit_batches(const Job *job); // iterations in which every view has its turn once
+
+// Small pictures on the way, for the report: in epochs 1, 2, 4, 8... one of each view, frames/viewV_ITERATION.png.
+bool rey_frame_due(const Fit *fit, int iteration);
+rey_result rey_frame_write(Fit *fit, int view, const float *image);
+// The picture of iteration `iteration`; *bytes is null where there is none. Freed with rey_free.
+rey_result rey_frame_read(const Fit *fit, int view, int iteration, unsigned char **bytes, size_t *size);
 
 rey_result rey_views_load(Fit *fit);
 void rey_views_free(Fit *fit);

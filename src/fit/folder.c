@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static rey_result make_folder(rey_context *ctx, const char *path) {
+rey_result rey_fit_make_folder(rey_context *ctx, const char *path) {
     char part[4096];
     size_t length = strlen(path);
     if (length >= sizeof part) {
@@ -53,12 +53,12 @@ static rey_result check_outputs(Fit *fit) {
     return result;
 }
 
-// A fit that starts again would go on in the event files of the one before.
-static void remove_event_files(const Fit *fit) {
-    DIR *folder = opendir(fit->output);
+// Removes the files of a folder whose names start so.
+static void remove_files(const char *path, const char *start) {
+    DIR *folder = opendir(path);
     const struct dirent *entry;
     while (folder && (entry = readdir(folder))) {
-        if (!strncmp(entry->d_name, "events.out.tfevents.", strlen("events.out.tfevents."))) {
+        if (!strncmp(entry->d_name, start, strlen(start))) {
             unlinkat(dirfd(folder), entry->d_name, 0);
         }
     }
@@ -88,21 +88,23 @@ static rey_result check_former(Fit *fit, const char *path) {
 }
 
 static rey_result take_over(Fit *fit) {
-    char *path = rey_fit_output_path(fit, "checkpoint.bin");
-    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
+    char *path = rey_fit_output_path(fit, "checkpoint.bin"), *frames = rey_fit_output_path(fit, "frames");
+    rey_result result = path && frames ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
         result = fit->def->overwrite ? REY_OK : check_former(fit, path);
         if (!result) {
-            remove_event_files(fit);
+            remove_files(fit->output, "events.out.tfevents."); // or this fit would go on in them
+            remove_files(frames, "view");
             unlink(path); // --resume must not find the former fit's
         }
     }
     rey_free(fit->ctx, path);
+    rey_free(fit->ctx, frames);
     return result;
 }
 
 rey_result rey_fit_folder_open(Fit *fit) {
-    rey_result result = fit->def->resume ? REY_OK : make_folder(fit->ctx, fit->output);
+    rey_result result = fit->def->resume ? REY_OK : rey_fit_make_folder(fit->ctx, fit->output);
     if (!result) {
         result = lock_folder(fit);
     }

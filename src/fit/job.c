@@ -1,11 +1,9 @@
 // job.c: job files become Job: every key has one row in a table, so that unknown keys and their neighbours are known.
-#include "fit/job.h"
+#include "fit/job_fields.h"
 
 #include "io/file.h"
-#include "io/number.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define NAMES(function, ...)                                                                                           \
@@ -19,154 +17,6 @@ NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
 NAMES(rey_parameterisation_name, "identity", "log", "logit")
 NAMES(rey_moment_name, "per_entry", "shared")
 
-typedef enum FieldType {
-    FIELD_TEXT,    // const char *
-    FIELD_REAL,    // double in [low, high]
-    FIELD_INTEGER, // int in [low, high]
-    FIELD_SEED,    // uint32_t
-    FIELD_CHOICE,  // int, index into names
-    FIELD_READER   // read(job, node, target)
-} FieldType;
-
-typedef struct Field {
-    const char *key;
-    FieldType type;
-    size_t offset;
-    double low, high;
-    const char *const *names;
-    rey_result (*read)(Job *job, const YamlNode *node, void *target);
-    bool required;
-} Field;
-
-static rey_result fail_at(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
-static rey_result fail_at(Job *job, const YamlNode *node, const char *format, ...) {
-    char message[1024];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
-    va_end(arguments);
-    if (node->line == 0) {
-        return rey_fail(job->ctx, REY_ERROR_FORMAT, "--set: %s", message);
-    }
-    return rey_fail(job->ctx, REY_ERROR_FORMAT, "%s:%d: %s", job->path, node->line, message);
-}
-
-static bool is_real(const YamlNode *node, double *value) {
-    const char *end;
-    return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
-}
-
-static rey_result read_real(Job *job, const YamlNode *node, double low, double high, double *out) {
-    double value;
-    if (!is_real(node, &value)) {
-        return fail_at(job, node, "%s%sexpected a number", node->key ? node->key : "", node->key ? ": " : "");
-    }
-    if (value < low || value > high) {
-        return fail_at(job, node, "%s = %g, expected %g to %g", node->key ? node->key : "value", value, low, high);
-    }
-    *out = value;
-    return REY_OK;
-}
-
-static const char *word_at(void *user, int i) {
-    const char *const *names = user;
-    return names[i];
-}
-
-static rey_result read_choice(Job *job, const YamlNode *node, const char *const *names, int *out) {
-    const char *text = node->kind == YAML_SCALAR && node->text ? node->text : "";
-    char all[256] = "";
-    for (int i = 0; names[i]; i++) {
-        if (!strcmp(text, names[i])) {
-            *out = i;
-            return REY_OK;
-        }
-        size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", names[i]);
-    }
-    const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
-    return nearest ? fail_at(job, node, "unknown value '%s', did you mean '%s'?", text, nearest)
-                   : fail_at(job, node, "unknown value '%s', expected one of %s", text, all);
-}
-
-static rey_result read_text(Job *job, const YamlNode *node, const char **out) {
-    if (node->kind != YAML_SCALAR || !node->text || !node->text[0]) {
-        return fail_at(job, node, "%s: expected a text", node->key ? node->key : "entry");
-    }
-    *out = node->text;
-    return REY_OK;
-}
-
-static rey_result read_field(Job *job, const Field *field, const YamlNode *node, char *base) {
-    void *target = base + field->offset;
-    double value;
-    rey_result result;
-    switch (field->type) {
-    case FIELD_TEXT:
-        return read_text(job, node, target);
-    case FIELD_REAL:
-        return read_real(job, node, field->low, field->high, target);
-    case FIELD_INTEGER:
-    case FIELD_SEED:
-        result = read_real(job, node, field->low, field->high, &value);
-        if (!result && value != floor(value)) {
-            result = fail_at(job, node, "%s = %g, expected a whole number", field->key, value);
-        }
-        if (!result && field->type == FIELD_SEED) {
-            *(uint32_t *)target = (uint32_t)value;
-        } else if (!result) {
-            *(int *)target = (int)value;
-        }
-        return result;
-    case FIELD_CHOICE:
-        return read_choice(job, node, field->names, target);
-    default:
-        return field->read(job, node, target);
-    }
-}
-
-static const char *key_at(void *user, int i) {
-    const Field *fields = user;
-    return fields[i].key;
-}
-
-// Reads a map by its table, which ends with a key of null.
-static rey_result read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base) {
-    if (map->kind != YAML_MAP) {
-        return fail_at(job, map, "%s: expected 'key: value' lines", what);
-    }
-    for (const YamlNode *node = map->child; node; node = node->next) {
-        const Field *field = fields;
-        while (field->key && strcmp(field->key, node->key)) {
-            field++;
-        }
-        if (!field->key) {
-            const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
-            return nearest ? fail_at(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
-                           : fail_at(job, node, "unknown key '%s' in %s", node->key, what);
-        }
-        rey_result result = read_field(job, field, node, base);
-        if (result) {
-            return result;
-        }
-    }
-    for (const Field *field = fields; field->key; field++) {
-        if (field->required && !rey_yaml_find(map, field->key)) {
-            return fail_at(job, map, "%s: key '%s' is missing", what, field->key);
-        }
-    }
-    return REY_OK;
-}
-
-static rey_result open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count) {
-    if (node->kind != YAML_LIST || !node->child) {
-        return fail_at(job, node, "%s: expected a list of at least one entry", node->key ? node->key : "entry");
-    }
-    *count = rey_yaml_count(node);
-    *items = rey_job_alloc(job, (size_t)*count, item_bytes);
-    return *items ? REY_OK : REY_ERROR_MEMORY;
-}
-
 // Letters, digits and underscores, the first no digit.
 static bool is_name(const char *text) {
     static const char rest[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789";
@@ -177,7 +27,7 @@ static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
     rey_define **defines = target;
     if (node->kind != YAML_MAP) {
         return node->child || (node->text && node->text[0])
-                   ? fail_at(job, node, "defines: expected 'name: value' lines")
+                   ? rey_job_fail(job, node, "defines: expected 'name: value' lines")
                    : REY_OK;
     }
     job->define_count = rey_yaml_count(node);
@@ -186,8 +36,8 @@ static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*defines)[i].name = entry->key;
-        result = is_name(entry->key) ? read_text(job, entry, &(*defines)[i].value)
-                                     : fail_at(job, entry, "defines: '%s' is not a name", entry->key);
+        result = is_name(entry->key) ? rey_job_read_text(job, entry, &(*defines)[i].value)
+                                     : rey_job_fail(job, entry, "defines: '%s' is not a name", entry->key);
     }
     return result;
 }
@@ -207,19 +57,19 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
     if (node->kind == YAML_SCALAR) {
         *steps = rey_job_alloc(job, 1, sizeof **steps);
         job->spp_count = 1;
-        return *steps ? read_field(job, &fields[1], node, (char *)*steps) : REY_ERROR_MEMORY;
+        return *steps ? rey_job_read_field(job, &fields[1], node, (char *)*steps) : REY_ERROR_MEMORY;
     }
     void *items;
-    rey_result result = open_list(job, node, sizeof **steps, &items, &job->spp_count);
+    rey_result result = rey_job_open_list(job, node, sizeof **steps, &items, &job->spp_count);
     if (result) {
         return result;
     }
     *steps = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        result = read_map(job, entry, "spp", fields, &(*steps)[i]);
+        result = rey_job_read_map(job, entry, "spp", fields, &(*steps)[i]);
         if (!result && (i ? (*steps)[i].from <= (*steps)[i - 1].from : (*steps)[0].from != 0)) {
-            result = fail_at(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
+            result = rey_job_fail(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
         }
     }
     return result;
@@ -235,12 +85,12 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     };
     JobView **views = target;
     void *items = NULL;
-    rey_result result = open_list(job, node, sizeof **views, &items, &job->view_count);
+    rey_result result = rey_job_open_list(job, node, sizeof **views, &items, &job->view_count);
     *views = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*views)[i] = (JobView){.sensor = i, .weight = 1, .line = entry->line};
-        result = read_map(job, entry, "views", fields, &(*views)[i]);
+        result = rey_job_read_map(job, entry, "views", fields, &(*views)[i]);
     }
     return result;
 }
@@ -256,8 +106,8 @@ static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
         {0},
     };
     UNUSED(target);
-    return node->kind == YAML_SCALAR ? read_field(job, fields, node, (char *)job)
-                                     : read_map(job, node, "loss", fields, job);
+    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, (char *)job)
+                                     : rey_job_read_map(job, node, "loss", fields, job);
 }
 
 static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
@@ -273,8 +123,8 @@ static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
         {.key = "every", .type = FIELD_INTEGER, .offset = offsetof(JobSchedule, every), .low = 1, .high = 1e9},
         {0},
     };
-    return node->kind == YAML_SCALAR ? read_field(job, fields, node, target)
-                                     : read_map(job, node, "schedule", fields, target);
+    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, target)
+                                     : rey_job_read_map(job, node, "schedule", fields, target);
 }
 
 static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
@@ -293,7 +143,7 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
         {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
         {0},
     };
-    return read_map(job, node, "optimizer", fields, target);
+    return rey_job_read_map(job, node, "optimizer", fields, target);
 }
 
 static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
@@ -302,20 +152,20 @@ static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
         *out = node->text[0] == '-' ? -INFINITY : INFINITY;
         return REY_OK;
     }
-    return read_real(job, node, -1e30, 1e30, out);
+    return rey_job_read_real(job, node, -1e30, 1e30, out);
 }
 
 static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
     double *bounds = target;
     if (node->kind != YAML_LIST || rey_yaml_count(node) != 2) {
-        return fail_at(job, node, "bounds: expected [low, high]");
+        return rey_job_fail(job, node, "bounds: expected [low, high]");
     }
     rey_result result = read_bound(job, node->child, &bounds[0]);
     if (!result) {
         result = read_bound(job, node->child->next, &bounds[1]);
     }
     if (!result && !(bounds[0] < bounds[1])) {
-        result = fail_at(job, node, "bounds: %g is not below %g", bounds[0], bounds[1]);
+        result = rey_job_fail(job, node, "bounds: %g is not below %g", bounds[0], bounds[1]);
     }
     return result;
 }
@@ -323,18 +173,18 @@ static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
 static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     JobParameter *parameter = target;
     double value;
-    if (node->kind == YAML_SCALAR && !is_real(node, &value)) {
-        return read_text(job, node, &parameter->start_file);
+    if (node->kind == YAML_SCALAR && !rey_job_is_real(node, &value)) {
+        return rey_job_read_text(job, node, &parameter->start_file);
     }
     int count = node->kind == YAML_LIST ? rey_yaml_count(node) : 1;
     if (node->kind == YAML_MAP || count < 1) {
-        return fail_at(job, node, "start: expected a number, a list of numbers, or a file");
+        return rey_job_fail(job, node, "start: expected a number, a list of numbers, or a file");
     }
     double *values = rey_job_alloc(job, (size_t)count, sizeof *values);
     rey_result result = values ? REY_OK : REY_ERROR_MEMORY;
     const YamlNode *entry = node->kind == YAML_LIST ? node->child : node;
     for (int i = 0; i < count && !result; i++, entry = entry->next) {
-        result = read_real(job, entry, -1e30, 1e30, &values[i]);
+        result = rey_job_read_real(job, entry, -1e30, 1e30, &values[i]);
     }
     parameter->start = values;
     parameter->start_count = count;
@@ -363,12 +213,12 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
     };
     JobParameter **parameters = target;
     void *items = NULL;
-    rey_result result = open_list(job, node, sizeof **parameters, &items, &job->parameter_count);
+    rey_result result = rey_job_open_list(job, node, sizeof **parameters, &items, &job->parameter_count);
     *parameters = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*parameters)[i] = (JobParameter){.bounds = {NAN, NAN}, .line = entry->line};
-        result = read_map(job, entry, "parameters", fields, &(*parameters)[i]);
+        result = rey_job_read_map(job, entry, "parameters", fields, &(*parameters)[i]);
     }
     return result;
 }
@@ -380,7 +230,7 @@ static rey_result read_stop(Job *job, const YamlNode *node, void *target) {
         {0},
     };
     UNUSED(target);
-    return read_map(job, node, "stop", fields, job);
+    return rey_job_read_map(job, node, "stop", fields, job);
 }
 
 static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
@@ -389,7 +239,7 @@ static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
         {0},
     };
     UNUSED(target);
-    return read_map(job, node, "truth", fields, job);
+    return rey_job_read_map(job, node, "truth", fields, job);
 }
 
 static const Field job_fields[] = {
@@ -411,6 +261,7 @@ static const Field job_fields[] = {
      .required = true},
     {.key = "stop", .type = FIELD_READER, .read = read_stop},
     {.key = "checkpoint_every", .type = FIELD_INTEGER, .offset = offsetof(Job, checkpoint_every), .high = 1e9},
+    {.key = "checkpoint_seconds", .type = FIELD_REAL, .offset = offsetof(Job, checkpoint_seconds), .high = 1e9},
     {.key = "image_every", .type = FIELD_INTEGER, .offset = offsetof(Job, image_every), .high = 1e9},
     {.key = "report_spp", .type = FIELD_INTEGER, .offset = offsetof(Job, report_spp), .high = 65536},
     {.key = "truth", .type = FIELD_READER, .read = read_truth},
@@ -440,6 +291,7 @@ static rey_result set_defaults(Job *job) {
                                     .momentum = 0.9,
                                     .schedule = {.end = 0.05, .factor = 0.5, .every = 100}};
     job->checkpoint_every = 50;
+    job->checkpoint_seconds = 30;
     job->image_every = 50;
     job->report_spp = 64;
     return REY_OK;
@@ -456,13 +308,13 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
         result = set_defaults(job);
     }
     if (!result) {
-        result = read_map(job, job->tree, "the job", job_fields, job);
+        result = rey_job_read_map(job, job->tree, "the job", job_fields, job);
     }
     if (!result && !job->optimizer.schedule.length) {
         job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
     }
     if (!result && job->views_per_iteration > job->view_count) {
-        result = fail_at(job, rey_yaml_find(job->tree, "views_per_iteration"),
+        result = rey_job_fail(job, rey_yaml_find(job->tree, "views_per_iteration"),
                          "views_per_iteration = %d, but the job has %d view%s", job->views_per_iteration,
                          job->view_count, PLURAL(job->view_count));
     }

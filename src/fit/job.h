@@ -69,6 +69,7 @@ typedef struct Job {
     uint32_t seed;
     int iterations, views_per_iteration; // 0 = all views
     int checkpoint_every, image_every;   // 0 = never
+    double checkpoint_seconds;           // and after so much time, 0 = never
     int report_spp;                      // 0 = no report
     JobSpp *spp;
     int spp_count;

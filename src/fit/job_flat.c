@@ -178,6 +178,7 @@ rey_result rey_job_yaml(const Job *job, char **out) {
     line_text(&flat, "output", job->output);
     line_integer(&flat, "iterations", job->iterations);
     line_integer(&flat, "checkpoint_every", job->checkpoint_every);
+    line_real(&flat, "checkpoint_seconds", job->checkpoint_seconds);
     line_integer(&flat, "image_every", job->image_every);
     line_integer(&flat, "report_spp", job->report_spp);
     if (job->truth_scene) {

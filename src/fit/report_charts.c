@@ -1,9 +1,19 @@
-// report_charts.c: curves as inline SVG.
+// report_charts.c: curves of the history as inline SVG.
 #include "fit/report_parts.h"
 
 #include <math.h>
 
-enum { WIDE = 880, HIGH = 240, LEFT = 56, BOTTOM = 34, SPARK_WIDE = 150, SPARK_HIGH = 34, SPARK_LABEL = 48, MOST_POINTS = 440 };
+enum { WIDE = 460, HIGH = 220, LEFT = 58, TOP = 8, BOTTOM = 36, SPARK_WIDE = 150, SPARK_HIGH = 34, MOST_POINTS = 300 };
+
+typedef struct Chart {
+    const Fit *fit;
+    int column, count;  // columns of the history; three are red, green and blue
+    int reach;          // above 0, the curve is smoothed over 2 reach + 1 points and the raw one is pale
+    const float *truth; // of each column, dashed; may be null
+    const char *label;  // what the vertical axis shows
+    bool logarithmic;   // low and high are logarithms to base 10 then
+    double low, high;
+} Chart;
 
 static double cell(const Fit *fit, int64_t row, int column) {
     return ARRAY_AT(fit->state.history, double, (size_t)(row * fit->state.history_width + column));
@@ -19,118 +29,237 @@ static double bin_mean(const Fit *fit, int column, int bin, int bins) {
     return sum / (double)(last - first);
 }
 
-typedef struct Axis {
-    double low, high; // logarithms to base 10
-} Axis;
-
-static double loss_y(Axis axis, double loss) {
-    return (HIGH - BOTTOM) * (axis.high - log10(loss)) / (axis.high - axis.low);
+static int bin_count(const Fit *fit, int most) {
+    return fit->state.iteration < most ? fit->state.iteration : most;
 }
 
-// One curve of the loss, smoothed over 2 * reach + 1 bins. Estimates of a small loss can be negative: they are left
-// out.
-static void loss_curve(const Fit *fit, Axis axis, int bins, int reach, const char *style, Text *html) {
-    rey_text_add(html, "<polyline class=\"%s\" points=\"", style);
-    for (int i = 0; i < bins; i++) {
-        double sum = 0;
-        int count = 0;
-        for (int k = i - reach; k <= i + reach; k++) {
-            if (k >= 0 && k < bins) {
-                sum += bin_mean(fit, HISTORY_LOSS, k, bins);
-                count++;
+// Mean of the bins around one.
+static double smooth(const Chart *c, int column, int bin, int bins, int reach) {
+    double sum = 0;
+    int count = 0;
+    for (int k = bin - reach; k <= bin + reach; k++) {
+        if (k >= 0 && k < bins) {
+            sum += bin_mean(c->fit, column, k, bins);
+            count++;
+        }
+    }
+    return sum / count;
+}
+
+static void widen(Chart *c, double value) {
+    double at = c->logarithmic ? log10(value) : value;
+    if (isfinite(at)) {
+        c->low = fmin(c->low, at);
+        c->high = fmax(c->high, at);
+    }
+}
+
+// False when there is nothing that the axis could show.
+static bool set_range(Chart *c) {
+    int bins = bin_count(c->fit, MOST_POINTS);
+    c->low = INFINITY;
+    c->high = -INFINITY;
+    for (int k = 0; k < c->count; k++) {
+        for (int i = 0; i < bins; i++) {
+            widen(c, bin_mean(c->fit, c->column + k, i, bins));
+        }
+        if (c->truth) {
+            widen(c, (double)c->truth[k]);
+        }
+    }
+    if (!(c->high >= c->low)) {
+        return false;
+    }
+    double margin = fmax(0.06 * (c->high - c->low), c->logarithmic ? 0.05 : 1e-3 * fabs(c->high) + 1e-9);
+    c->low -= margin;
+    c->high += margin;
+    return true;
+}
+
+// Below the lowest of a logarithmic axis lies what is not positive.
+static double y_of(const Chart *c, double value) {
+    double at = !c->logarithmic ? value : value > 0 ? log10(value) : c->low;
+    return TOP + (HIGH - TOP - BOTTOM) * (c->high - fmin(fmax(at, c->low), c->high)) / (c->high - c->low);
+}
+
+static double x_of(const Chart *c, double iteration) {
+    return LEFT + (WIDE - LEFT - 10) * iteration / c->fit->state.iteration;
+}
+
+static void y_tick(const Chart *c, double value, Text *html) {
+    double y = y_of(c, value);
+    rey_text_add(html,
+                 "<line class=\"grid\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
+                 "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.4g</text>\n",
+                 LEFT, WIDE - 10, y, y, LEFT - 6, y + 4, value);
+}
+
+// 1, 2 or 5 times a power of ten: the smallest that cuts the range into at most `most` parts.
+static double nice_step(double range, int most) {
+    double step = pow(10, floor(log10(range / most)));
+    while (range / step > most) {
+        double lead = step / pow(10, floor(log10(step) + 1e-9));
+        step *= lead > 1.5 && lead < 3 ? 2.5 : 2;
+    }
+    return step;
+}
+
+static void y_axis(const Chart *c, Text *html) {
+    if (!c->logarithmic) {
+        double step = nice_step(c->high - c->low, 5);
+        for (double k = ceil(c->low / step); k * step <= c->high; k++) {
+            y_tick(c, k * step, html);
+        }
+        return;
+    }
+    static const int parts[] = {1, 2, 5};
+    int every = 1 + (int)((c->high - c->low) / 6);
+    for (int decade = (int)floor(c->low); decade <= (int)ceil(c->high); decade++) {
+        for (int p = 0; p < (c->high - c->low < 1.7 ? 3 : 1); p++) {
+            double value = parts[p] * pow(10, decade);
+            if (log10(value) >= c->low && log10(value) <= c->high && decade % every == 0) {
+                y_tick(c, value, html);
             }
         }
-        if (sum > 0) {
-            double y = fmin(fmax(loss_y(axis, sum / count), 0), HIGH - BOTTOM);
-            rey_text_add(html, "%.1f,%.1f ", LEFT + (WIDE - LEFT) * (i + 0.5) / bins, y);
-        }
+    }
+}
+
+static void axes(const Chart *c, Text *html) {
+    y_axis(c, html);
+    double step = fmax(nice_step(c->fit->state.iteration, 5), 1);
+    for (double i = 0; i <= c->fit->state.iteration; i += step) {
+        rey_text_add(html, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%.0f</text>", x_of(c, i), HIGH - BOTTOM + 15,
+                     i);
+    }
+    rey_text_add(html,
+                 "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">iteration</text>"
+                 "<line class=\"axis\" x1=\"%d\" x2=\"%d\" y1=\"%d\" y2=\"%d\"/>\n",
+                 LEFT + (WIDE - LEFT - 10) / 2, HIGH - 4, LEFT, WIDE - 10, HIGH - BOTTOM, HIGH - BOTTOM);
+}
+
+static const char *colour(int count, int k) {
+    static const char *const names[] = {" c0", " c1", " c2"};
+    return count == 3 ? names[k] : "";
+}
+
+static void curve(const Chart *c, int column, int reach, const char *style, const char *tint, Text *html) {
+    int bins = bin_count(c->fit, MOST_POINTS);
+    rey_text_add(html, "<polyline class=\"%s%s\" points=\"", style, tint);
+    for (int i = 0; i < bins; i++) {
+        rey_text_add(html, "%.1f,%.1f ", x_of(c, c->fit->state.iteration * (i + 0.5) / bins),
+                     y_of(c, smooth(c, column, i, bins, reach)));
     }
     rey_text_add(html, "\"/>\n");
 }
 
-static void loss_axes(const Fit *fit, Axis axis, Text *html) {
-    static const int parts[] = {1, 2, 5};
-    bool few = axis.high - axis.low < 1.5;
-    for (int decade = (int)floor(axis.low); decade <= (int)ceil(axis.high); decade++) {
-        for (int p = 0; p < (few ? 3 : 1); p++) {
-            double value = parts[p] * pow(10, decade);
-            if (log10(value) < axis.low - 1e-9 || log10(value) > axis.high + 1e-9) {
-                continue;
-            }
-            double y = loss_y(axis, value);
-            rey_text_add(html, "<line class=\"grid\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", LEFT, WIDE, y, y);
-            rey_text_add(html, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>\n", LEFT - 8, y + 4, value);
+static void legend(const Chart *c, Text *html) {
+    static const char *const channels[] = {"red", "green", "blue"};
+    rey_text_add(html, "<figcaption>");
+    rey_text_html(html, c->label);
+    rey_text_add(html, c->logarithmic ? ", logarithmic scale" : "");
+    for (int k = 0; k < 3 && c->count == 3; k++) {
+        rey_text_add(html, " <b class=\"key%s\"></b>%s", colour(3, k), channels[k]);
+    }
+    if (c->reach) {
+        rey_text_add(html, " <b class=\"key pale\"></b>each iteration <b class=\"key\"></b>running mean");
+    }
+    rey_text_add(html, c->truth ? " <b class=\"key dash\"></b>truth</figcaption></figure>\n" : "</figcaption></figure>\n");
+}
+
+static void put_chart(Chart *c, Text *html) {
+    if (!set_range(c)) {
+        rey_text_add(html, "<p class=\"note\">No iteration had a positive %s.</p>\n", c->label);
+        return;
+    }
+    rey_text_add(html, "<figure class=\"chart\"><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", WIDE, HIGH);
+    rey_text_html(html, c->label);
+    rey_text_add(html, "\">\n");
+    axes(c, html);
+    for (int k = 0; k < c->count; k++) {
+        if (c->truth) {
+            double y = y_of(c, (double)c->truth[k]);
+            rey_text_add(html, "<line class=\"truth%s\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>",
+                         colour(c->count, k), LEFT, WIDE - 10, y, y);
         }
+        if (c->reach) {
+            curve(c, c->column + k, 0, "raw", colour(c->count, k), html);
+        }
+        curve(c, c->column + k, c->reach, "line", colour(c->count, k), html);
     }
-    for (int i = 0; i <= 4; i++) {
-        rey_text_add(html, "<text x=\"%d\" y=\"%d\" text-anchor=\"%s\">%d</text>", LEFT + (WIDE - LEFT) * i / 4,
-                     HIGH - BOTTOM + 17,
-                     i == 4 ? "end"
-                     : i    ? "middle"
-                            : "start",
-                     fit->state.iteration * i / 4);
-    }
-    rey_text_add(html, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">iteration</text>\n", LEFT + (WIDE - LEFT) / 2,
-                 HIGH - 2);
+    rey_text_add(html, "</svg>");
+    legend(c, html);
 }
 
 void rey_report_loss(const Fit *fit, Text *html) {
-    int rows = fit->state.iteration, bins = rows < MOST_POINTS ? rows : MOST_POINTS;
-    Axis axis = {INFINITY, -INFINITY};
-    for (int i = 0; i < bins; i++) {
-        double loss = bin_mean(fit, HISTORY_LOSS, i, bins);
-        if (loss > 0) {
-            axis.low = fmin(axis.low, log10(loss));
-            axis.high = fmax(axis.high, log10(loss));
-        }
+    int reach = bin_count(fit, MOST_POINTS) / 50, negative = 0;
+    Chart loss = {.fit = fit, .column = HISTORY_LOSS, .count = 1, .reach = reach, .label = "loss", .logarithmic = true};
+    Chart norm = {.fit = fit,
+                  .column = HISTORY_NORM,
+                  .count = 1,
+                  .reach = reach,
+                  .label = "norm of the gradient",
+                  .logarithmic = true};
+    for (int i = 0; i < fit->state.iteration; i++) {
+        negative += cell(fit, i, HISTORY_LOSS) <= 0;
     }
-    if (!(axis.high >= axis.low)) {
-        rey_text_add(html, "<p class=\"note\">No iteration had a positive loss.</p>\n");
-        return;
+    rey_text_add(html, "<div class=\"charts\">");
+    put_chart(&loss, html);
+    put_chart(&norm, html);
+    rey_text_add(html, "</div>\n");
+    if (negative) {
+        rey_text_add(html,
+                     "<p class=\"note\">In %d of %d iterations the loss, an unbiased estimate, was not positive; they "
+                     "lie on the lower edge.</p>\n",
+                     negative, fit->state.iteration);
     }
-    axis.low -= 0.08;
-    axis.high += 0.08;
-    rey_text_add(html, "<svg viewBox=\"0 0 %d %d\" width=\"100%%\" role=\"img\" aria-label=\"loss\">\n", WIDE, HIGH);
-    loss_axes(fit, axis, html);
-    loss_curve(fit, axis, bins, 0, "raw", html);
-    loss_curve(fit, axis, bins, bins / 60, "line", html);
-    rey_text_add(html, "<line class=\"raw\" x1=\"%d\" x2=\"%d\" y1=\"12\" y2=\"12\"/><text x=\"%d\" y=\"16\">each "
-                       "iteration&rsquo;s estimate</text><line class=\"line\" x1=\"%d\" x2=\"%d\" y1=\"28\" y2=\"28\"/>"
-                       "<text x=\"%d\" y=\"32\">running mean</text>\n",
-                 WIDE - 190, WIDE - 165, WIDE - 158, WIDE - 190, WIDE - 165, WIDE - 158);
-    rey_text_add(html, "</svg>\n");
 }
 
-void rey_report_curve(const Fit *fit, int column, int64_t count, const float *truth, Text *html) {
-    int rows = fit->state.iteration, bins = rows < SPARK_WIDE ? rows : SPARK_WIDE;
-    double low = INFINITY, high = -INFINITY;
-    for (int64_t k = 0; k < count; k++) {
-        for (int i = 0; i < bins; i++) {
-            double value = bin_mean(fit, column + (int)k, i, bins);
-            low = fmin(low, value);
-            high = fmax(high, value);
-        }
-        if (truth) {
-            low = fmin(low, (double)truth[k]);
-            high = fmax(high, (double)truth[k]);
+static bool wants_logarithm(const Chart *c) {
+    double low = INFINITY, high = 0;
+    for (int k = 0; k < c->count; k++) {
+        for (int i = 0; i < c->fit->state.iteration; i++) {
+            low = fmin(low, cell(c->fit, i, c->column + k));
+            high = fmax(high, cell(c->fit, i, c->column + k));
         }
     }
-    double range = high > low ? high - low : 1;
-    rey_text_add(html, "<svg width=\"%d\" height=\"%d\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"history\">",
-                 SPARK_WIDE + SPARK_LABEL, SPARK_HIGH, SPARK_WIDE + SPARK_LABEL, SPARK_HIGH);
-    rey_text_add(html, "<line class=\"grid\" x1=\"0\" x2=\"%d\" y1=\"%d\" y2=\"%d\"/><text x=\"%d\" y=\"9\">%.3g</text>"
-                       "<text x=\"%d\" y=\"%d\">%.3g</text>",
-                 SPARK_WIDE, SPARK_HIGH - 1, SPARK_HIGH - 1, SPARK_WIDE + 5, high, SPARK_WIDE + 5, SPARK_HIGH, low);
-    for (int64_t k = 0; k < count; k++) {
-        if (truth) {
-            double y = 2 + (SPARK_HIGH - 4) * (high - (double)truth[k]) / range;
-            rey_text_add(html, "<line class=\"truth\" x1=\"0\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", SPARK_WIDE, y, y);
+    return low > 0 && high > 8 * low;
+}
+
+void rey_report_histories(const Fit *fit, const FitResult *out, Text *html) {
+    int column = HISTORY_VALUES;
+    rey_text_add(html, "<div class=\"charts\">");
+    for (size_t i = 0; i < out->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        if (row->count > HISTORY_LARGEST) {
+            continue;
         }
-        rey_text_add(html, count == 3 ? "<polyline class=\"line c%d\" points=\"" : "<polyline class=\"line\" points=\"",
-                     (int)k);
+        Chart chart = {
+            .fit = fit, .column = column, .count = (int)row->count, .truth = row->truth, .label = row->name};
+        chart.logarithmic = wants_logarithm(&chart);
+        put_chart(&chart, html);
+        column += (int)row->count;
+    }
+    rey_text_add(html, "</div>\n");
+}
+
+void rey_report_sparkline(const Fit *fit, int column, int64_t count, const float *truth, Text *html) {
+    int bins = bin_count(fit, SPARK_WIDE);
+    Chart c = {.fit = fit, .column = column, .count = (int)count, .truth = truth};
+    if (!set_range(&c)) {
+        return;
+    }
+    double per_y = (SPARK_HIGH - 4) / (c.high - c.low);
+    rey_text_add(html, "<svg width=\"%d\" height=\"%d\" role=\"img\" aria-label=\"history\">", SPARK_WIDE, SPARK_HIGH);
+    for (int k = 0; k < c.count; k++) {
+        if (truth) {
+            double y = 2 + per_y * (c.high - (double)truth[k]);
+            rey_text_add(html, "<line class=\"truth%s\" x1=\"0\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", colour(c.count, k),
+                         SPARK_WIDE, y, y);
+        }
+        rey_text_add(html, "<polyline class=\"line%s\" points=\"", colour(c.count, k));
         for (int i = 0; i < bins; i++) {
-            double y = 2 + (SPARK_HIGH - 4) * (high - bin_mean(fit, column + (int)k, i, bins)) / range;
-            rey_text_add(html, "%.1f,%.1f ", SPARK_WIDE * (i + 0.5) / bins, y);
+            rey_text_add(html, "%.1f,%.1f ", SPARK_WIDE * (i + 0.5) / bins,
+                         2 + per_y * (c.high - bin_mean(fit, column + k, i, bins)));
         }
         rey_text_add(html, "\"/>");
     }

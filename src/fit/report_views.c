@@ -1,101 +1,10 @@
-// report_views.c: the pictures of a report, tone-mapped and embedded as PNG.
+// report_views.c: the views of a report: the pictures of start and result, and those on the way.
 #include "fit/report_parts.h"
-#include "io/image.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-enum { SMALL_PICTURE = 128 }; // pixels across, below which enlarged pixels stay square
+#include <stdio.h>
 
 static const uint32_t REPORT_SET = 0xfffffff0u; // sample sets that no iteration uses
-
-static int compare_floats(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-// The given quantile of an array, which is sorted by it.
-static float quantile(float *values, int64_t count, double share) {
-    qsort(values, (size_t)count, sizeof *values, compare_floats);
-    return values[(int64_t)(share * (double)(count - 1))];
-}
-
-float rey_report_exposure(rey_context *ctx, const float *rgb, int64_t pixels) {
-    float *brightest = rey_alloc_array(ctx, (size_t)pixels, sizeof *brightest);
-    if (!brightest) {
-        return 1; // only a picture's look depends on it
-    }
-    for (int64_t i = 0; i < pixels; i++) {
-        float most = fmaxf(rgb[3 * i], fmaxf(rgb[3 * i + 1], rgb[3 * i + 2]));
-        brightest[i] = isfinite(most) ? most : 0;
-    }
-    float white = quantile(brightest, pixels, 0.99);
-    rey_free(ctx, brightest);
-    return white > 0 && (white < 0.3f || white > 1.2f) ? 0.95f / white : 1;
-}
-
-static rey_result embed(Text *html, const char *name, const unsigned char *rgb8, int width, int height) {
-    unsigned char *png = NULL;
-    size_t size = 0;
-    rey_result result = rey_png_encode(html->ctx, rgb8, width, height, &png, &size);
-    if (!result) {
-        rey_text_add(html, "<img alt=\"");
-        rey_text_html(html, name);
-        rey_text_add(html, "\" width=\"%d\" height=\"%d\" src=\"data:image/png;base64,", width, height);
-        rey_text_base64(html, png, size);
-        rey_text_add(html, "\">");
-    }
-    rey_free(html->ctx, png);
-    return result;
-}
-
-rey_result rey_report_image(Text *html, const char *name, const float *rgb, int width, int height, float exposure) {
-    int64_t pixels = (int64_t)width * height;
-    float *scaled = rey_alloc_array(html->ctx, (size_t)pixels * 3, sizeof *scaled);
-    unsigned char *rgb8 = rey_alloc_array(html->ctx, (size_t)pixels, 3);
-    rey_result result = scaled && rgb8 ? REY_OK : REY_ERROR_MEMORY;
-    for (int64_t i = 0; i < 3 * pixels && !result; i++) {
-        scaled[i] = exposure * rgb[i];
-    }
-    if (!result) {
-        rey_image_to_srgb8(scaled, pixels, rgb8);
-        result = embed(html, name, rgb8, width, height);
-    }
-    rey_free(html->ctx, scaled);
-    rey_free(html->ctx, rgb8);
-    return result;
-}
-
-// Mean difference over channels: blue where the result is darker than the target, red where it is brighter.
-static rey_result difference_image(Text *html, const FitView *view, const float *image, float *scale) {
-    int64_t pixels = (int64_t)view->width * view->height;
-    float *mean = rey_alloc_array(html->ctx, (size_t)pixels * 2, sizeof *mean), *sorted;
-    unsigned char *rgb8 = rey_alloc_array(html->ctx, (size_t)pixels, 3);
-    rey_result result = mean && rgb8 ? REY_OK : REY_ERROR_MEMORY;
-    if (!result) {
-        sorted = mean + pixels;
-        for (int64_t i = 0; i < pixels; i++) {
-            bool counts = !view->mask || view->mask[i] > 0;
-            for (int k = 0; k < 3 && counts; k++) {
-                mean[i] += (image[3 * i + k] - view->target[3 * i + k]) / 3;
-            }
-            sorted[i] = fabsf(mean[i]);
-        }
-        *scale = fmaxf(quantile(sorted, pixels, 0.995), 1e-9f);
-        for (int64_t i = 0; i < pixels; i++) {
-            float t = fminf(fmaxf(mean[i] / *scale, -1), 1), fade = 1 - fabsf(t);
-            const float full[3] = {t > 0 ? 178 : 33, t > 0 ? 24 : 102, t > 0 ? 43 : 172};
-            for (int k = 0; k < 3; k++) {
-                rgb8[3 * i + k] = (unsigned char)(full[k] + (247 - full[k]) * fade + 0.5f);
-            }
-        }
-        result = embed(html, "difference", rgb8, view->width, view->height);
-    }
-    rey_free(html->ctx, mean);
-    rey_free(html->ctx, rgb8);
-    return result;
-}
 
 // Root of sum (I - R)^2 over sum R^2, behind the mask.
 static double relative_error(const FitView *view, const float *image) {
@@ -125,40 +34,86 @@ static void comparison(Text *html, int view) {
         }
         rey_text_add(html, "</select>");
     }
-    rey_text_add(html, "</div><label class=\"stops\">exposure <input type=\"range\" min=\"-4\" max=\"4\" step=\"0.5\" "
-                       "value=\"0\"> <output>0</output> stops</label></div>\n");
+    rey_text_add(html, "</div></div>\n");
 }
 
-static rey_result view_section(Fit *fit, int index, const float *start, const float *result_image, Text *html) {
+static void strip_figure(Text *html, int width, int height, const unsigned char *png, size_t size,
+                         const char *caption) {
+    rey_text_add(html, "<figure>");
+    rey_report_png(html, caption, png, size, width, height, true);
+    rey_text_add(html, "<figcaption>%s</figcaption></figure>", caption);
+}
+
+static rey_result strip_end(const FitView *view, const float *image, float exposure, const char *caption, Text *html) {
+    unsigned char *png;
+    size_t size = 0;
+    int width, height;
+    rey_result result =
+        rey_report_thumbnail(html->ctx, image, view->width, view->height, exposure, &png, &size, &width, &height);
+    if (!result) {
+        strip_figure(html, width, height, png, size, caption);
+    }
+    rey_free(html->ctx, png);
+    return result;
+}
+
+// Start, iterations, result. The pictures on the way are those that the iterations rendered for themselves.
+static rey_result strip(Fit *fit, int index, float exposure, const float *start, const float *found, Text *html) {
     const FitView *view = &fit->views[index];
-    float exposure = rey_report_exposure(fit->ctx, view->target, (int64_t)view->width * view->height), scale = 0;
-    rey_text_add(html, view->width < SMALL_PICTURE ? "<section class=\"small\">" : "<section>");
-    rey_text_add(html, "<h3>View %d <span class=\"note\">sensor %d, %d &times; %d", index, view->sensor,
+    rey_text_add(html, "<div class=\"strip\">");
+    rey_result result = strip_end(view, start, exposure, "start", html);
+    for (int i = 1; i < fit->state.iteration && !result; i++) {
+        unsigned char *png = NULL;
+        size_t size = 0;
+        if (rey_frame_due(fit, i)) {
+            result = rey_frame_read(fit, index, i, &png, &size);
+        }
+        if (png) {
+            char caption[32];
+            snprintf(caption, sizeof caption, "%d", i);
+            strip_figure(html, 160, 160 * view->height / view->width, png, size, caption);
+        }
+        rey_free(fit->ctx, png);
+    }
+    if (!result) {
+        result = strip_end(view, found, exposure, "result", html);
+    }
+    rey_text_add(html, "</div>\n<p class=\"note\">The way: pictures after so many iterations, with the few samples of an "
+                       "iteration.</p>\n");
+    return result;
+}
+
+static rey_result view_section(Fit *fit, int index, const float *start, const float *found, Text *html) {
+    const FitView *view = &fit->views[index];
+    float exposure = rey_report_exposure(fit->ctx, view->target, (int64_t)view->width * view->height);
+    char caption[80];
+    rey_text_add(html, "<section><h3>View %d <span class=\"note\">sensor %d, %d &times; %d", index, view->sensor,
                  view->width, view->height);
     if (exposure < 1 || exposure > 1) {
         rey_text_add(html, ", shown at exposure &times;%.3g", (double)exposure);
     }
     rey_text_add(html, "</span></h3>\n");
     comparison(html, index);
-    rey_text_add(html, "<div class=\"four\"><figure>");
-    rey_result result = rey_report_image(html, "target", view->target, view->width, view->height, exposure);
-    rey_text_add(html, "<figcaption>target</figcaption></figure><figure>");
+    rey_text_add(html, "<div class=\"four\">");
+    rey_result result =
+        rey_report_figure(html, "target", view->target, view->width, view->height, exposure, "target");
     if (!result) {
-        result = rey_report_image(html, "start", start, view->width, view->height, exposure);
+        snprintf(caption, sizeof caption, "start, error %.3g&thinsp;%%", 100 * relative_error(view, start));
+        result = rey_report_figure(html, "start", start, view->width, view->height, exposure, caption);
     }
-    rey_text_add(html, "<figcaption>start, relative error %.3g %%</figcaption></figure><figure>",
-                 100 * relative_error(view, start));
     if (!result) {
-        result = rey_report_image(html, "result", result_image, view->width, view->height, exposure);
+        snprintf(caption, sizeof caption, "result, error %.3g&thinsp;%%", 100 * relative_error(view, found));
+        result = rey_report_figure(html, "result", found, view->width, view->height, exposure, caption);
     }
-    rey_text_add(html, "<figcaption>result, relative error %.3g %%</figcaption></figure><figure>",
-                 100 * relative_error(view, result_image));
     if (!result) {
-        result = difference_image(html, view, result_image, &scale);
+        result = rey_report_difference(html, "result &minus; target", found, view->target, view->mask, view->width,
+                                       view->height);
     }
-    rey_text_add(html, "<figcaption>result &minus; target, mean of the channels<span class=\"bar\">&minus;%.2g<i></i>+%.2g"
-                       "</span></figcaption></figure></div></section>\n",
-                 (double)scale, (double)scale);
+    rey_text_add(html, "</div>\n");
+    if (!result) {
+        result = strip(fit, index, exposure, start, found, html);
+    }
+    rey_text_add(html, "</section>\n");
     return result;
 }
 
@@ -193,6 +148,11 @@ rey_result rey_report_views(Fit *fit, Text *html) {
         result = view_section(fit, v, start + at, found + at, html);
         at += (int64_t)fit->views[v].width * fit->views[v].height * 3;
     }
+    rey_text_add(html,
+                 "<p class=\"note\">Error of a picture: root of the sum of (I &minus; R)&sup2; over that of R&sup2;, R "
+                 "the target, I rendered with %d samples per pixel, whose noise it contains. Differences are means of "
+                 "the channels; their scale ends at the 99.5th percentile.</p>\n",
+                 fit->job.report_spp);
     rey_free(fit->ctx, start);
     rey_free(fit->ctx, found);
     return result;

@@ -1,0 +1,135 @@
+// job_fields.c: values and maps of a job file, and what is wrong with them.
+#include "fit/job_fields.h"
+
+#include "io/number.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) {
+    char message[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    if (node->line == 0) {
+        return rey_fail(job->ctx, REY_ERROR_FORMAT, "--set: %s", message);
+    }
+    return rey_fail(job->ctx, REY_ERROR_FORMAT, "%s:%d: %s", job->path, node->line, message);
+}
+
+bool rey_job_is_real(const YamlNode *node, double *value) {
+    const char *end;
+    return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
+}
+
+rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double high, double *out) {
+    double value;
+    if (!rey_job_is_real(node, &value)) {
+        return rey_job_fail(job, node, "%s%sexpected a number", node->key ? node->key : "", node->key ? ": " : "");
+    }
+    if (value < low || value > high) {
+        return rey_job_fail(job, node, "%s = %g, expected %g to %g", node->key ? node->key : "value", value, low, high);
+    }
+    *out = value;
+    return REY_OK;
+}
+
+static const char *word_at(void *user, int i) {
+    const char *const *names = user;
+    return names[i];
+}
+
+static rey_result read_choice(Job *job, const YamlNode *node, const char *const *names, int *out) {
+    const char *text = node->kind == YAML_SCALAR && node->text ? node->text : "";
+    char all[256] = "";
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(text, names[i])) {
+            *out = i;
+            return REY_OK;
+        }
+        size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", names[i]);
+    }
+    const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
+    return nearest ? rey_job_fail(job, node, "unknown value '%s', did you mean '%s'?", text, nearest)
+                   : rey_job_fail(job, node, "unknown value '%s', expected one of %s", text, all);
+}
+
+rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out) {
+    if (node->kind != YAML_SCALAR || !node->text || !node->text[0]) {
+        return rey_job_fail(job, node, "%s: expected a text", node->key ? node->key : "entry");
+    }
+    *out = node->text;
+    return REY_OK;
+}
+
+rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node, char *base) {
+    void *target = base + field->offset;
+    double value;
+    rey_result result;
+    switch (field->type) {
+    case FIELD_TEXT:
+        return rey_job_read_text(job, node, target);
+    case FIELD_REAL:
+        return rey_job_read_real(job, node, field->low, field->high, target);
+    case FIELD_INTEGER:
+    case FIELD_SEED:
+        result = rey_job_read_real(job, node, field->low, field->high, &value);
+        if (!result && value != floor(value)) {
+            result = rey_job_fail(job, node, "%s = %g, expected a whole number", field->key, value);
+        }
+        if (!result && field->type == FIELD_SEED) {
+            *(uint32_t *)target = (uint32_t)value;
+        } else if (!result) {
+            *(int *)target = (int)value;
+        }
+        return result;
+    case FIELD_CHOICE:
+        return read_choice(job, node, field->names, target);
+    default:
+        return field->read(job, node, target);
+    }
+}
+
+static const char *key_at(void *user, int i) {
+    const Field *fields = user;
+    return fields[i].key;
+}
+
+rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base) {
+    if (map->kind != YAML_MAP) {
+        return rey_job_fail(job, map, "%s: expected 'key: value' lines", what);
+    }
+    for (const YamlNode *node = map->child; node; node = node->next) {
+        const Field *field = fields;
+        while (field->key && strcmp(field->key, node->key)) {
+            field++;
+        }
+        if (!field->key) {
+            const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
+            return nearest ? rey_job_fail(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
+                           : rey_job_fail(job, node, "unknown key '%s' in %s", node->key, what);
+        }
+        rey_result result = rey_job_read_field(job, field, node, base);
+        if (result) {
+            return result;
+        }
+    }
+    for (const Field *field = fields; field->key; field++) {
+        if (field->required && !rey_yaml_find(map, field->key)) {
+            return rey_job_fail(job, map, "%s: key '%s' is missing", what, field->key);
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_job_open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count) {
+    if (node->kind != YAML_LIST || !node->child) {
+        return rey_job_fail(job, node, "%s: expected a list of at least one entry", node->key ? node->key : "entry");
+    }
+    *count = rey_yaml_count(node);
+    *items = rey_job_alloc(job, (size_t)*count, item_bytes);
+    return *items ? REY_OK : REY_ERROR_MEMORY;
+}

@@ -1,0 +1,34 @@
+// job_fields.h: how a map of a job file is read by a table of its keys.
+#pragma once
+
+#include "fit/job.h"
+
+typedef enum FieldType {
+    FIELD_TEXT,    // const char *
+    FIELD_REAL,    // double in [low, high]
+    FIELD_INTEGER, // int in [low, high]
+    FIELD_SEED,    // uint32_t
+    FIELD_CHOICE,  // int, index into names
+    FIELD_READER   // read(job, node, target)
+} FieldType;
+
+typedef struct Field {
+    const char *key;
+    FieldType type;
+    size_t offset;
+    double low, high;
+    const char *const *names;
+    rey_result (*read)(Job *job, const YamlNode *node, void *target);
+    bool required;
+} Field;
+
+// Records a message that starts with the node's file and line.
+rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
+bool rey_job_is_real(const YamlNode *node, double *value);
+rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double high, double *out);
+rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out);
+rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node, char *base);
+// Reads a map by its table, which ends with a key of null.
+rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base);
+// Memory for the entries of a list of at least one.
+rey_result rey_job_open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count);

@@ -1,0 +1,82 @@
+// report_table.c: truth, start, found and error of every parameter, with its curve.
+#include "fit/report_parts.h"
+#include "io/image.h"
+
+#include <math.h>
+
+enum { SHOWN_ENTRIES = 4 };
+
+// A colour as it looks; bright lights keep their hue.
+static void put_swatch(Text *html, const double rgb[3]) {
+    double most = fmax(1, fmax(rgb[0], fmax(rgb[1], rgb[2])));
+    rey_text_add(html, "<span class=\"sw\" style=\"background:rgb(%.0f,%.0f,%.0f)\"></span>",
+                 (double)(255 * rey_srgb_encode((float)fmax(rgb[0] / most, 0))),
+                 (double)(255 * rey_srgb_encode((float)fmax(rgb[1] / most, 0))),
+                 (double)(255 * rey_srgb_encode((float)fmax(rgb[2] / most, 0))));
+}
+
+// Few entries one by one, of many the mean: of the channels where they are colours.
+static void put_entries(Text *html, const FitRow *row, const float *values) {
+    if (!values) {
+        rey_text_add(html, "&ndash;");
+        return;
+    }
+    bool few = row->count <= SHOWN_ENTRIES, colours = row->count == 3 || (row->dims == 3 && row->shape[2] == 3);
+    int64_t shown = few ? row->count : colours ? 3 : 1;
+    double mean[SHOWN_ENTRIES] = {0};
+    for (int64_t i = 0; i < row->count; i++) {
+        mean[i % shown] += (double)values[i] * (double)shown / (double)row->count;
+    }
+    if (colours) {
+        put_swatch(html, mean);
+    }
+    rey_text_add(html, few ? "" : "mean ");
+    for (int64_t i = 0; i < shown; i++) {
+        rey_text_add(html, i ? " &nbsp;%.4g" : "%.4g", mean[i]);
+    }
+}
+
+static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
+    const float *columns[] = {row->truth, row->start, row->found};
+    rey_text_add(html, "<tr><td><code>");
+    rey_text_html(html, row->name);
+    rey_text_add(html, "</code>");
+    for (int i = 0; i < row->dims && row->count > HISTORY_LARGEST; i++) {
+        rey_text_add(html, i ? " &times; %lld" : "<div class=\"note\">%lld", (long long)row->shape[i]);
+    }
+    rey_text_add(html, row->dims && row->count > HISTORY_LARGEST ? "</div></td>" : "</td>");
+    for (int i = 0; i < COUNT_OF(columns); i++) {
+        rey_text_add(html, "<td>");
+        put_entries(html, row, columns[i]);
+        rey_text_add(html, "</td>");
+    }
+    if (row->truth) {
+        rey_text_add(html, "<td class=\"n\">%.2f&thinsp;%%%s</td><td>", 100 * row->error,
+                     row->weighted ? "<sup>w</sup>" : "");
+    } else {
+        rey_text_add(html, "<td class=\"n\">&ndash;</td><td>");
+    }
+    if (row->count <= HISTORY_LARGEST) {
+        rey_report_sparkline(fit, column, row->count, row->truth, html);
+    }
+    rey_text_add(html, "</td></tr>\n");
+}
+
+void rey_report_table(Fit *fit, const FitResult *out, Text *html) {
+    int column = HISTORY_VALUES;
+    bool weighted = false;
+    rey_text_add(html, "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>truth</th>"
+                       "<th>start</th><th>found</th><th class=\"n\">error</th><th>history</th></tr></thead><tbody>\n");
+    for (size_t i = 0; i < out->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        put_row(fit, row, column, html);
+        column += row->count <= HISTORY_LARGEST ? (int)row->count : 0;
+        weighted = weighted || (row->weighted && row->truth);
+    }
+    rey_text_add(html, "</tbody></table></div>\n<p class=\"note\">Error: the largest relative error of an entry.");
+    if (weighted) {
+        rey_text_add(html, " <sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the "
+                           "pictures depend on it at the truth.");
+    }
+    rey_text_add(html, " Dashed: the truth.</p>\n");
+}
