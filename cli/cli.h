@@ -54,6 +54,7 @@ typedef struct Options {
     int terms;           // REY_TERM_* bits, 0 = all that are needed
     bool reverse;        // --mode reverse
     const char *adjoint; // number or file name
+    bool lenient;        // leave out what cannot be read
     bool resume, overwrite, json;
     bool all;            // check every parameter
     double step;         // of differences along the direction, 0 = found by itself
@@ -135,6 +136,8 @@ int cli_finish_output(void);
 
 // The keys that every rendering command reports: times, paths, rays, memory, threads, lanes.
 void cli_json_stats(Json *json, const Session *session, const rey_stats *stats);
+// "ignored": what a lenient reader left out; nothing when the reader was not lenient.
+void cli_json_ignored(Json *json, const Session *session);
 void cli_add_stats(rey_stats *sum, const rey_stats *part);
 void cli_json_terms(Json *json, const char *key, int terms);
 // Names of the terms in bits, joined by commas, into text.

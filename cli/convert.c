@@ -8,6 +8,7 @@ static void print_json(const Session *s) {
     json_object(&json, NULL);
     json_string(&json, "output", s->options->files[1]);
     json_integer(&json, "parameters", rey_param_count(s->scene));
+    cli_json_ignored(&json, s);
     json_object_end(&json);
     json_end(&json);
 }

@@ -39,6 +39,7 @@ typedef enum OptionId {
     OPTION_SET,
     OPTION_RESUME,
     OPTION_OVERWRITE,
+    OPTION_LENIENT,
     OPTION_JSON,
     OPTION_HELP
 } OptionId;
@@ -73,6 +74,7 @@ static const OptionRow option_rows[] = {
     {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR,
      "worker threads (default: all that are allowed)"},
     {OPTION_LANES, 0, "lanes", "1|8|16", RENDERS | FITS | READS | DOCTOR, "SIMD width (default: the widest)"},
+    {OPTION_LENIENT, 0, "lenient", NULL, RENDERS | READS, "leave out what cannot be read, and list it"},
     {OPTION_JSON, 0, "json", NULL, EVERY, "print one JSON object on standard output"},
     {OPTION_HELP, 'h', "help", NULL, EVERY, "print this text"},
 };
@@ -242,6 +244,9 @@ static void apply_switch(Options *o, OptionId id) {
         break;
     case OPTION_OVERWRITE:
         o->overwrite = true;
+        break;
+    case OPTION_LENIENT:
+        o->lenient = true;
         break;
     case OPTION_JSON:
         o->json = true;

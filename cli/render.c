@@ -12,6 +12,7 @@ static void print_json(const Session *s, const rey_stats *stats) {
     json_integer(&json, "width", s->width);
     json_integer(&json, "height", s->height);
     json_string(&json, "output", s->options->output);
+    cli_json_ignored(&json, s);
     json_object_end(&json);
     json_end(&json);
 }

@@ -125,6 +125,7 @@ static void print_params_json(const Session *s) {
         }
     }
     json_array_end(&json);
+    cli_json_ignored(&json, s);
     json_object_end(&json);
     json_end(&json);
 }
@@ -206,6 +207,7 @@ static void print_info_json(const Session *s) {
         json_string(&json, NULL, rey_scene_note(s->scene, i));
     }
     json_array_end(&json);
+    cli_json_ignored(&json, s);
     json_object_end(&json);
     json_end(&json);
 }

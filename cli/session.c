@@ -165,11 +165,16 @@ static rey_result load_scene(Session *s) {
     if (result) {
         return result;
     }
-    result = rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &s->scene);
+    result = (o->lenient ? rey_scene_load_lenient : rey_scene_load)(s->ctx, o->files[0], o->defines, o->define_count,
+                                                                    &s->scene);
     if (result) {
         return result;
     }
-    return rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height);
+    for (int i = 0; i < rey_scene_ignored_count(s->scene); i++) {
+        cli_note("ignored: %s", rey_scene_ignored(s->scene, i));
+    }
+    bool renders = o->command == COMMAND_RENDER || o->command == COMMAND_GRAD || o->command == COMMAND_CHECK;
+    return renders ? rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height) : REY_OK;
 }
 
 int cli_session_open(const Options *options, const char *label, Session *session) {
@@ -219,6 +224,17 @@ void cli_add_stats(rey_stats *sum, const rey_stats *part) {
     sum->paths += part->paths;
     sum->rays += part->rays;
     sum->nonfinite += part->nonfinite;
+}
+
+void cli_json_ignored(Json *json, const Session *session) {
+    if (!session->options->lenient) {
+        return;
+    }
+    json_array(json, "ignored");
+    for (int i = 0; i < rey_scene_ignored_count(session->scene); i++) {
+        json_string(json, NULL, rey_scene_ignored(session->scene, i));
+    }
+    json_array_end(json);
 }
 
 void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) {

@@ -3,8 +3,8 @@
 #include "io/save.h"
 #include "render/update.h"
 
-rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
-                          rey_scene **out) {
+static rey_result load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
+                       rey_scene **out) {
     rey_result result = rey_begin(ctx, path && out && (!define_count || defines));
     if (out) {
         *out = NULL;
@@ -15,7 +15,7 @@ rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *
     if (define_count < 0) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "define_count is %d, expected at least 0", define_count);
     }
-    result = rey_mitsuba_load(ctx, path, defines, define_count, false, out);
+    result = rey_mitsuba_load(ctx, path, defines, define_count, flags, out);
     if (result == REY_OK) {
         result = rey_scene_update(*out);
     }
@@ -24,6 +24,25 @@ rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *
         *out = NULL;
     }
     return result;
+}
+
+rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                          rey_scene **out) {
+    return load(ctx, path, defines, define_count, 0, out);
+}
+
+rey_result rey_scene_load_lenient(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
+                                  rey_scene **out) {
+    return load(ctx, path, defines, define_count, LOAD_LENIENT, out);
+}
+
+int rey_scene_ignored_count(const rey_scene *scene) {
+    return (int)rey_mitsuba_ignored(scene)->count;
+}
+
+const char *rey_scene_ignored(const rey_scene *scene, int i) {
+    const Array *list = rey_mitsuba_ignored(scene);
+    return i >= 0 && i < (int)list->count ? ARRAY_AT(*list, char *, i) : NULL;
 }
 
 rey_result rey_scene_save(const rey_scene *scene, const char *path) {

@@ -87,6 +87,12 @@ typedef struct rey_define { /* one $name substitution, like -D name=value on the
 /* Loads a Mitsuba 3 XML scene. The caller owns *out; it must be destroyed before the context. */
 REY_API rey_result rey_scene_load(rey_context *ctx, const char *path, const rey_define *defines,
                                   int define_count, rey_scene **out);
+/* The same for what can be loaded: objects and properties that cannot be read are left out instead of failing. */
+REY_API rey_result rey_scene_load_lenient(rey_context *ctx, const char *path, const rey_define *defines,
+                                          int define_count, rey_scene **out);
+REY_API int rey_scene_ignored_count(const rey_scene *scene); /* how many things were left out */
+/* What was left out and why, "FILE:LINE:COLUMN: text"; null when there is no such entry. Lives as long as the scene. */
+REY_API const char *rey_scene_ignored(const rey_scene *scene, int i);
 REY_API void rey_scene_destroy(rey_scene *scene);
 
 /* Writes the scene back with its current parameter values: path is the XML file, data files (.exr, .ply, .obj) go

@@ -120,7 +120,7 @@ static rey_result check_films(Fit *fit, const rey_scene *truth) {
 // The job's defines are those of its scene: the truth need not use them.
 static rey_result load_truth(Fit *fit, rey_scene **out) {
     const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
-    rey_result result = path ? rey_mitsuba_load(fit->ctx, path, fit->job.defines, fit->job.define_count, true, out)
+    rey_result result = path ? rey_mitsuba_load(fit->ctx, path, fit->job.defines, fit->job.define_count, LOAD_SPARE, out)
                              : REY_ERROR_MEMORY;
     return result ? result : rey_scene_update(*out);
 }

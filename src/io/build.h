@@ -38,6 +38,7 @@ typedef struct SceneSource {
     rey_xml_document *document;
     Array textures, shapes; // of TextureSource, ShapeSource
     Array attributes;       // of MeshAttribute
+    Array ignored;          // of char *: what a lenient reader left out, and why
     Array paths;            // of char *, per node of the document: its first parameter path, null = none
 } SceneSource;
 
@@ -46,6 +47,8 @@ typedef struct Builder {
     rey_scene *scene;
     SceneSource *source;
     Array attribute_uses; // of AttributeUse
+    Array named;          // of rey_xml_node *: objects whose path has been noted, in that order
+    bool lenient;         // what cannot be read is left out
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
     int32_t shape_flags;  // of all shapes that are built now
 } Builder;
@@ -64,15 +67,17 @@ enum { MAX_PATH_NAME = 512 };
 void build_join(char out[MAX_PATH_NAME], const char *a, const char *b);
 
 // Remembers an object's parameter path, which starts the names of its parameters.
-rey_result build_name(Builder *b, const rey_xml_node *node, const char *path);
+rey_result build_name(Builder *b, rey_xml_node *node, const char *path);
 
 // First visit of an object: remembers its path and returns true. Later visits: names the object's parameters under
 // the new path as well and returns false. Objects with an id are known under it, too.
 rey_result build_visit(Builder *b, rey_xml_node *node, const char *path, bool *first);
 rey_result build_finish(Builder *b, rey_xml_node *node, const char *path);
 
-// Refuses a plugin: by name where it is one of the format's that does not exist yet, else with the nearest known name.
+// Refuses a plugin: by name and reason where it is one of the format's, else with the nearest known name.
 rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user);
+
+const char *build_medium_word(void *user, int i); // plugins of participating media
 
 // What a texture-valued slot expects.
 typedef struct TextureUse {

@@ -1,5 +1,6 @@
 // build_bsdf.c: scattering functions, driven by the table of their kinds.
 #include "io/build.h"
+#include "io/lenient.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -7,26 +8,6 @@
 static const char *bsdf_word(void *user, int i) {
     UNUSED(user);
     return i < rey_bsdf_kind_count ? rey_bsdf_kinds[i].name : NULL;
-}
-
-// Functions of the format that are left out on purpose.
-static rey_result refuse(Builder *b, const rey_xml_node *node) {
-    static const struct {
-        const char *name, *why;
-    } refused[] = {{"polarizer", "light has no polarisation here"},
-                   {"retarder", "light has no polarisation here"},
-                   {"circular", "light has no polarisation here"},
-                   {"pplastic", "light has no polarisation here; 'roughplastic' is its unpolarised form"},
-                   {"measured_polarized", "light has no polarisation here"},
-                   {"measured", "measured reflectance data is not read; 'principled' can be fitted to it"},
-                   {"hair", "there is no scattering of hair; 'roughdielectric' is the nearest kind"}};
-    for (int i = 0; i < COUNT_OF(refused); i++) {
-        if (strcmp(node->type, refused[i].name) == 0) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "bsdf '%s' is not supported: %s", node->type,
-                                refused[i].why);
-        }
-    }
-    return build_unknown(b, node, bsdf_word, NULL);
 }
 
 static TextureUse slot_use(const ParamDesc *p) {
@@ -309,7 +290,7 @@ rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t 
     }
     int index = rey_bsdf_kind_find(node->type);
     if (index < 0) {
-        return refuse(b, node);
+        return build_unknown(b, node, bsdf_word, NULL);
     }
     const BsdfKind *kind = &rey_bsdf_kinds[index];
     BsdfNode bsdf = empty_bsdf();
@@ -326,6 +307,6 @@ rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t 
     }
     TRY(add_bsdf(b, index, bsdf, out));
     node->built = *out;
-    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }

@@ -1,6 +1,7 @@
 // build_emitter.c: light sources.
 #include "emitter/table.h"
 #include "io/build.h"
+#include "io/lenient.h"
 #include "io/image.h"
 
 #include <string.h>
@@ -300,7 +301,7 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, const EmitterKin
     e->slot[0] = node->built;
     TRY(get_weight(b, node, e));
     if (first) {
-        TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+        TRY(build_check_unused(b, node));
         TRY(build_finish(b, node, path));
     }
     return REY_OK;
@@ -326,7 +327,7 @@ static rey_result build_free(Builder *b, rey_xml_node *node, const EmitterKind *
     }
     TRY(get_weight(b, node, e));
     node->built = id;
-    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }
 

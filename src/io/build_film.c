@@ -1,5 +1,6 @@
 // build_film.c: films and their reconstruction filters.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "sensor/filter.h"
 
 #include <string.h>
@@ -60,7 +61,7 @@ static rey_result build_filter(Builder *b, rey_xml_node *node, SensorRecord *s) 
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the filter's radius is %g pixels, expected up to %d",
                             (double)s->filter_radius, MOST_FILTER_RADIUS);
     }
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }
 
 static rey_result get_size(Builder *b, rey_xml_node *node, const char *name, int64_t low, int64_t high, int64_t otherwise,
@@ -118,5 +119,5 @@ rey_result build_film(Builder *b, rey_xml_node *node, SensorRecord *s) {
     }
     rey_xml_child *filter = node ? rey_xml_child_of(node, REY_XML_BIT(REY_XML_RFILTER), 0) : NULL;
     TRY(build_filter(b, filter ? filter->node : NULL, s));
-    return node ? rey_xml_check_unused(b->ctx, node, NULL, NULL) : REY_OK;
+    return node ? build_check_unused(b, node) : REY_OK;
 }

@@ -1,6 +1,7 @@
 // build_instance.c: shapegroups, which are invisible themselves, and their instances; merge, whose shapes stand in the
 // scene as they are: shading groups bring together what it would.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "shape/affine.h"
 #include "shape/instance.h"
 
@@ -21,7 +22,8 @@ static rey_result build_shapes_of(Builder *b, rey_xml_node *node, const char *pa
         child->used = true;
         snprintf(name, sizeof name, "shape_%d", i);
         build_join(full, path, child->node->id ? child->node->id : name);
-        TRY(build_shape(b, child->node, full));
+        Snapshot s = build_snapshot(b);
+        TRY(build_forgive(b, &s, child, "", build_shape(b, child->node, full), NULL));
     }
     return REY_OK;
 }
@@ -33,15 +35,16 @@ rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path) {
     if (b->collection >= 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shapegroup cannot stand inside a shapegroup");
     }
+    TRY(build_name(b, node, path));
     b->collection = node->built = b->scene->view.collections++;
     TRY(build_shapes_of(b, node, path));
     b->collection = -1;
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }
 
 rey_result build_merge(Builder *b, rey_xml_node *node, const char *path) {
     TRY(build_shapes_of(b, node, path));
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }
 
 // The group that an instance shows; it may be declared later in the file.
@@ -84,5 +87,5 @@ rey_result build_instance(Builder *b, rey_xml_node *node, const char *path) {
     TRY(build_pose(b, m, path, p, &instance.to_world));
     ARRAY_AT(scene->build.instances, InstanceRecord, id) = instance;
     node->built = id;
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }

@@ -1,5 +1,6 @@
 // build_integrator.c: integrators.
 #include "io/build.h"
+#include "io/lenient.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -62,7 +63,7 @@ static rey_result get_ignored(Builder *b, rey_xml_node *node) {
     TRY(rey_xml_get_float(b->ctx, node, "timeout", 0, &timeout));
     TRY(rey_xml_get_int(b->ctx, node, "block_size", 0, INT32_MAX, 0, &count));
     TRY(rey_xml_get_int(b->ctx, node, "samples_per_pass", 0, INT32_MAX, 0, &count));
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }
 
 // ---- channels --------------------------------------------------------------------------------------------------------

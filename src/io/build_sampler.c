@@ -1,6 +1,7 @@
 // build_sampler.c: samplers. There are two ways to place samples: independent random points, and scrambled Sobol points,
 // which are stratified in every power of two of samples. All other samplers of the format stand for the latter.
 #include "io/build.h"
+#include "io/lenient.h"
 
 #include <string.h>
 
@@ -48,5 +49,5 @@ rey_result build_sampler(Builder *b, rey_xml_node *node, SensorRecord *s) {
                                "stratified for any sample count, and uses %d as it stands",
                                node->at.file, node->at.line, node->type, s->spp));
     }
-    return rey_xml_check_unused(b->ctx, node, NULL, NULL);
+    return build_check_unused(b, node);
 }

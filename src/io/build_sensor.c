@@ -1,5 +1,6 @@
 // build_sensor.c: cameras.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "io/number.h"
 #include "sensor/kinds.h"
 
@@ -254,14 +255,15 @@ static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, co
     }
     rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
     if (medium) {
-        return rey_xml_fail(b->ctx, medium->at, REY_ERROR_UNSUPPORTED, "participating media are not supported yet");
+        Snapshot before = build_snapshot(b);
+        TRY(build_forgive(b, &before, medium, "", build_unknown(b, medium->node, build_medium_word, NULL), NULL));
     }
     rey_xml_child *film = rey_xml_child_of(node, REY_XML_BIT(REY_XML_FILM), 0);
     rey_xml_child *sampler = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SAMPLER), 0);
     TRY(build_film(b, film ? film->node : NULL, s));
     TRY(build_sampler(b, sampler ? sampler->node : NULL, s));
     TRY(s->kind == SENSOR_BATCH ? build_batch(b, node, path, s) : build_single(b, node, path, s));
-    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }
 

@@ -1,5 +1,6 @@
 // build_shape.c: shapes, and the shading groups that they fall into.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "io/build_attribute.h"
 #include "shape/shape.h"
 #include "shape/update.h"
@@ -314,15 +315,21 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
     }
     rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
     if (medium) {
-        return rey_xml_fail(b->ctx, medium->at, REY_ERROR_UNSUPPORTED, "participating media are not supported yet");
+        Snapshot s = build_snapshot(b);
+        TRY(build_forgive(b, &s, medium, "", build_unknown(b, medium->node, build_medium_word, NULL), NULL));
     }
     rey_xml_child *bsdf = rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0);
     rey_xml_child *emitter = rey_xml_child_of(node, REY_XML_BIT(REY_XML_EMITTER), 0);
     rey_xml_child *sensor = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SENSOR), 0);
     build_join(name, path, "bsdf");
     if (bsdf) {
-        TRY(build_bsdf(b, bsdf->node, name, &shape->bsdf));
-    } else {
+        Snapshot s = build_snapshot(b);
+        bool left_out;
+        TRY(build_forgive(b, &s, bsdf, " (a diffuse bsdf takes its place)",
+                          build_bsdf(b, bsdf->node, name, &shape->bsdf), &left_out));
+        bsdf = left_out ? NULL : bsdf;
+    }
+    if (!bsdf) {
         TRY(build_default_bsdf(b, node, emitter ? 0 : 0.5, name, &shape->bsdf));
     }
     if (emitter && b->collection >= 0) {
@@ -330,7 +337,10 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
     }
     if (emitter) {
         build_join(name, path, "emitter");
-        TRY(build_emitter(b, emitter->node, id, name, &shape->emitter));
+        Snapshot s = build_snapshot(b);
+        bool left_out;
+        TRY(build_forgive(b, &s, emitter, "", build_emitter(b, emitter->node, id, name, &shape->emitter), &left_out));
+        emitter = left_out ? NULL : emitter;
     }
     if (shape->kind == SHAPE_MESH && (emitter || sensor || (shape->flags & SHAPE_UNSEEN))) {
         shape->area_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), shape->triangle_count);
@@ -382,7 +392,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     }
     *source = (ShapeSource){node, id};
     node->built = id;
-    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }
 

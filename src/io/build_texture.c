@@ -1,5 +1,6 @@
 // build_texture.c: textures and constants of the scene, with their parameters.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "io/image.h"
 
 #include <string.h>
@@ -227,7 +228,7 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
     }
     node->built = *out;
     add_terms(b, *out, &use);
-    TRY(rey_xml_check_unused(b->ctx, node, NULL, NULL));
+    TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }
 
@@ -239,7 +240,13 @@ rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureU
             return rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "'%s' must be a texture, not a %s", name,
                                 rey_xml_tag_name(child->node->tag));
         }
-        return build_texture(b, child->node, use, path, out);
+        Snapshot s = build_snapshot(b);
+        bool left_out;
+        TRY(build_forgive(b, &s, child, " (the default takes its place)",
+                          build_texture(b, child->node, use, path, out), &left_out));
+        if (!left_out) {
+            return REY_OK;
+        }
     }
     rey_xml_property *p = rey_xml_find(node, name);
     bool number = p && (p->kind == REY_XML_FLOAT_VALUE || p->kind == REY_XML_INTEGER_VALUE);

@@ -1,5 +1,6 @@
 // mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
 #include "io/build.h"
+#include "io/lenient.h"
 #include "io/mitsuba.h"
 
 #include <stdio.h>
@@ -34,9 +35,14 @@ static rey_result alias_prefix(Builder *b, const char *from, const char *to) {
     return REY_OK;
 }
 
-rey_result build_name(Builder *b, const rey_xml_node *node, const char *path) {
+rey_result build_name(Builder *b, rey_xml_node *node, const char *path) {
     char **kept = &ARRAY_AT(b->source->paths, char *, node->index);
-    if (!*kept) {
+    if (*kept) {
+        return REY_OK;
+    }
+    rey_xml_node **named = rey_array_push(b->ctx, &b->named, sizeof *named, 1);
+    if (named) {
+        *named = node;
         *kept = rey_strdup(b->ctx, path);
     }
     return *kept ? REY_OK : REY_ERROR_MEMORY;
@@ -71,33 +77,6 @@ rey_result build_pose(Builder *b, const double matrix[16], const char *path, Par
     p.description = "pose: local to world, row-major";
     build_join(name, path, "to_world");
     return rey_scene_add_param(b->scene, name, p) < 0 ? REY_ERROR_MEMORY : REY_OK;
-}
-
-// Plugins of the format that are known and do not exist here yet.
-static bool is_known_plugin(const char *type) {
-    static const char *const known[] = {
-        "thindielectric", "blendbsdf", "bumpmap", "normalmap", "polarizer", "retarder",
-        "circular", "pplastic", "measured_polarized", "hair", "measured", "roughconductor", "roughdielectric",
-        "dielectric", "conductor", "plastic", "roughplastic",
-        "sunsky", "timed_sunsky",
-        "ellipsoids", "ellipsoidsmesh", "orthographic", "thinlens", "radiancemeter", "irradiancemeter", "distant",
-        "batch", "volume",
-        "prbvolpath", "prb_basic", "direct_projective", "prb_projective", "stokes", "homogeneous",
-        "heterogeneous", "gridvolume", "constvolume"};
-    for (int i = 0; i < COUNT_OF(known); i++) {
-        if (strcmp(known[i], type) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
-rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user) {
-    const char *tag = rey_xml_tag_name(node->tag);
-    if (is_known_plugin(node->type)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "%s '%s' is not supported yet", tag, node->type);
-    }
-    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%s'", tag, node->type);
 }
 
 // Stable name of a top-level object: its id, or its class with a running number.
@@ -138,11 +117,23 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     case REY_XML_MEDIUM:
     case REY_XML_VOLUME:
     case REY_XML_PHASE:
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "participating media are not supported yet");
+        return build_unknown(b, node, build_medium_word, NULL);
     default:
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a %s cannot stand at the top level of a scene",
                             rey_xml_tag_name(node->tag));
     }
+}
+
+// A scene whose integrator could not be read is rendered by the usual one.
+static rey_result build_default_integrator(Builder *b, const rey_xml_node *root) {
+    bool ignored = false;
+    for (int i = 0; i < root->child_count; i++) {
+        ignored = ignored || (root->children[i].ignored && root->children[i].node->tag == REY_XML_INTEGRATOR);
+    }
+    if (ignored && !b->scene->integrator) {
+        b->scene->integrator = rey_strdup(b->ctx, "path");
+    }
+    return ignored && !b->scene->integrator ? REY_ERROR_MEMORY : REY_OK;
 }
 
 static rey_result build_scene(Builder *b) {
@@ -153,9 +144,12 @@ static rey_result build_scene(Builder *b) {
                             rey_xml_tag_name(root->tag));
     }
     for (int i = 0; i < root->child_count; i++) {
-        TRY(build_child(b, &root->children[i], counts));
+        Snapshot s = build_snapshot(b);
+        rey_xml_child *child = &root->children[i];
+        TRY(build_forgive(b, &s, child, "", build_child(b, child, counts), NULL));
     }
-    TRY(rey_xml_check_unused(b->ctx, root, NULL, NULL));
+    TRY(build_default_integrator(b, root));
+    TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
@@ -173,12 +167,16 @@ static void source_free(void *document) {
         rey_free(source->ctx, ARRAY_AT(source->paths, char *, i));
     }
     rey_array_free(source->ctx, &source->paths);
+    for (size_t i = 0; i < source->ignored.count; i++) {
+        rey_free(source->ctx, ARRAY_AT(source->ignored, char *, i));
+    }
+    rey_array_free(source->ctx, &source->ignored);
     rey_free(source->ctx, source);
 }
 
-rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, bool spare,
+rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                             rey_scene **out) {
-    Builder b = {.ctx = ctx, .collection = -1};
+    Builder b = {.ctx = ctx, .collection = -1, .lenient = (flags & LOAD_LENIENT) != 0};
     *out = NULL;
     TRY(rey_scene_new(ctx, &b.scene));
     b.source = rey_alloc(ctx, sizeof *b.source);
@@ -187,7 +185,7 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         b.source->ctx = ctx;
         b.scene->document = b.source;
         b.scene->document_free = source_free;
-        result = (spare ? rey_xml_read_spare : rey_xml_read)(ctx, path, defines, define_count, &b.source->document);
+        result = (flags ? rey_xml_read_spare : rey_xml_read)(ctx, path, defines, define_count, &b.source->document);
     }
     if (result == REY_OK) {
         size_t nodes = (size_t)rey_xml_node_count(b.source->document);
@@ -197,10 +195,16 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         result = build_scene(&b);
     }
     rey_array_free(ctx, &b.attribute_uses);
+    rey_array_free(ctx, &b.named);
     if (result != REY_OK) {
         rey_scene_destroy(b.scene);
         return result;
     }
     *out = b.scene;
     return REY_OK;
+}
+
+const Array *rey_mitsuba_ignored(const rey_scene *scene) {
+    const SceneSource *source = scene->document;
+    return &source->ignored;
 }

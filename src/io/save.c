@@ -10,13 +10,28 @@
 
 static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, const char *slot);
 
+// Marks the objects that stand in the file where they were declared: not those inside of what was left out.
+static void mark_declared(Writer *w, const rey_xml_node *node) {
+    for (int i = 0; i < node->child_count; i++) {
+        const rey_xml_child *c = &node->children[i];
+        if (!c->ref && !c->ignored) {
+            w->declared[c->node->index] = 1;
+            mark_declared(w, c->node);
+        }
+    }
+}
+
 static rey_result write_children(Writer *w, int depth, const rey_xml_node *node) {
     for (int i = 0; i < node->child_count; i++) {
         const rey_xml_child *c = &node->children[i];
-        if (c->node->ignored || c->ignored) {
+        if (c->ignored) {
             continue;
         }
-        if (c->ref) {
+        if (c->ref && !w->declared[c->node->index]) {
+            w->declared[c->node->index] = 1;
+            mark_declared(w, c->node);
+            TRY(write_node(w, depth, c->node, c->name));
+        } else if (c->ref) {
             rey_save_tag(w, depth, "ref", c->node->id ? c->node->id : c->ref, "name", c->name);
         } else {
             TRY(write_node(w, depth, c->node, c->name));
@@ -80,7 +95,7 @@ static void write_aliases(Writer *w) {
     const XmlIds *ids = &w->source->document->ids;
     for (size_t i = 0; i < ids->capacity; i++) {
         const XmlId *id = &ids->slots[i];
-        if (id->id && id->node->id && strcmp(id->id, id->node->id) != 0 && !id->node->ignored) {
+        if (id->id && id->node->id && strcmp(id->id, id->node->id) != 0 && w->declared[id->node->index]) {
             rey_save_tag(w, 1, "alias", id->node->id, "as", id->id);
         }
     }
@@ -88,6 +103,9 @@ static void write_aliases(Writer *w) {
 
 static rey_result write_all(Writer *w, const char *path) {
     TRY(rey_save_find_edits(w));
+    w->declared = rey_alloc(w->ctx, (size_t)rey_xml_node_count(w->source->document) + 1);
+    TRY(w->declared ? REY_OK : REY_ERROR_MEMORY);
+    mark_declared(w, rey_xml_root(w->source->document));
     TRY(rey_save_list_files(w));
     TRY(rey_save_copy_files(w));
     rey_save_line(w, 0, "<scene version=\"3.0.0\">");
@@ -107,6 +125,7 @@ rey_result rey_mitsuba_save(const rey_scene *scene, const char *path) {
     rey_result result = write_all(&w, path);
     rey_save_free_files(&w);
     rey_array_free(w.ctx, &w.edits);
+    rey_free(w.ctx, w.declared);
     rey_free(w.ctx, w.first_edit);
     rey_array_free(w.ctx, &w.text);
     return result;

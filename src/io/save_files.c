@@ -52,7 +52,7 @@ static const rey_xml_property *file_property(const rey_xml_node *node) {
 }
 
 static rey_result find_source(const Writer *w, const rey_xml_node *node, char **path) {
-    const rey_xml_property *p = node->ignored ? NULL : file_property(node);
+    const rey_xml_property *p = file_property(node);
     *path = NULL;
     return p && !rey_save_replaces(w, node, "filename")
                ? rey_xml_search(w->ctx, w->source->document, NULL, p->string, path)

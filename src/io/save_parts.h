@@ -40,6 +40,7 @@ typedef struct Writer {
     int32_t *first_edit;     // per node: entry of `edits`, -1 = none
     int number;              // running number of the files that are written anew
     bool folder_made;
+    uint8_t *declared;       // per node: the file holds it where it was declared, or where it was first referred to
     bool failed;             // out of memory while writing text
 } Writer;
 

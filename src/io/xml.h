@@ -95,7 +95,6 @@ typedef struct rey_xml_node {
     int child_count;
     rey_xml_asked *asked; // kept by the getters
     int index;  // position in the document's list of nodes
-    bool ignored; // left out by a lenient reader
     int built;  // free for the builder: -1 at first. Nodes are shared: build each once.
     int height; // longest chain of children below, references included; at most REY_XML_DEEPEST
 } rey_xml_node;
@@ -182,6 +181,9 @@ int rey_xml_count_children(const rey_xml_node *node, unsigned tags); // marks no
 // those that the getters were asked for.
 rey_result rey_xml_check_unused(rey_context *ctx, const rey_xml_node *node, const char *(*known)(void *user, int i),
                                 void *user);
+
+// Marks that property or child as left out.
+void rey_xml_ignore_unused(rey_xml_node *node);
 
 // ---- files -------------------------------------------------------------------------------------------------------
 

@@ -265,20 +265,43 @@ static rey_result fail_child(rey_context *ctx, const rey_xml_node *node, const r
                         rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag), child->node->type);
 }
 
+// The first property or child that nobody took; both null when there is none.
+static void find_unused(const rey_xml_node *node, rey_xml_property **property, rey_xml_child **child) {
+    *property = NULL;
+    *child = NULL;
+    for (int i = 0; i < node->property_count && !*property; i++) {
+        *property = node->properties[i].used ? NULL : &node->properties[i];
+    }
+    for (int i = 0; i < node->child_count && !*child; i++) {
+        *child = node->children[i].used ? NULL : &node->children[i];
+    }
+    if (*property && *child) {
+        bool first = (*property)->order < (*child)->order;
+        *property = first ? *property : NULL;
+        *child = first ? NULL : *child;
+    }
+}
+
 rey_result rey_xml_check_unused(rey_context *ctx, const rey_xml_node *node, const char *(*known)(void *user, int i),
                                 void *user) {
-    const rey_xml_property *property = NULL;
-    const rey_xml_child *child = NULL;
+    rey_xml_property *property;
+    rey_xml_child *child;
     user = known ? user : node->asked;
     known = known ? known : asked_name;
-    for (int i = 0; i < node->property_count && !property; i++) {
-        property = node->properties[i].used ? NULL : &node->properties[i];
-    }
-    for (int i = 0; i < node->child_count && !child; i++) {
-        child = node->children[i].used ? NULL : &node->children[i];
-    }
-    if (property && (!child || property->order < child->order)) {
+    find_unused(node, &property, &child);
+    if (property) {
         return fail_property(ctx, node, property, known, user);
     }
     return child ? fail_child(ctx, node, child, known, user) : REY_OK;
+}
+
+void rey_xml_ignore_unused(rey_xml_node *node) {
+    rey_xml_property *property;
+    rey_xml_child *child;
+    find_unused(node, &property, &child);
+    if (property) {
+        property->used = property->ignored = true;
+    } else if (child) {
+        child->used = child->ignored = true;
+    }
 }

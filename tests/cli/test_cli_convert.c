@@ -21,10 +21,56 @@ static void failures_of_convert(void **state) {
     assert_non_null(strstr(f->words, "no/such/folder.xml"));
 }
 
+static const char *const broken_scene =
+    "<scene version='3.0.0'><integrator type='stokes'/><sensor type='perspective'><film type='hdrfilm'>"
+    "<integer name='width' value='8'/><integer name='height' value='8'/></film><float name='zoom' value='2'/></sensor>"
+    "<medium type='homogeneous' id='fog'/><emitter type='sunsky'/><emitter type='constant'/>"
+    "<shape type='sphere'><bsdf type='twosided'><bsdf type='hair' id='fur'/></bsdf>"
+    "<ref name='interior' id='fog'/></shape>"
+    "<shape type='cube'><bsdf type='diffuse' id='wood'><texture type='bitmap' name='reflectance'>"
+    "<string name='filename' value='none.png'/></texture></bsdf></shape>"
+    "<shape type='ellipsoids'><bsdf type='diffuse' id='kept'><rgb name='reflectance' value='0.1 0.2 0.3'/></bsdf></shape>"
+    "<shape type='rectangle'><ref id='kept'/></shape><shape type='obj'><string name='filename' value='no.obj'/></shape>"
+    "</scene>";
+
+static void lenient_reading_lists_what_it_leaves_out(void **state) {
+    static const char *const words[] = {"stokes",   "zoom", "homogeneous", "sunsky", "hair",
+                                        "interior", "none.png", "ellipsoids",  "no.obj"};
+    static const char *const commands[] = {"params broken.xml --lenient --json", "info broken.xml --lenient --json",
+                                           "render broken.xml --spp 2 -o a.npy --lenient --json",
+                                           "convert broken.xml mended.xml --lenient --json"};
+    Fixture *f = *state;
+    FILE *file = fopen("broken.xml", "w");
+    assert_non_null(file);
+    fputs(broken_scene, file);
+    fclose(file);
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        JsonNode *node = run_json(f, 0, commands[i]);
+        int count = 0;
+        for (const JsonNode *n = json_get(node, "ignored")->first; n; n = n->next) {
+            count++;
+        }
+        assert_int_equal(count, sizeof words / sizeof words[0]);
+        json_free(node);
+        for (size_t k = 0; k < sizeof words / sizeof words[0]; k++) {
+            if (!strstr(f->words, words[k])) {
+                fail_msg("'%s' is not named in %s", words[k], f->words);
+            }
+        }
+    }
+    expect(f, 1, "info broken.xml");
+    assert_non_null(strstr(f->words, "stokes"));
+    expect(f, 0, "render mended.xml --spp 2 -o b.npy");
+    assert_int_equal(system("cmp -s a.npy b.npy"), 0);
+    expect(f, 0, "params mended.xml");
+    assert_non_null(strstr(f->out, "kept.reflectance.value"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(converted_scenes_render_the_same_bits),
         cmocka_unit_test(failures_of_convert),
+        cmocka_unit_test(lenient_reading_lists_what_it_leaves_out),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -1,0 +1,22 @@
+// lenient.h: reading what can be read of a scene: where a part fails, everything that it began is taken back, the part
+// is left out, and the scene remembers what and why.
+#pragma once
+
+#include "io/build.h"
+
+// How far the scene had grown.
+typedef struct Snapshot {
+#define ARRAY(type, name, comment) size_t name;
+#include "scene/arrays.inl"
+#undef ARRAY
+    size_t params, aliases, source_textures, source_shapes, source_attributes, attribute_uses, named;
+    int32_t collection, collections;
+} Snapshot;
+
+Snapshot build_snapshot(const Builder *b);
+// The result of building a child: when it failed and the reader is lenient, takes back what was built since the
+// snapshot, marks the child as left out and returns REY_OK; else returns the result. *left_out may be null.
+rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, const char *instead, rey_result result,
+                         bool *left_out);
+// An error that names what nobody took; a lenient reader leaves all of that out.
+rey_result build_check_unused(Builder *b, rey_xml_node *node);
