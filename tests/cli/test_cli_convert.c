@@ -35,7 +35,7 @@ static const char *const broken_scene =
 
 static void lenient_reading_lists_what_it_leaves_out(void **state) {
     static const char *const words[] = {"stokes",   "zoom", "homogeneous", "sunsky", "hair",
-                                        "interior", "none.png", "ellipsoids",  "no.obj"};
+                                        "212: medium", "none.png", "ellipsoids",  "no.obj"};
     static const char *const commands[] = {"params broken.xml --lenient --json", "info broken.xml --lenient --json",
                                            "render broken.xml --spp 2 -o a.npy --lenient --json",
                                            "convert broken.xml mended.xml --lenient --json"};
