@@ -37,11 +37,11 @@ rey_result rey_scene_load_lenient(rey_context *ctx, const char *path, const rey_
 }
 
 int rey_scene_ignored_count(const rey_scene *scene) {
-    return (int)rey_mitsuba_ignored(scene)->count;
+    return scene ? (int)rey_mitsuba_ignored(scene)->count : 0;
 }
 
 const char *rey_scene_ignored(const rey_scene *scene, int i) {
-    const Array *list = rey_mitsuba_ignored(scene);
+    const Array *list = scene ? rey_mitsuba_ignored(scene) : &(Array){0};
     return i >= 0 && i < (int)list->count ? ARRAY_AT(*list, char *, i) : NULL;
 }
 

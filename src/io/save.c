@@ -109,7 +109,13 @@ static rey_result write_all(Writer *w, const char *path) {
     TRY(rey_save_list_files(w));
     TRY(rey_save_copy_files(w));
     rey_save_line(w, 0, "<scene version=\"3.0.0\">");
-    TRY(write_children(w, 1, rey_xml_root(w->source->document)));
+    const rey_xml_node *root = rey_xml_root(w->source->document);
+    for (int i = 0; i < root->child_count; i++) {
+        if (root->children[i].ignored && root->children[i].node->tag == REY_XML_INTEGRATOR) {
+            rey_save_line(w, 1, "<integrator type=\"%s\"/>", w->scene->integrator); // what took its place
+        }
+    }
+    TRY(write_children(w, 1, root));
     write_aliases(w);
     rey_save_line(w, 0, "</scene>");
     return w->failed ? REY_ERROR_MEMORY : rey_file_write(w->ctx, path, w->text.data, w->text.count);
