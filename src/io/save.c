@@ -110,10 +110,12 @@ static rey_result write_all(Writer *w, const char *path) {
     TRY(rey_save_copy_files(w));
     rey_save_line(w, 0, "<scene version=\"3.0.0\">");
     const rey_xml_node *root = rey_xml_root(w->source->document);
+    bool read = w->scene->integrator == NULL;
     for (int i = 0; i < root->child_count; i++) {
-        if (root->children[i].ignored && root->children[i].node->tag == REY_XML_INTEGRATOR) {
-            rey_save_line(w, 1, "<integrator type=\"%s\"/>", w->scene->integrator); // what took its place
-        }
+        read = read || (!root->children[i].ignored && root->children[i].node->tag == REY_XML_INTEGRATOR);
+    }
+    if (!read) { // what took the place of one that was left out
+        rey_save_line(w, 1, "<integrator type=\"%s\"/>", w->scene->integrator);
     }
     TRY(write_children(w, 1, root));
     write_aliases(w);
