@@ -40,7 +40,6 @@ static const struct {
                {"blackbody", missing},
                {"regular", missing},
                {"irregular", missing},
-               {"ptracer", missing},
                {"prb_basic", missing},
                {"direct_projective", missing},
                {"prb_projective", missing}};
