@@ -7,10 +7,10 @@
 enum { CHECK_POINTS = 4, CHECK_HALVINGS = 6 };
 
 // difference = sum of weights * picture(theta + offset * direction); rough: the same of lower order, whose distance from
-// the difference says how much the step matters.
+// the difference says how much the step matters; plain: the simplest quotient over the whole step.
 typedef struct Step {
     double h;
-    double offsets[CHECK_POINTS], weights[CHECK_POINTS], rough[CHECK_POINTS];
+    double offsets[CHECK_POINTS], weights[CHECK_POINTS], rough[CHECK_POINTS], plain[CHECK_POINTS];
 } Step;
 
 typedef enum Verdict {
@@ -26,7 +26,9 @@ typedef struct Check { // one direction
     const char *spec;
     Direction direction;
     Step step;
+    bool replays;         // the difference is taken along the derivative's own paths
     CheckResult result;
+    double fresh_z;       // of that against the plain quotient of fresh paths; 0 where nothing is replayed
     double reverse_error; // |reverse - forward| over the mean of |derivative|
     Verdict verdict;
     char *refusal;        // why there is no complete derivative; owned
@@ -36,6 +38,8 @@ typedef struct Check { // one direction
 #define CHECK_REVERSE_TOLERANCE 1e-4
 // A direction whose noise is a larger part of its signal than this is weak.
 #define CHECK_WEAK 0.1
+// Fresh paths contradict replayed ones beyond this: a mean over few sets of heavy tails is skewed.
+#define CHECK_FRESH_Z 5
 
 const char *check_verdict_name(Verdict verdict);
 void check_print_table(const Check *checks, int count, double threshold);

@@ -24,20 +24,20 @@ static void print_row(const Check *check) {
     }
     char block[32];
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    printf("%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %9.1e  %s\n", check->spec, r->derivative, r->difference,
-           check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->reverse_error,
+    printf("%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative, r->difference,
+           check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->fresh_z, check->reverse_error,
            check_verdict_name(check->verdict));
 }
 
 void check_print_table(const Check *checks, int count, double threshold) {
-    printf("%-36s %13s %13s %9s %9s %8s %7s %6s %9s  %s\n", "direction", "derivative", "difference", "step", "error/rms",
-           "worst z", "block", "sum z", "reverse", "verdict");
+    printf("%-36s %13s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "difference", "step", "error/rms",
+           "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
     for (int i = 0; i < count; i++) {
         print_row(&checks[i]);
     }
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
-    printf("%s: |z| of every block and channel up to %.2f, |sum z| / sqrt(n) below 3, reverse = forward to %g\n",
-           wrong ? "FAILED" : "passed", threshold, CHECK_REVERSE_TOLERANCE);
+    printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3, fresh z up to %d, reverse = forward to %g\n",
+           wrong ? "FAILED" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
     if (weak) {
         printf("%d of %d are weak: noise is more than %g %% of the signal, so that they say little; raise --spp\n", weak,
                count, 100 * CHECK_WEAK);
@@ -71,6 +71,8 @@ void check_print_json(const Session *session, const rey_stats *stats, const Chec
         json_integer(&json, NULL, r->worst_channel);
         json_array_end(&json);
         json_number(&json, "sum_z", r->sum_z);
+        json_bool(&json, "replayed", checks[i].replays);
+        json_number(&json, "fresh_z", checks[i].fresh_z);
         json_integer(&json, "tests", r->tests);
         json_number(&json, "step", checks[i].step.h);
         json_number(&json, "reverse_error", checks[i].reverse_error);

@@ -11,6 +11,8 @@
 
 // Systematic error that a finite difference may have after extrapolation, relative to the blocks' root mean square.
 static const double relative_floor = 1e-3;
+// Share of the distance between the two orders of difference that the better one may be off by.
+static const double truncated = 0.25;
 // Share of the mean variance over all blocks in the variance of each.
 static const double pooled = 0.25;
 
@@ -94,6 +96,14 @@ static bool step_matters(const double *difference, const double *rough, size_t s
     return apart > apart_forgiven * apart_forgiven * signal && apart > 4 * noise;
 }
 
+static double gap_at(const double *difference, const double *rough, size_t stride, size_t at) {
+    double gap = 0;
+    for (size_t k = 0; k < CHECK_SETS; k++) {
+        gap += (difference[k * stride + at] - rough[k * stride + at]) / CHECK_SETS;
+    }
+    return fabs(gap);
+}
+
 CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, const double *rough,
                           double rounding) {
     size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
@@ -102,25 +112,26 @@ CheckResult check_compare(const Blocks *b, const double *derivative, const doubl
     double signal_squares = squares.signal[0] + squares.signal[1] + squares.signal[2];
     double error_squares = squares.noise[0] + squares.noise[1] + squares.noise[2];
     r.relative_error = signal_squares > 0 ? sqrt(error_squares / signal_squares) : 0;
-    double sum = 0, variance = 0;
-    int blocks = 0;
+    double sum = 0, noise = 0, systematic = 0, variance = 0;
     for (size_t at = 0; at < stride; at++) {
         int series = (int)(at % CHECK_SERIES);
         Sample s = sample_at(derivative, difference, stride, at, rounding);
         if (s.empty) {
             continue;
         }
-        double floor = relative_floor * sqrt(squares.signal[series]) + rounding;
+        double gap = gap_at(difference, rough, stride, at);
+        double floor = relative_floor * sqrt(squares.signal[series]) + rounding + truncated * gap;
         // Sixteen sets may all miss a block's rare bright samples; the other blocks say how likely those are.
         double error2 = (1 - pooled) * s.error * s.error + pooled * squares.noise[series];
-        double t = (s.derivative - s.difference) / sqrt(error2 + floor * floor);
-        double z = normal_from_t(t, CHECK_SETS - 1);
+        double error = sqrt(error2 + floor * floor);
+        double z = normal_from_t((s.derivative - s.difference) / error, CHECK_SETS - 1);
         if (series == 3) {
             r.derivative += s.derivative / (double)count;
             r.difference += s.difference / (double)count;
             variance += s.error * s.error / (double)(count * count);
             sum += z;
-            blocks++;
+            noise += error2 / (error * error);
+            systematic += floor / error;
             continue;
         }
         r.tests++;
@@ -132,9 +143,27 @@ CheckResult check_compare(const Blocks *b, const double *derivative, const doubl
             r.worst_channel = series;
         }
     }
-    r.sum_z = blocks ? sum / sqrt(blocks) : 0;
+    // Noise is independent from block to block; rounding and truncation may have the same sign everywhere.
+    double spread = sqrt(noise + systematic * systematic);
+    r.sum_z = spread > 0 ? sum / spread : sum;
     r.standard_error = sqrt(variance);
     return r;
+}
+
+double check_mean_z(const Blocks *b, const double *rows, double floor) {
+    size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
+    double means[CHECK_SETS] = {0}, mean = 0, squares = 0;
+    for (size_t k = 0; k < CHECK_SETS; k++) {
+        for (size_t i = 0; i < count; i++) {
+            means[k] += rows[k * stride + i * CHECK_SERIES + 3] / (double)count;
+        }
+        mean += means[k] / CHECK_SETS;
+    }
+    for (size_t k = 0; k < CHECK_SETS; k++) {
+        squares += (means[k] - mean) * (means[k] - mean);
+    }
+    double error2 = squares / (CHECK_SETS - 1) / CHECK_SETS + floor * floor;
+    return error2 > 0 ? normal_from_t(mean / sqrt(error2), CHECK_SETS - 1) : 0;
 }
 
 double check_z_threshold(int n) {

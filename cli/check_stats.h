@@ -21,7 +21,7 @@ typedef struct CheckResult {
     double relative_error;         // root mean square standard error of the blocks over that of their derivative
     double worst_z;                // of the block and channel with the largest |z|
     int worst_x, worst_y, worst_channel;
-    double sum_z; // sum of the blocks' z of the mean channel / sqrt(their number)
+    double sum_z; // sum of the blocks' z of the mean channel over its standard deviation
     int tests;    // block and channel tests
     bool step_matters; // the rough difference is away from the other by more than noise, and by more than is forgiven
 } CheckResult;
@@ -30,6 +30,9 @@ typedef struct CheckResult {
 // means, from the same sample sets. rounding: absolute error that float arithmetic leaves in a block's difference.
 CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, const double *rough,
                           double rounding);
+
+// z of the picture's mean of such rows against 0, give or take `floor`.
+double check_mean_z(const Blocks *blocks, const double *rows, double floor);
 
 // |z| that one of n tests passes with a probability of 1 % in all (Sidak's correction).
 double check_z_threshold(int n);

@@ -38,6 +38,11 @@ static void summarize(const double *values, int count, double *mean, double *sta
     *standard_error = sqrt(squares / (count - 1) / count);
 }
 
+// Terms that are missing. A jump that no path met is not needed.
+static int terms_left_out(const Grad *g) {
+    return g->needed & ~g->used & (~REY_TERM_TERMINATOR | g->stats.missing_terms);
+}
+
 static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     const Options *o = g->session.options;
     Json json = json_begin(file);
@@ -49,8 +54,8 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     json_object(&json, "terms");
     json_number(&json, rey_term_name(REY_TERM_INTERIOR), g->value);
     json_object_end(&json);
-    json_bool(&json, "complete", (g->needed & ~g->used) == 0);
-    cli_json_terms(&json, "needed_terms", g->needed);
+    json_bool(&json, "complete", terms_left_out(g) == 0);
+    cli_json_terms(&json, "needed_terms", g->needed & (~REY_TERM_TERMINATOR | g->stats.missing_terms));
     json_array(&json, "parameters");
     for (int i = 0; i < g->direction.count; i++) {
         json_string(&json, NULL, g->direction.names[i]);
@@ -275,9 +280,9 @@ static void print_result(const Grad *g) {
     if (g->png_scale > 0) {
         cli_note("blue -%g, white 0, red %g", (double)g->png_scale, (double)g->png_scale);
     }
-    if ((g->needed & ~g->used) != 0) {
+    if (terms_left_out(g)) {
         char missing[128];
-        cli_terms_text(g->needed & ~g->used, missing, sizeof missing);
+        cli_terms_text(terms_left_out(g), missing, sizeof missing);
         cli_note("incomplete on request: left out %s", missing);
     }
     if (g->session.options->json) {

@@ -33,10 +33,11 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
          "for\n"
          "each parameter, and gradient.json, into the folder -o.\n" DIRECTION_NOTES},
-    [COMMAND_CHECK] = {"check", cli_check, "SCENE --param P [--param P]... [options]",
+    [COMMAND_CHECK] = {"check", cli_check, "SCENE --param P [--param P]... | --all [options]",
                        "compare gradients with correlated finite differences",
-                       "\nEach P is checked by itself, in blocks of the image. Exits with 1 when a gradient is "
-                       "wrong.\n" DIRECTION_NOTES},
+                       "\nEach P is checked by itself, in blocks of the image. Where nothing moves, differences are taken along the\n"
+                       "paths of the derivative, and held against fresh paths (fresh z); elsewhere along fresh paths. Exits with\n"
+                       "1 when a gradient is wrong, with 0 when all are right or too noisy to say (weak).\n" DIRECTION_NOTES},
     [COMMAND_FIT] = {"fit", cli_fit, "JOB.yaml [--set key=value]... [--resume] [-o DIR] [options]",
                      "recover parameters from images", ""},
     [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},

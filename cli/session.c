@@ -224,6 +224,7 @@ void cli_add_stats(rey_stats *sum, const rey_stats *part) {
     sum->paths += part->paths;
     sum->rays += part->rays;
     sum->nonfinite += part->nonfinite;
+    sum->missing_terms |= part->missing_terms;
 }
 
 void cli_json_ignored(Json *json, const Session *session) {

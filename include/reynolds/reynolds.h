@@ -143,7 +143,8 @@ typedef struct rey_param_info {
     int dims;                /* number of entries of shape, 0 to 3 */
     int64_t shape[3];        /* for example height, width, 3 */
     float low, high;         /* allowed range, -INFINITY and INFINITY where open */
-    int terms;               /* bits of the terms that its derivative needs; 0 = not differentiable */
+    int terms;               /* bits of the terms that its derivative may need; 0 = not differentiable. TERMINATOR is
+                                needed only if paths meet the jump, which the derivative then reports */
     const char *why;         /* why the terms beyond interior are needed, or why it is not differentiable; "" else */
 } rey_param_info;
 
@@ -182,6 +183,8 @@ typedef struct rey_stats {
     double thread_seconds; /* thread time of the workers, summed [s] */
     int64_t paths, rays; /* camera paths, and rays of any kind */
     int64_t nonfinite;   /* samples dropped because they were not finite; 0 in a healthy renderer */
+    int missing_terms;   /* derivatives: terms that the parameters may need and the paths showed to be needed, but that
+                            were left out: REY_TERM_TERMINATOR */
 } rey_stats;
 
 /* Renders. image: height x width x 3 floats owned by the caller. stats may be null. */

@@ -1,6 +1,7 @@
 // kernel.c: all kernels of one SIMD width, compiled once per width. Runs one unit of work: the samples of a tile.
 #include "integrator/aov.h"
 #include "integrator/path_adj.h"
+#include "integrator/path_replay.h"
 #include "sensor/filter.h"
 
 enum { MAX_FOOTPRINT = 2 * MOST_FILTER_RADIUS + 2 }; // pixels that a filter may cover along one axis
@@ -175,7 +176,11 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         for (int c = 0; c < SPEC_N; c++) {
             memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
         }
-        path_backward(t);
+        if (t->job->mode == MODE_REPLAY) {
+            path_replay(t);
+        } else {
+            path_backward(t);
+        }
     }
     if (t->job->mode != MODE_REVERSE) {
         film_splat(t, filter, count);
@@ -194,7 +199,7 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     int32_t *begin = (int32_t *)((char *)job->workspace + bytes);
     FilterTable filter;
     filter_tabulate(t.sensor, &filter);
-    t.derivative = job->mode == MODE_REVERSE || job->mode == MODE_FORWARD;
+    t.derivative = mode_records(job->mode);
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     int64_t total = (int64_t)job->width * job->height * job->spp;
     for (int64_t first = 0; first < total && (!job->go_on || job->go_on(job->user)); first += t.ws.chunk) {

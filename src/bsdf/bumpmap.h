@@ -47,6 +47,7 @@ KFN void bumpmap_adj(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 wo, I
                dwo, duv);
     // valid = (+-x, +-y, z) of side normalize(product)
     Vec3 n = v3_scale(v3_normalize(product), side);
+    turned_watch(n, wi, sink, m);
     v3_normalize_adj(product, v3_scale(turned_valid_adj(n, wi, p->flip_invalid_normals, dvalid), side), &d);
     // product = (-a vy, a vx - b ux, ux vy)
     Float da = d.y * s->vx - d.x * s->vy, db = -d.y * s->ux;

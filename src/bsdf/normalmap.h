@@ -34,6 +34,7 @@ KFN void normalmap_adj(const BsdfCall *call, const NormalMap *p, Vec3 wi, Vec3 w
                        NormalMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
     Vec3 encoded = normalmap_encoded(p), n = v3_normalize(encoded), valid = normalmap_normal(p, wi);
     Vec3 dvalid = v3_zero(), dencoded = v3_zero();
+    turned_watch(n, wi, sink, m);
     turned_adj(call, valid, p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi, dwo, duv);
     // valid = (+-x, +-y, z) of n = normalize(2 c - 1)
     v3_normalize_adj(encoded, turned_valid_adj(n, wi, p->flip_invalid_normals, dvalid), &dencoded);

@@ -2,7 +2,7 @@
 // maps have in common. The nested function sees both directions in a frame about n, with its tangent along the
 // surface's; light that is above one of the two surfaces and below the other one is dropped. Optionally the rest is
 // shadowed as by a microsurface whose roughness follows from the angle between the normals [estevez2019 eq. 3 and 4].
-// NOT differentiated: the jump where n turns away from the viewer.
+// NOT differentiated: the jump where n turns away from the viewer; it is reported (turned_watch).
 #pragma once
 
 #include "bsdf/call.h"
@@ -17,6 +17,15 @@ typedef struct Turned {
 KFN Vec3 turned_valid(Vec3 n, Vec3 wi, int32_t flip_invalid) {
     Mask flip = m_set(flip_invalid) & m_le(wi.z * v3_dot(wi, n), f_set(0));
     return v3(f_select(flip, -n.x, n.x), f_select(flip, -n.y, n.y), n.z);
+}
+
+// Notes in the sink whether n faces the viewer as the surface does. Where it faces away from the light the value goes
+// to 0 continuously, with the cosine.
+KFN void turned_watch(Vec3 n, Vec3 wi, Sink *sink, Mask m) {
+    if (sink->watch_turned) {
+        Mask away = m_le(wi.z * v3_dot(wi, n), f_set(0));
+        sink->faces |= (m_any(m & away) ? FACES_AWAY : 0) | (m_any(m & ~away) ? FACES_ALIKE : 0);
+    }
 }
 
 KFN Vec3 turned_valid_adj(Vec3 n, Vec3 wi, int32_t flip_invalid, Vec3 dvalid) {

@@ -137,7 +137,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (result) {
         return result;
     }
-    if (info.terms != REY_TERM_INTERIOR) {
+    if ((info.terms & ~REY_TERM_TERMINATOR) != REY_TERM_INTERIOR) { // jumps are refused when a path meets one
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
     for (size_t i = 0; i < u->items.count; i++) {

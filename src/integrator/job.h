@@ -3,13 +3,20 @@
 
 #include "scene/scene.h"
 
-enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV };
+// MODE_REPLAY: the picture of another scene along the paths of this one (path_replay.h).
+enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV, MODE_REPLAY };
+
+// Modes that record every vertex.
+static inline bool mode_records(int32_t mode) {
+    return mode == MODE_REVERSE || mode == MODE_FORWARD || mode == MODE_REPLAY;
+}
 
 // What of a group depends on the selected parameters.
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2 };
 
 typedef struct PathJob {
     const SceneView *scene;
+    const SceneView *moved;       // MODE_REPLAY: the scene with other parameters
     int32_t sensor, mode;
     int32_t x, y, width, height;  // tile in full-film pixels; may reach beyond the film with sample_border
     int32_t spp;
@@ -28,6 +35,7 @@ typedef struct PathJob {
     bool any_normals, any_attributes, any_places;
     const int32_t *live;          // per group: LIVE_ mask
     bool live_lights;             // some emitter depends on the selection
+    bool watch_turned;            // the selection turns shading normals: note which way they face
     // Asked before each chunk of paths: false ends the job early. May be null.
     bool (*go_on)(void *user);
     void *user;
@@ -36,6 +44,7 @@ typedef struct PathJob {
     size_t workspace_bytes;
     // Results, added to.
     int64_t paths, rays, nonfinite;
+    int32_t faces;                // FACES_ bits of scene/sink.h
     double trace_seconds;
 } PathJob;
 

@@ -222,6 +222,24 @@ KFN bool passing_is_live(const Tracer *t) {
     return false;
 }
 
+// Notes whether shading normals that depend on the selection face the viewer as the surface does. The picture jumps
+// where they begin to face the other way, which is somewhere if paths meet both; faces may also be wound the wrong way
+// round throughout. Where normals turn away from the light, the scattering function goes to 0 with the cosine, and
+// nothing jumps.
+KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
+    if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
+        Mask selected = s->m & mi_lt(i_set(-1), i_gather(sink->normals_at, s->hit.shape));
+        Float geometric = -v3_dot(s->d, s->si.ng);
+        Mask away = m_le(s->wi.z * geometric, f_set(0));
+        sink->faces |= (m_any(selected & away) ? FACES_AWAY : 0) | (m_any(selected & ~away) ? FACES_ALIKE : 0);
+    }
+    if (t->scene->bsdfs[s->group->bsdf].turns) {
+        // Maps look at the viewer also where they scatter nothing to any light.
+        Vec3 dwi = v3_zero(), dwo = v3_zero();
+        bsdf_adj(&s->call, s->wi, s->wi, i_set(LOBE_SMOOTH), spec_zero(), sink, s->m, &dwi, &dwo, NULL);
+    }
+}
+
 // Sweeps the chunk's records from the last vertex to the first.
 static void path_backward(Tracer *t) {
     PathJob *job = t->job;
@@ -236,6 +254,7 @@ static void path_backward(Tracer *t) {
                  .any_normals = job->any_normals,
                  .any_attributes = job->any_attributes,
                  .any_places = job->any_places,
+                 .watch_turned = job->watch_turned,
                  .derivative = f_set(0)};
     bool live_passing = passing_is_live(t);
     Walk walk;
@@ -262,6 +281,9 @@ static void path_backward(Tracer *t) {
             find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
             s.call.surface = &s.surface;
         }
+        if (job->watch_turned && (live & LIVE_SCATTERING)) {
+            watch_normals(t, &s, &sink);
+        }
         if ((live & LIVE_SCATTERING) || live_passing) {
             s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
         }
@@ -280,4 +302,5 @@ static void path_backward(Tracer *t) {
             forward_flush(t, &sink, slot, c, m);
         }
     }
+    job->faces |= sink.faces;
 }

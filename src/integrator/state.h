@@ -81,7 +81,7 @@ typedef struct Workspace {
 // Lays the workspace out in a block; with block null only measures. Returns the bytes needed.
 static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
     size_t at = 0;
-    bool derivative = mode == MODE_REVERSE || mode == MODE_FORWARD;
+    bool derivative = mode_records(mode);
     ws->chunk = CHUNK;
     size_t n = (size_t)ws->chunk + 2 * LANES;
     ws->record_capacity = derivative ? CHUNK * RECORDS_PER_PATH : 0;

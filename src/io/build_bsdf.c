@@ -150,6 +150,7 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
         const ParamDesc *p = &kind->params[i];
         double value = (double)p->value;
         bsdf->surface |= p->type == PARAM_HEIGHT;
+        bsdf->turns |= p->type == PARAM_HEIGHT || p->type == PARAM_NORMAL;
         char name[MAX_PATH_NAME];
         build_join(name, path, p->name);
         switch (p->type) {
@@ -238,6 +239,7 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         TRY(build_bsdf(b, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), i)->node, name, &bsdf->child[i]));
         const BsdfNode *nested = &ARRAY_AT(b->scene->build.bsdfs, BsdfNode, bsdf->child[i]);
         bsdf->surface |= nested->surface;
+        bsdf->turns |= nested->turns;
         bsdf->transmits |= nested->transmits;
     }
     return REY_OK;

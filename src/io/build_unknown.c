@@ -37,9 +37,6 @@ static const struct {
                {"sggx", no_media},
                {"prbvolpath", no_media},
                {"volume", missing},
-               {"blackbody", missing},
-               {"regular", missing},
-               {"irregular", missing},
                {"prb_basic", missing},
                {"direct_projective", missing},
                {"prb_projective", missing}};

@@ -6,6 +6,7 @@
 #include "render/particles.h"
 #include "render/render_parts.h"
 #include "render/update.h"
+#include "scene/sink.h"
 
 #include <string.h>
 
@@ -135,6 +136,7 @@ bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker)
     job->user = r;
     job->paths = job->rays = job->nonfinite = 0;
     job->trace_seconds = 0;
+    job->faces = 0;
     double start = rey_thread_seconds();
     if (particles) {
         r->backend->run_particles(particles);
@@ -146,6 +148,8 @@ bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker)
     r->stats.paths += job->paths;
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
+    r->faces |= job->faces;
+    r->stats.missing_terms = r->faces == (FACES_ALIKE | FACES_AWAY) ? REY_TERM_TERMINATOR : 0;
     r->stats.trace_seconds += job->trace_seconds;
     r->stats.thread_seconds += seconds;
     r->done += 1;
@@ -213,7 +217,7 @@ static bool has_interior(const Param *p) {
 
 // Refuses parameters whose derivative would lack a term.
 static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
-    const int available = REY_TERM_INTERIOR;
+    const int available = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
     for (int i = 0; i < selection.count; i++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(scene, selection.params[i], &info);
@@ -236,8 +240,8 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
                             info.why);
         }
     }
-    if (def->terms & ~available) {
-        int bit = def->terms & ~available;
+    if (def->terms & ~REY_TERM_INTERIOR) {
+        int bit = def->terms & ~REY_TERM_INTERIOR;
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;
@@ -275,6 +279,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_normals |= p->normals >= 0;
         r->job.any_attributes |= p->attribute >= 0;
         r->job.any_places |= p->emitter >= 0;
+        r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
         if (at > INT32_MAX / 2) {
             return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
@@ -316,6 +321,22 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
         result = check_terms(scene, def, selection);
     }
     return result == REY_OK ? map_selection(r, selection) : result;
+}
+
+// Refuses a gradient whose paths met a jump that no term covers.
+static rey_result derivative_end(const Render *r, rey_result result, rey_selection selection) {
+    if (result != REY_OK || r->def.terms || !(r->stats.missing_terms & REY_TERM_TERMINATOR)) {
+        return result;
+    }
+    const Param *p = NULL;
+    for (int i = 0; i < selection.count && (!p || !(p->terms & REY_TERM_TERMINATOR)); i++) {
+        p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
+    }
+    return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                    "the gradient of %s needs the term 'terminator', which does not exist yet: paths met shading "
+                    "normals that face the viewer as the surface does and others that do not, and the picture jumps "
+                    "between them. --terms interior gives the part that does",
+                    p ? p->name : "");
 }
 
 // The adjoint of the film's sums: of each pixel over samples and filter norm.
@@ -374,6 +395,7 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
             }
         }
     }
+    result = derivative_end(&r, result, selection);
     return rey_render_end(&r, result, start, stats);
 }
 
@@ -418,5 +440,6 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
         }
     }
     rey_free(scene->ctx, pictures);
+    result = derivative_end(&r, result, selection);
     return rey_render_end(&r, result, start, stats);
 }

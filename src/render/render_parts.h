@@ -24,6 +24,7 @@ typedef struct Render {
     double *columns, *rows;
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, live
     float *adjoint;
+    int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;
     double done, total;    // progress
     int part, parts;       // this call is number `part` of `parts` equal ones

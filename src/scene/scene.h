@@ -33,6 +33,7 @@ typedef struct BsdfNode {
     int32_t table;               // first derived value in `tables`, -1 = none
     int32_t transmits;           // lets light through, itself or in a child
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
+    int32_t turns;               // turns the shading normal, itself or in a child
 } BsdfNode;
 
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };

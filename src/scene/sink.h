@@ -6,6 +6,9 @@
 #include "math/vec.h"
 #include "scene/scene.h"
 
+// Which way shading normals that depend on the selection were met: as the surface faces, or the other way round.
+enum { FACES_ALIKE = 1, FACES_AWAY = 2 };
+
 typedef struct Sink {
     double *gradient;          // reverse, else null
     const float *tangent;      // forward, else null
@@ -15,6 +18,8 @@ typedef struct Sink {
     const int32_t *attribute_at; // like view.attributes: every second entry
     const int32_t *place_at;   // per emitter and slot: position or pose
     bool any_normals, any_attributes, any_places;
+    bool watch_turned; // see PathJob
+    int32_t faces;     // FACES_ bits
     Float derivative;          // forward: accumulates
 } Sink;
 

@@ -1,0 +1,64 @@
+// path_replay.h: the picture of a scene along the recorded paths of another one, which differs in the values of its
+// parameters alone: directions, densities, MIS weights, roulette and choices are those of the recording scene, values
+// of functions and lights those of the moved one. E[f(moved) / p(recorded)] is the moved scene's picture, and its
+// differences are free of the noise that choices make when they flip.
+// NOT replayed: what moves hit points, light samples and the directions of mirrors and glass.
+#pragma once
+
+#include "integrator/path_adj.h"
+
+static Spec replay_escape(Tracer *t, const RecordBatch *batch) {
+    const Records *r = &t->ws.records;
+    const EmitterRecord *e = t->scene->emitters + t->scene->environment;
+    Vec2 uv = environment_uv(t->scene, e, record_v3(r->dx, r->dy, r->dz, batch->first));
+    return spec_scale(emitter_eval(t->scene, e, texcoord(uv, NULL), f_set(1)), f_load(r->mis + batch->first));
+}
+
+// Radiance leaving a batch of vertices, given what arrives there.
+static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
+    SurfaceSweep s = surface_load(t, batch, slot, suffix);
+    Spec l = spec_zero();
+    s.call.uv.hit = &s.hit;
+    if (t->scene->bsdfs[s.group->bsdf].surface) {
+        find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
+        s.call.surface = &s.surface;
+    }
+    if (s.emitter) {
+        Spec emission = emitter_eval(t->scene, s.emitter, texcoord(s.si.uv, &s.hit), f_set(1));
+        l = spec_zero_unless(s.lit, spec_scale(emission, s.mis));
+    }
+    if (m_any(s.connected)) {
+        Spec value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+        Spec f = bsdf_eval(&s.call, s.wi, s.wl, i_set(LOBE_SMOOTH)), weight = s.light_weight;
+        if (t->scene->through) {
+            Walk walk;
+            weight = spec_mul(weight, walk_again(t, &s, &walk));
+        }
+        l = spec_add(l, spec_zero_unless(s.connected, spec_mul(spec_mul(f, value), weight)));
+    }
+    if (m_any(s.scattered)) {
+        Spec f = bsdf_eval(&s.call, s.wi, s.wo, s.lobe);
+        Spec onward = spec_mul(spec_scale(f, s.scatter_weight), suffix);
+        l = spec_add(l, spec_zero_unless(s.scattered, onward));
+    }
+    return l;
+}
+
+static void path_replay(Tracer *t) {
+    const SceneView *recorded = t->scene;
+    const Records *r = &t->ws.records;
+    t->scene = t->job->moved;
+    for (int32_t b = t->batch_count - 1; b >= 0; b--) {
+        const RecordBatch *batch = t->ws.batches + b;
+        Mask m = m_first_n(batch->count);
+        Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
+        Spec l = batch->tag == VERTEX_ESCAPED
+                     ? replay_escape(t, batch)
+                     : replay_surface(t, batch, slot, spec_gather(t->ws.suffix, slot));
+        l = spec_zero_unless(m & m_finite(spec_sum(l)), l);
+        spec_scatter(t->ws.suffix, slot, l, m);
+        // The path's first vertex comes last.
+        spec_scatter(t->ws.radiance, slot, spec_mul(spec_load(r->beta, batch->first), l), m);
+    }
+    t->scene = recorded;
+}

@@ -1,0 +1,219 @@
+// Shading normals that turn away from the viewer are refused where a path meets them and nowhere else; pictures along
+// recorded paths.
+#include "render/replay.h"
+#include "reynolds/reynolds.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { SIZE = 16, NUMBERS = SIZE * SIZE * 3, SPP = 32, SETS = 4 };
+
+static const char *const plane_text =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "property float nx\nproperty float ny\nproperty float nz\nelement face 2\n"
+    "property list uchar int vertex_indices\nend_header\n"
+    "-1 -1 0 %s\n1 -1 0 %s\n1 1 0 %s\n-1 1 0 %s\n%s";
+
+typedef struct Stage {
+    rey_context *ctx;
+    rey_scene *scene;
+    char folder[64];
+} Stage;
+
+static void write_text(const Stage *s, const char *name, const char *text) {
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", s->folder, name);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+}
+
+// A plane seen from `origin` under a lamp, with a normal for its vertices and a scattering function.
+static void stage_load(const Stage *s, const char *origin, const char *normal, const char *bsdf, bool reversed,
+                       rey_scene **out) {
+    char ply[1024], xml[4096], path[128];
+    snprintf(ply, sizeof ply, plane_text, normal, normal, normal, normal,
+             reversed ? "3 2 1 0\n3 3 2 0\n" : "3 0 1 2\n3 0 2 3\n");
+    write_text(s, "plane.ply", ply);
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>"
+             "<sensor type='perspective'><float name='fov' value='20'/><transform name='to_world'>"
+             "<lookat origin='%s' target='0,0,0' up='0,1,0.1'/></transform><film type='hdrfilm'>"
+             "<integer name='width' value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film></sensor>"
+             "<emitter type='constant'/><emitter type='point'><point name='position' x='0.3' y='0.2' z='4'/></emitter>"
+             "<shape type='ply' id='plane'><string name='filename' value='plane.ply'/>%s</shape></scene>",
+             origin, SIZE, SIZE, bsdf);
+    write_text(s, "scene.xml", xml);
+    snprintf(path, sizeof path, "%s/scene.xml", s->folder);
+    if (rey_scene_load(s->ctx, path, NULL, 0, out) != REY_OK) {
+        fail_msg("%s", rey_error(s->ctx));
+    }
+}
+
+static int set_up(void **state) {
+    Stage *s = calloc(1, sizeof *s);
+    if (!s || rey_context_create(NULL, &s->ctx)) {
+        return 1;
+    }
+    snprintf(s->folder, sizeof s->folder, "/tmp/reynolds_test_terminator_XXXXXX");
+    *state = s;
+    return !mkdtemp(s->folder);
+}
+
+static int tear_down(void **state) {
+    Stage *s = *state;
+    char command[128];
+    snprintf(command, sizeof command, "rm -r %s", s->folder);
+    int status = system(command);
+    rey_context_destroy(s->ctx);
+    free(s);
+    return status;
+}
+
+static rey_render_def def_make(int terms) {
+    rey_render_def def = rey_default_render_def();
+    def.spp = SPP;
+    def.sets = SETS;
+    def.terms = terms;
+    return def;
+}
+
+// The results of forward and reverse mode for the sum of the parameter's numbers, which must agree.
+static rey_result derive(const Stage *s, rey_scene *scene, const char *name, int terms, int *missing) {
+    static float image[NUMBERS], adjoint[NUMBERS], tangent[64];
+    double gradient[64], forward = 0, reverse = 0;
+    int param = rey_param_find(scene, name);
+    assert_true(param >= 0);
+    rey_selection selection = {&param, 1};
+    int64_t count = rey_selection_size(scene, selection);
+    assert_true(count <= 64);
+    for (int i = 0; i < 64; i++) {
+        tangent[i] = (float)(i % 3) - 0.5F;
+    }
+    for (int i = 0; i < NUMBERS; i++) {
+        adjoint[i] = 1;
+    }
+    rey_render_def def = def_make(terms);
+    rey_stats stats = {0}, reversed = {0};
+    rey_result result = rey_jvp(scene, &def, selection, tangent, image, NULL, &stats);
+    assert_int_equal(rey_vjp(scene, &def, selection, adjoint, gradient, NULL, &reversed), result);
+    assert_int_equal(stats.missing_terms, reversed.missing_terms);
+    *missing = stats.missing_terms;
+    if (result) {
+        assert_int_equal(result, REY_ERROR_INCOMPLETE);
+        assert_non_null(strstr(rey_error(s->ctx), "terminator"));
+        assert_non_null(strstr(rey_error(s->ctx), name));
+        return result;
+    }
+    double size = 0;
+    for (int i = 0; i < NUMBERS; i++) {
+        forward += (double)image[i];
+        size += fabs((double)image[i]);
+    }
+    for (int64_t i = 0; i < count; i++) {
+        reverse += gradient[i] * (double)tangent[i];
+    }
+    assert_true(size > 0);
+    assert_true(fabs(forward - reverse) <= 1e-4 * size);
+    return REY_OK;
+}
+
+static void test_turned_normals(void **state) {
+    const Stage *s = *state;
+    static const char twosided[] = "<bsdf type='twosided'><bsdf type='roughconductor'/></bsdf>";
+    static const char flat_map[] = "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='0.6,0.5,1'/>"
+                                   "<bsdf type='diffuse'/></bsdf>";
+    static const char steep_map[] = "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='0.95,0.5,0.6'/>"
+                                    "<bsdf type='diffuse'/></bsdf>";
+    static const char unflipped_map[] =
+        "<bsdf type='normalmap' id='map'><boolean name='flip_invalid_normals' value='false'/>"
+        "<rgb name='normalmap' value='0.95,0.5,0.6'/><bsdf type='diffuse'/></bsdf>";
+    static const struct {
+        const char *origin, *normal, *bsdf, *param;
+        bool turned, reversed;
+    } cases[] = {{"0,0,5", "0 0 1", "<bsdf type='diffuse'/>", "plane.normals", false, false},
+                 {"1,0,5", "0.3 0 1", "<bsdf type='diffuse'/>", "plane.normals", false, false},
+                 {"1,0,5", "0.3 0 1", "<bsdf type='diffuse'/>", "plane.normals", false, true},
+                 {"0,0,5", "0.3 0 1", twosided, "plane.normals", false, false},
+                 {"0,0,-5", "0.3 0 1", twosided, "plane.normals", false, false}, // from behind, both face away
+                 {"-1.6,0,4.75", "0.9 0 0.3", "<bsdf type='diffuse'/>", "plane.normals", true, false},
+                 {"-1.6,0,4.75", "0.9 0 0.3", "<bsdf type='diffuse'/>", "plane.normals", true, true},
+                 {"-1.6,0,4.75", "0.9 0 0.3", twosided, "plane.normals", true, false},
+                 {"0,0,5", "0 0 1", flat_map, "map.normalmap.value", false, false},
+                 {"-1.08,0,4.9", "0 0 1", steep_map, "map.normalmap.value", true, false},
+                 {"-1.08,0,4.9", "0 0 1", unflipped_map, "map.normalmap.value", true, false},
+                 {"5,0,1", "0 0 1", steep_map, "map.normalmap.value", false, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        rey_scene *scene;
+        int missing, expected = cases[i].turned ? REY_TERM_TERMINATOR : 0;
+        stage_load(s, cases[i].origin, cases[i].normal, cases[i].bsdf, cases[i].reversed, &scene);
+        rey_result result = derive(s, scene, cases[i].param, 0, &missing);
+        if (result != (cases[i].turned ? REY_ERROR_INCOMPLETE : REY_OK) || missing != expected) {
+            fail_msg("case %d: %s, missing %d: %s", (int)i, rey_result_text(result), missing, rey_error(s->ctx));
+        }
+        assert_int_equal(derive(s, scene, cases[i].param, REY_TERM_INTERIOR, &missing), REY_OK);
+        assert_int_equal(missing, expected);
+        rey_scene_destroy(scene);
+    }
+}
+
+// Other parameters are not refused for normals that turn away.
+static void test_other_parameters(void **state) {
+    const Stage *s = *state;
+    rey_scene *scene;
+    int missing;
+    stage_load(s, "-5,0,1", "0.9 0 0.3", "<bsdf type='twosided'><bsdf type='diffuse' id='paint'/></bsdf>", false, &scene);
+    assert_int_equal(derive(s, scene, "paint.reflectance.value", 0, &missing), REY_OK);
+    assert_int_equal(missing, 0);
+    rey_scene_destroy(scene);
+}
+
+// Along the recorded paths light scales with the reflectance exactly, and roughness gives what fresh paths give.
+static void test_replay(void **state) {
+    const Stage *s = *state;
+    static float same[NUMBERS], brighter[NUMBERS], fresh[NUMBERS], replayed[NUMBERS];
+    static const char rough[] = "<bsdf type='roughconductor' id='paint'><float name='alpha' value='0.4'/>"
+                                "<rgb name='specular_reflectance' value='0.4,0.3,0.2'/></bsdf>";
+    rey_scene *scene, *moved;
+    stage_load(s, "0,-3,5", "0 0 1", rough, false, &scene);
+    stage_load(s, "0,-3,5", "0 0 1", rough, false, &moved);
+    rey_render_def def = def_make(0);
+    def.spp = 256;
+    int colour = rey_param_find(moved, "paint.specular_reflectance.value"), alpha = rey_param_find(moved, "paint.alpha.value");
+    assert_true(colour >= 0 && alpha >= 0);
+    const float bright[] = {0.8F, 0.6F, 0.4F}, dim[] = {0.4F, 0.3F, 0.2F}, other_alpha = 0.45F;
+    assert_int_equal(rey_replay(scene, moved, &def, same, NULL), REY_OK);
+    assert_int_equal(rey_param_set(moved, colour, bright, 3), REY_OK);
+    assert_int_equal(rey_replay(scene, moved, &def, brighter, NULL), REY_OK);
+    assert_int_equal(rey_param_set(moved, colour, dim, 3), REY_OK);
+    assert_int_equal(rey_param_set(moved, alpha, &other_alpha, 1), REY_OK);
+    assert_int_equal(rey_replay(scene, moved, &def, replayed, NULL), REY_OK);
+    assert_int_equal(rey_render(moved, &def, fresh, NULL), REY_OK);
+    double changed = 0, sum = 0, fresh_sum = 0, replayed_sum = 0;
+    for (int i = 0; i < NUMBERS; i++) {
+        assert_true(fabsf(brighter[i] - 2 * same[i]) <= 1e-5F * brighter[i]);
+        changed += fabs((double)replayed[i] - (double)same[i]);
+        sum += (double)same[i];
+        fresh_sum += (double)fresh[i];
+        replayed_sum += (double)replayed[i];
+    }
+    assert_true(sum > 0 && changed > 1e-3 * sum);
+    assert_true(fabs(replayed_sum - fresh_sum) < 3e-3 * fresh_sum);
+    rey_scene_destroy(scene);
+    rey_scene_destroy(moved);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_other_parameters),
+                                       cmocka_unit_test(test_replay)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
