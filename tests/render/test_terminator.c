@@ -46,7 +46,7 @@ static void stage_load(const Stage *s, const char *origin, const char *normal, c
     write_text(s, "plane.ply", ply);
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>"
-             "<sensor type='perspective'><float name='fov' value='20'/><transform name='to_world'>"
+             "<sensor type='perspective'><float name='fov' value='10'/><transform name='to_world'>"
              "<lookat origin='%s' target='0,0,0' up='0,1,0.1'/></transform><film type='hdrfilm'>"
              "<integer name='width' value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film></sensor>"
              "<emitter type='constant'/><emitter type='point'><point name='position' x='0.3' y='0.2' z='4'/></emitter>"
@@ -94,6 +94,8 @@ static rey_result derive(const Stage *s, rey_scene *scene, const char *name, int
     int param = rey_param_find(scene, name);
     assert_true(param >= 0);
     rey_selection selection = {&param, 1};
+    rey_param_info info;
+    assert_int_equal(rey_param_get_info(scene, param, &info), REY_OK);
     int64_t count = rey_selection_size(scene, selection);
     assert_true(count <= 64);
     for (int i = 0; i < 64; i++) {
@@ -111,7 +113,7 @@ static rey_result derive(const Stage *s, rey_scene *scene, const char *name, int
     if (result) {
         assert_int_equal(result, REY_ERROR_INCOMPLETE);
         assert_non_null(strstr(rey_error(s->ctx), "terminator"));
-        assert_non_null(strstr(rey_error(s->ctx), name));
+        assert_non_null(strstr(rey_error(s->ctx), info.name));
         return result;
     }
     double size = 0;
