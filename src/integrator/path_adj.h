@@ -240,24 +240,61 @@ KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
     }
 }
 
+static Sink sink_of(const PathJob *job) {
+    return (Sink){.gradient = job->gradient,
+                  .tangent = job->tangent,
+                  .texture_at = job->texture_at,
+                  .to_uv_at = job->to_uv_at,
+                  .normals_at = job->normals_at,
+                  .attribute_at = job->attribute_at,
+                  .place_at = job->place_at,
+                  .any_normals = job->any_normals,
+                  .any_attributes = job->any_attributes,
+                  .any_places = job->any_places,
+                  .watch_turned = job->watch_turned,
+                  .derivative = f_set(0)};
+}
+
+// The adjoint of a batch of surface vertices that something selected reaches.
+static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
+                          Sink *sink) {
+    PathJob *job = t->job;
+    int32_t live = job->live[batch->group];
+    Walk walk;
+    SurfaceSweep s = surface_load(t, batch, slot, suffix);
+    s.call.uv.hit = &s.hit;
+    if (t->scene->bsdfs[s.group->bsdf].surface) {
+        find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
+        s.call.surface = &s.surface;
+    }
+    if (job->watch_turned && (live & LIVE_SCATTERING)) {
+        watch_normals(t, &s, sink);
+    }
+    if ((live & LIVE_SCATTERING) || live_passing) {
+        s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+    }
+    Spec unshadowed = s.light_weight;
+    if (t->scene->through) {
+        s.light_weight = spec_mul(unshadowed, walk_again(t, &s, &walk));
+    }
+    for (int c = 0; c < drives(t); c++) {
+        Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
+        surface_adj(t, &s, live, delta, sink);
+        if (live_passing) {
+            // L += f Le w_l T
+            Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
+            walk_adj(t, &walk, spec_zero_unless(s.connected, dt), sink);
+        }
+        forward_flush(t, sink, slot, c, s.m);
+    }
+}
+
 // Sweeps the chunk's records from the last vertex to the first.
 static void path_backward(Tracer *t) {
     PathJob *job = t->job;
     const Records *r = &t->ws.records;
-    Sink sink = {.gradient = job->gradient,
-                 .tangent = job->tangent,
-                 .texture_at = job->texture_at,
-                 .to_uv_at = job->to_uv_at,
-                 .normals_at = job->normals_at,
-                 .attribute_at = job->attribute_at,
-                 .place_at = job->place_at,
-                 .any_normals = job->any_normals,
-                 .any_attributes = job->any_attributes,
-                 .any_places = job->any_places,
-                 .watch_turned = job->watch_turned,
-                 .derivative = f_set(0)};
+    Sink sink = sink_of(job);
     bool live_passing = passing_is_live(t);
-    Walk walk;
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
         if (batch->tag == VERTEX_ESCAPED) {
@@ -271,35 +308,8 @@ static void path_backward(Tracer *t) {
         Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
         Mask finite = m & m_finite(spec_sum(l));
         spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
-        int32_t live = job->live[batch->group];
-        if (!live && !job->live_lights && !live_passing) {
-            continue;
-        }
-        SurfaceSweep s = surface_load(t, batch, slot, suffix);
-        s.call.uv.hit = &s.hit;
-        if (t->scene->bsdfs[s.group->bsdf].surface) {
-            find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
-            s.call.surface = &s.surface;
-        }
-        if (job->watch_turned && (live & LIVE_SCATTERING)) {
-            watch_normals(t, &s, &sink);
-        }
-        if ((live & LIVE_SCATTERING) || live_passing) {
-            s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
-        }
-        Spec unshadowed = s.light_weight;
-        if (t->scene->through) {
-            s.light_weight = spec_mul(unshadowed, walk_again(t, &s, &walk));
-        }
-        for (int c = 0; c < drives(t); c++) {
-            Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
-            surface_adj(t, &s, live, delta, &sink);
-            if (live_passing) {
-                // L += f Le w_l T
-                Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
-                walk_adj(t, &walk, spec_zero_unless(s.connected, dt), &sink);
-            }
-            forward_flush(t, &sink, slot, c, m);
+        if (job->live[batch->group] || job->live_lights || live_passing) {
+            surface_sweep(t, batch, slot, suffix, finite, live_passing, &sink);
         }
     }
     job->faces |= sink.faces;
