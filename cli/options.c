@@ -414,13 +414,24 @@ static bool is_nonfinite(const char *text) {
     return end != text && !*end && !isfinite(value);
 }
 
+static const char *missing_file(Command command, int given) {
+    switch (command) {
+    case COMMAND_FIT:
+        return "JOB.yaml is missing";
+    case COMMAND_CONVERT:
+        return given ? "OUT.xml is missing" : "IN and OUT.xml are missing";
+    case COMMAND_COMPARE:
+        return given ? "B is missing" : "A and B are missing";
+    default:
+        return "SCENE is missing";
+    }
+}
+
 static bool check_required(const Options *o) {
-    static const char *const missing[COMMAND_COUNT] = {"SCENE", "SCENE", "SCENE",   "JOB.yaml",
-                                                       "SCENE", "SCENE", "IN and OUT.xml", "A and B", ""};
     static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     Command c = o->command;
     if (o->file_count < needed[c]) {
-        cli_usage_error(o, "%s missing", missing[c]);
+        cli_usage_error(o, "%s", missing_file(c, o->file_count));
     } else if (o->all && o->param_count) {
         cli_usage_error(o, "--all and --param: give one of them");
     } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {

@@ -8,6 +8,7 @@
 #include <locale.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { LOSS_WINDOW = 10 }; // the final loss is a mean over so many iterations
 
@@ -33,10 +34,15 @@ static rey_result write_resolved(Fit *fit) {
     return result;
 }
 
+// A fit that was killed before its first checkpoint goes on from its start.
 static rey_result resume(Fit *fit) {
-    char *path = rey_fit_output_path(fit, "checkpoint.bin");
-    rey_result result = path ? rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state) : REY_ERROR_MEMORY;
+    char *path = rey_fit_output_path(fit, "checkpoint.bin"), *job = rey_fit_output_path(fit, "job.resolved.yaml");
+    rey_result result = path && job ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && (access(path, F_OK) == 0 || access(job, F_OK) != 0)) {
+        result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
+    }
     rey_free(fit->ctx, path);
+    rey_free(fit->ctx, job);
     if (!result) {
         result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
     }

@@ -92,11 +92,11 @@ static rey_result take_over(Fit *fit) {
     rey_result result = path && frames ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
         result = fit->def->overwrite ? REY_OK : check_former(fit, path);
-        if (!result) {
-            remove_files(fit->output, "events.out.tfevents."); // or this fit would go on in them
-            remove_files(frames, "view");
-            unlink(path); // --resume must not find the former fit's
-        }
+    }
+    if (!result) {
+        remove_files(fit->output, "events.out.tfevents."); // or this fit would go on in them
+        remove_files(frames, "view");
+        unlink(path); // --resume must not find the former fit's
     }
     rey_free(fit->ctx, path);
     rey_free(fit->ctx, frames);

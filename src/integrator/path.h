@@ -105,8 +105,8 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
     }
     const EmitterRecord *e = scene->emitters + scene->environment;
     Vertex v = vertex_load(t, order, count, bounce);
-    if (scene->through && scene->hide_emitters) {
-        v.m = v.m & mi_lt(i_set(0), v.depth);
+    if (scene->hide_emitters) {
+        v.m = v.m & m_gt(v.pdf, f_set(PDF_VIEWED));
     }
     Vec2 uv = environment_uv(scene, e, v.d);
     Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, uv) * e->weight));
@@ -241,7 +241,11 @@ KFN void append_paths(Tracer *t, const Vertex *v, const Interaction *si, const O
     Paths *next = &t->ws.paths[1 - t->current];
     // Lights are weighed as seen from the last vertex that turned the path.
     Vec3 origin = si->p;
-    Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(-1));
+    Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(PDF_DELTA));
+    if (t->scene->hide_emitters) {
+        Mask absent = mi_eq(w->sample.lobe & 3, i_set(LOBE_NULL)) & m_le(v->pdf, f_set(PDF_VIEWED));
+        density = f_select(absent, f_set(PDF_VIEWED), density);
+    }
     if (t->scene->through) {
         origin = v3_select(w->passed, v->origin, si->p);
         density = f_select(w->passed, v->pdf, density);

@@ -17,6 +17,10 @@ KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)boun
 // Beyond the dimensions of bounces, so that a lens changes no other random number.
 #define DIMENSION_LENS 0x80000000u
 
+// Densities of paths that light sampling could not have made: delta lobes; the camera, also behind absent surfaces.
+#define PDF_DELTA (-1.0f)
+#define PDF_VIEWED (-2.0f)
+
 // Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
 #define DERIVATIVE_FLOOR 0.05f
 
@@ -95,7 +99,7 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         spec_store(p->beta, i, spec_set(sample.weight));
         f_store(p->eta2 + i, f_set(1));
         f_store(p->roulette + i, f_set(1));
-        f_store(p->pdf + i, f_set(-1));
+        f_store(p->pdf + i, f_set(PDF_VIEWED));
         i_store(p->slot + i, slot);
         i_store(p->medium + i, i_set(t->sensor->medium));
         i_store(p->depth + i, i_set(0));

@@ -414,10 +414,38 @@ static void test_depth(void **state) {
     rey_context_destroy(ctx);
 }
 
+// A sky that is hidden from the camera is hidden behind surfaces that are not there, too; and lights what is.
+static void test_hidden_sky(void **state) {
+    static const char *const shapes[] = {
+        "<bsdf type='null'/>", "<bsdf type='mask'><float name='opacity' value='0'/><bsdf type='diffuse'/></bsdf>", ""};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        char rest[512];
+        rey_context *ctx;
+        float image[4 * 4 * 3];
+        rey_render_def def = rey_default_render_def();
+        def.spp = 64;
+        snprintf(rest, sizeof rest, "<emitter type='constant'/><shape type='sphere'><float name='radius' value='9'/>%s"
+                                    "<boolean name='flip_normals' value='true'/></shape>", shapes[i]);
+        assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+        rey_scene *scene = load_text(ctx, "<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>",
+                                     i < 2 ? rest : "<emitter type='constant'/><shape type='rectangle'><transform "
+                                                    "name='to_world'><scale value='50'/><rotate y='1' angle='180'/>"
+                                                    "<translate z='3'/></transform></shape>");
+        assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
+        for (int k = 0; k < 48; k++) {
+            assert_true(i < 2 ? image[k] <= 0 : image[k] > 0.4f);
+        }
+        rey_scene_destroy(scene);
+        rey_context_destroy(ctx);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_corridor), cmocka_unit_test(test_corridor_roulette),
                                        cmocka_unit_test(test_through), cmocka_unit_test(test_through_gradient),
                                        cmocka_unit_test(test_split),            cmocka_unit_test(test_layers),
-                                       cmocka_unit_test(test_moments),          cmocka_unit_test(test_depth)};
+                                       cmocka_unit_test(test_moments),          cmocka_unit_test(test_depth),
+                                       cmocka_unit_test(test_hidden_sky)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
