@@ -71,6 +71,8 @@ typedef struct Options {
 // Parses a subcommand's arguments. Returns true when the command should run; otherwise *status is what it should
 // return: 0 after --help, 2 after a usage error, which has been printed.
 bool cli_options_parse(Command command, int argc, char **argv, Options *options, int *status);
+// Whether a subcommand got what it needs; prints the usage error otherwise.
+bool cli_options_required(const Options *o);
 void cli_options_free(Options *options);
 void cli_options_help(Command command); // the list of the options that a subcommand takes
 

@@ -1,0 +1,61 @@
+// options_required.c: which options and files a subcommand needs, and which of them exclude each other.
+#include "cli.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool is_nonfinite(const char *text) {
+    char *end;
+    double value = strtod(text, &end);
+    return end != text && !*end && !isfinite(value);
+}
+
+static const char *missing_file(Command command, int given) {
+    switch (command) {
+    case COMMAND_FIT:
+        return "JOB.yaml is missing";
+    case COMMAND_CONVERT:
+        return given ? "OUT.xml is missing" : "IN and OUT.xml are missing";
+    case COMMAND_COMPARE:
+        return given ? "B is missing" : "A and B are missing";
+    default:
+        return "SCENE is missing";
+    }
+}
+
+bool cli_options_required(const Options *o) {
+    static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
+    Command c = o->command;
+    if (o->file_count < needed[c]) {
+        cli_usage_error(o, "%s", missing_file(c, o->file_count));
+    } else if (o->all && o->param_count) {
+        cli_usage_error(o, "--all and --param: give one of them");
+    } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {
+        cli_usage_error(o, "--param is missing");
+    } else if (o->variance && (o->reverse || !o->output || !strcmp(o->output, "-"))) {
+        cli_usage_error(o, "--variance is of forward mode and needs -o with the name of a file");
+    } else if (c == COMMAND_GRAD && o->reverse && !o->adjoint) {
+        cli_usage_error(o, "--mode reverse needs --adjoint");
+    } else if (c == COMMAND_GRAD && o->reverse && is_nonfinite(o->adjoint)) {
+        cli_usage_error(o, "--adjoint: '%s' is not a finite number; a file of that name is ./%s", o->adjoint, o->adjoint);
+    } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {
+        cli_usage_error(o, "--adjoint needs --mode reverse");
+    } else if (c == COMMAND_GRAD && o->reverse && o->output && !strcmp(o->output, "-")) {
+        cli_usage_error(o, "reverse mode writes a folder, -o - is not one");
+    } else if (c == COMMAND_GRAD && o->reverse && o->output && cli_image_format(o->output) != IMAGE_UNKNOWN) {
+        cli_usage_error(o, "reverse mode writes a folder of .npy files, -o %s names a picture", o->output);
+    } else if ((c == COMMAND_RENDER || (c == COMMAND_GRAD && !o->reverse)) && o->output &&
+               cli_image_format(o->output) == IMAGE_UNKNOWN) {
+        cli_usage_error(o, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
+    } else if (o->resume && o->overwrite) {
+        cli_usage_error(o, "--resume continues and --overwrite starts again: give one of them");
+    } else if (c == COMMAND_RENDER && !o->output && !o->json) {
+        cli_usage_error(o, "-o OUT is missing");
+    } else if (o->json && o->output && !strcmp(o->output, "-")) {
+        cli_usage_error(o, "--json and -o - both want standard output");
+    } else {
+        return true;
+    }
+    return false;
+}
