@@ -15,7 +15,7 @@ static void converted_scenes_render_the_same_bits(void **state) {
 static void failures_of_convert(void **state) {
     Fixture *f = *state;
     expect(f, 2, "convert %s");
-    assert_non_null(strstr(f->words, "IN and OUT.xml"));
+    assert_non_null(strstr(f->words, "OUT.xml is missing"));
     expect(f, 1, "convert missing.xml copy.xml");
     expect(f, 1, "convert %s no/such/folder.xml");
     assert_non_null(strstr(f->words, "no/such/folder.xml"));
