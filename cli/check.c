@@ -303,6 +303,14 @@ static rey_result work_prepare(Work *w, int64_t largest) {
     return good ? rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &w->displaced) : REY_ERROR_MEMORY;
 }
 
+static bool can_replay(const Work *w, const Direction *d) {
+    bool can = true;
+    for (int k = 0; k < d->count; k++) {
+        can = can && rey_can_replay(w->session.scene, d->params[k]);
+    }
+    return can;
+}
+
 static int build_directions(Work *w, Check *checks, int count) {
     for (int i = 0; i < count; i++) {
         rey_param_info info;
@@ -315,7 +323,7 @@ static int build_directions(Work *w, Check *checks, int count) {
         if (status) {
             return status;
         }
-        checks[i].replays = cli_direction_terms(w->session.scene, &checks[i].direction) == REY_TERM_INTERIOR;
+        checks[i].replays = can_replay(w, &checks[i].direction);
     }
     return EXIT_OK;
 }

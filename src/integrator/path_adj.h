@@ -267,7 +267,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
         s.call.surface = &s.surface;
     }
-    if (job->watch_turned && (live & LIVE_SCATTERING)) {
+    if (job->watch_turned && (live & LIVE_SCATTERING) && !batch->ends) {
         watch_normals(t, &s, sink);
     }
     if ((live & LIVE_SCATTERING) || live_passing) {

@@ -57,6 +57,7 @@ enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL };
 // A run of recorded vertices that share tag and group; `count` lanes of the LANES from `first` on are alive.
 typedef struct RecordBatch {
     int32_t tag, group, first, count;
+    bool ends; // the paths end here: their depth is reached
 } RecordBatch;
 
 typedef struct Workspace {

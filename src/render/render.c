@@ -277,6 +277,10 @@ static rey_result map_selection(Render *r, rey_selection selection) {
             *slot = (int32_t)at;
         }
         r->job.any_normals |= p->normals >= 0;
+        if (p->normals >= 0 && view->shapes[p->normals].emitter >= 0) {
+            // A light's normals say into which directions it shines: light samples jump where none of its points is met.
+            r->faces = FACES_ALIKE | FACES_AWAY;
+        }
         r->job.any_attributes |= p->attribute >= 0;
         r->job.any_places |= p->emitter >= 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;

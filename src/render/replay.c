@@ -6,6 +6,11 @@
 #include "render/render_parts.h"
 #include "render/update.h"
 
+bool rey_can_replay(const rey_scene *scene, int param) {
+    const Param *p = &ARRAY_AT(scene->params, Param, param);
+    return p->terms == REY_TERM_INTERIOR && (p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0);
+}
+
 rey_result rey_replay(rey_scene *scene, rey_scene *moved, const rey_render_def *def, float *image, rey_stats *stats) {
     double start = rey_seconds(), *picture = NULL;
     int64_t numbers = 0;

@@ -168,6 +168,22 @@ static void test_turned_normals(void **state) {
     }
 }
 
+// The normals of a light say where it shines: light samples jump there, also where no path meets the light.
+static void test_normals_of_lights(void **state) {
+    const Stage *s = *state;
+    static const char light[] = "<bsdf type='diffuse'><rgb name='reflectance' value='0.3'/></bsdf>"
+                                "<emitter type='area'><rgb name='radiance' value='1'/></emitter>";
+    rey_scene *scene;
+    int missing;
+    stage_load(s, "0,0,5", "0 0 1", light, false, &scene);
+    assert_int_equal(derive(s, scene, "plane.normals", 0, &missing), REY_ERROR_INCOMPLETE);
+    assert_int_equal(derive(s, scene, "plane.normals", REY_TERM_INTERIOR, &missing), REY_OK);
+    assert_int_equal(missing, REY_TERM_TERMINATOR);
+    assert_true(rey_can_replay(scene, rey_param_find(scene, "plane.emitter.radiance.value")));
+    assert_false(rey_can_replay(scene, rey_param_find(scene, "plane.normals")));
+    rey_scene_destroy(scene);
+}
+
 // Other parameters are not refused for normals that turn away.
 static void test_other_parameters(void **state) {
     const Stage *s = *state;
@@ -215,7 +231,8 @@ static void test_replay(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_other_parameters),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_normals_of_lights),
+                                       cmocka_unit_test(test_other_parameters),
                                        cmocka_unit_test(test_replay)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
