@@ -42,15 +42,35 @@ typedef struct SceneSource {
     Array paths;            // of char *, per node of the document: its first parameter path, null = none
 } SceneSource;
 
+// Parameters and aliases that came into being while an object was built: no others have a name that begins with its path.
+typedef struct NodeNames {
+    size_t first_param, first_alias, params, aliases; // params, aliases: one past the last; 0 = open yet
+} NodeNames;
+
+// Parameters of one texture: its values and its to_uv.
+enum { TEXTURE_MOST_PARAMS = 2 };
+typedef struct TextureParams {
+    int32_t param[TEXTURE_MOST_PARAMS]; // number + 1, 0 = none
+} TextureParams;
+
+// Hash table of the shading groups: number + 1, 0 = empty.
+typedef struct GroupTable {
+    int32_t *slots;
+    size_t capacity, used; // capacity is a power of two
+} GroupTable;
+
 typedef struct Builder {
     rey_context *ctx;
     rey_scene *scene;
     SceneSource *source;
     Array attribute_uses; // of AttributeUse
+    Array names;          // of NodeNames, per node
+    Array texture_params; // of TextureParams, per texture
     Array named;          // of rey_xml_node *: objects whose path has been noted, in that order
     bool lenient;         // what cannot be read is left out
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
     int32_t shape_flags;  // of all shapes that are built now
+    GroupTable groups;
 } Builder;
 
 #define TRY(expression)                                                                                                \
@@ -105,6 +125,10 @@ rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const 
 // Appends a texture node with identity mapping; *theta has room for count numbers. Where a texture came from.
 rey_result build_add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta);
 rey_result build_note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture);
+// Registers a parameter of a texture (p.texture or p.to_uv); its number, -1 on failure. And those of a texture: the
+// k-th, null when there are fewer.
+int build_texture_param(Builder *b, const char *name, Param p);
+Param *build_param_of(Builder *b, int32_t texture, int k);
 // A constant number that is no parameter.
 rey_result build_number(Builder *b, float value, int32_t *out);
 // A pose: 16 numbers of theta with the parameter `path`.to_world. Returns its theta offset.
@@ -115,6 +139,7 @@ rey_result build_field_of_view(Builder *b, rey_xml_node *node, double aspect, do
 rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);
+rey_result build_group(Builder *b, ShapeRecord *shape); // finds its shading group
 rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);
 bool build_is_curve(const char *plugin);
 int build_curve_order(const char *plugin); // control points per segment

@@ -129,8 +129,8 @@ static rey_result height_slot(Builder *b, rey_xml_node *node, const ParamDesc *p
     rey_xml_child *child = rey_xml_child_of(node, REY_XML_TEXTURES, 0);
     TRY(build_texture(b, child->node, slot_use(p), path, out));
     TRY(refuse_attribute(b, node, *out));
-    for (size_t i = 0; i < b->scene->params.count; i++) {
-        Param *param = &ARRAY_AT(b->scene->params, Param, i);
+    Param *param;
+    for (int i = 0; (param = build_param_of(b, *out, i)); i++) {
         if (param->to_uv == *out) {
             param->terms |= REY_TERM_PRIMARY;
             param->why = "the slope of the heights jumps where uv moves from texel to texel";

@@ -49,9 +49,9 @@ static bool is_hard(const Builder *b, int32_t fraction, int32_t whole) {
 static rey_result fraction_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, const char *path, int32_t whole,
                                 int32_t *out) {
     TRY(number_slot(b, node, p, (double)(p->value * constant_value(b, whole)), path, out));
-    for (size_t i = 0; is_hard(b, *out, whole) && i < b->scene->params.count; i++) {
-        Param *param = &ARRAY_AT(b->scene->params, Param, i);
-        if (param->texture == whole || param->texture == *out) {
+    for (int i = 0; is_hard(b, *out, whole) && i < 2; i++) {
+        Param *param = build_param_of(b, i ? *out : whole, 0);
+        if (param) {
             param->terms |= REY_TERM_PRIMARY | REY_TERM_INDIRECT;
             param->why = beam_why;
         }
@@ -196,7 +196,7 @@ static rey_result image_slot(Builder *b, rey_xml_node *node, const EmitterParam 
     Param p = {PARAM_DEFAULTS, .theta = at, .count = (int32_t)count, .dims = 3, .shape = {image.height, image.width, 3},
                .low = row->low, .unit = row->unit, .terms = REY_TERM_INTERIOR, .description = row->text,
                .texture = *out};
-    if (result == REY_OK && (at < 0 || *out < 0 || !source || rey_scene_add_param(scene, path, p) < 0)) {
+    if (result == REY_OK && (at < 0 || *out < 0 || !source || build_texture_param(b, path, p) < 0)) {
         result = REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {

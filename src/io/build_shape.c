@@ -289,23 +289,6 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     return plugin->kind == SHAPE_SDFGRID ? build_sdfgrid(b, node, id, path, shape) : REY_OK;
 }
 
-static rey_result assign_group(Builder *b, ShapeRecord *shape) {
-    rey_scene *scene = b->scene;
-    Group g = {shape->bsdf, shape->emitter, shape->kind, shape->flags, shape->interior, shape->exterior};
-    for (size_t i = 0; i < scene->build.groups.count; i++) {
-        if (memcmp(&ARRAY_AT(scene->build.groups, Group, i), &g, sizeof g) == 0) {
-            shape->group = (int32_t)i;
-            return REY_OK;
-        }
-    }
-    shape->group = rey_scene_append(scene, &scene->build.groups, sizeof g, 1);
-    if (shape->group < 0) {
-        return REY_ERROR_MEMORY;
-    }
-    ARRAY_AT(scene->build.groups, Group, shape->group) = g;
-    return REY_OK;
-}
-
 // The scattering function and the light of a shape.
 static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
     char name[MAX_PATH_NAME];
@@ -350,7 +333,7 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
         build_join(name, path, "sensor");
         TRY(build_sensor(b, sensor->node, id, name));
     }
-    return assign_group(b, shape);
+    return build_group(b, shape);
 }
 
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {

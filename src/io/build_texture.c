@@ -33,6 +33,25 @@ static Param texture_param(TextureUse use, int32_t texture, int32_t theta, int64
                    .texture = texture};
 }
 
+int build_texture_param(Builder *b, const char *name, Param p) {
+    size_t texture = (size_t)(p.texture >= 0 ? p.texture : p.to_uv), known = b->texture_params.count;
+    if (texture >= known &&
+        !rey_array_push(b->ctx, &b->texture_params, sizeof(TextureParams), texture + 1 - known)) {
+        return -1;
+    }
+    int32_t *slot = ARRAY_AT(b->texture_params, TextureParams, texture).param;
+    int param = rey_scene_add_param(b->scene, name, p);
+    slot[slot[0] ? 1 : 0] = param + 1;
+    return param;
+}
+
+Param *build_param_of(Builder *b, int32_t texture, int k) {
+    int32_t param = k < TEXTURE_MOST_PARAMS && (size_t)texture < b->texture_params.count
+                        ? ARRAY_AT(b->texture_params, TextureParams, texture).param[k]
+                        : 0;
+    return param > 0 ? &ARRAY_AT(b->scene->params, Param, param - 1) : NULL;
+}
+
 // Parameters are differentiable where their derivative is not 0: an open range loses infinity, and bounds of 0 stay.
 rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, TextureUse use, const double *values,
                           int count, const char *path, int32_t *out) {
@@ -52,7 +71,7 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
     p.dims = count > 1;
     p.shape[0] = count;
     build_join(name, path, "value");
-    int param = rey_scene_add_param(b->scene, name, p);
+    int param = build_texture_param(b, name, p);
     if (param < 0) {
         return REY_ERROR_MEMORY;
     }
@@ -106,7 +125,7 @@ static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path,
         p.terms |= REY_TERM_PRIMARY;
         p.why = why;
     }
-    if (at < 0 || rey_scene_add_param(b->scene, name, p) < 0) {
+    if (at < 0 || build_texture_param(b, name, p) < 0) {
         return REY_ERROR_MEMORY;
     }
     float *theta = &ARRAY_AT(b->scene->build.theta, float, at);
@@ -149,7 +168,7 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
         p.shape[0] = image.height;
         p.shape[1] = image.width;
         p.shape[2] = image.channels;
-        int param = rey_scene_add_param(b->scene, name, p);
+        int param = build_texture_param(b, name, p);
         result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR && wrap != WRAP_CLAMP);
     }
     rey_image_free(b->ctx, &image);
@@ -194,12 +213,10 @@ static rey_result build_attribute(Builder *b, rey_xml_node *node, const char *pa
 
 // A texture that several slots share needs the terms of all of them.
 static void add_terms(Builder *b, int32_t texture, const TextureUse *use) {
-    for (size_t i = 0; i < b->scene->params.count; i++) {
-        Param *p = &ARRAY_AT(b->scene->params, Param, i);
-        if (p->texture == texture || p->to_uv == texture) {
-            p->terms |= use->terms;
-            p->why = use->why && !*p->why ? use->why : p->why;
-        }
+    Param *p;
+    for (int k = 0; (p = build_param_of(b, texture, k)); k++) {
+        p->terms |= use->terms;
+        p->why = use->why && !*p->why ? use->why : p->why;
     }
     for (int k = 0; k < 2; k++) {
         int32_t child = ARRAY_AT(b->scene->build.textures, TextureNode, texture).child[k];

@@ -22,25 +22,19 @@ Snapshot build_snapshot(const Builder *b) {
 
 static void take_back(Builder *b, const Snapshot *s) {
     rey_scene *scene = b->scene;
-    for (size_t i = s->params; i < scene->params.count; i++) {
-        rey_free(b->ctx, ARRAY_AT(scene->params, Param, i).name);
-    }
-    for (size_t i = s->aliases; i < scene->aliases.count; i++) {
-        rey_free(b->ctx, ARRAY_AT(scene->aliases, Alias, i).name);
-    }
     for (size_t i = s->named; i < b->named.count; i++) { // these objects may still be built by whoever else refers to them
         rey_xml_node *node = ARRAY_AT(b->named, rey_xml_node *, i);
         rey_free(b->ctx, ARRAY_AT(b->source->paths, char *, node->index));
         ARRAY_AT(b->source->paths, char *, node->index) = NULL;
         node->built = -1;
     }
-    scene->params.count = s->params;
-    scene->aliases.count = s->aliases;
+    rey_scene_forget_params(scene, s->params, s->aliases);
     b->source->textures.count = s->source_textures;
     b->source->shapes.count = s->source_shapes;
     b->source->attributes.count = s->source_attributes;
     b->attribute_uses.count = s->attribute_uses;
     b->named.count = s->named;
+    b->texture_params.count = b->texture_params.count < s->textures ? b->texture_params.count : s->textures;
     b->collection = s->collection;
     scene->view.collections = s->collections;
     if (scene->view.environment >= (int32_t)s->emitters) {

@@ -10,13 +10,15 @@ void build_join(char out[MAX_PATH_NAME], const char *a, const char *b) {
     snprintf(out, MAX_PATH_NAME, "%s%s%s", a, *a ? "." : "", b);
 }
 
-// Names every parameter below `from` under `to` as well.
-static rey_result alias_prefix(Builder *b, const char *from, const char *to) {
-    size_t length = strlen(from);
+// Names every parameter of a node, whose names begin with `from`, under `to` as well.
+static rey_result alias_prefix(Builder *b, const rey_xml_node *node, const char *from, const char *to) {
+    const NodeNames *names = &ARRAY_AT(b->names, NodeNames, node->index);
+    size_t length = strlen(from), params = names->params ? names->params : b->scene->params.count;
+    size_t aliases = names->params ? names->aliases : b->scene->aliases.count;
     if (strcmp(from, to) == 0) {
         return REY_OK;
     }
-    for (size_t i = 0; i < b->scene->params.count; i++) {
+    for (size_t i = names->first_param; i < params; i++) {
         const char *name = ARRAY_AT(b->scene->params, Param, i).name;
         if (strncmp(name, from, length) == 0 && name[length] == '.') {
             char alias[MAX_PATH_NAME];
@@ -24,7 +26,7 @@ static rey_result alias_prefix(Builder *b, const char *from, const char *to) {
             TRY(rey_scene_add_alias(b->scene, alias, (int)i));
         }
     }
-    for (size_t i = 0, n = b->scene->aliases.count; i < n; i++) {
+    for (size_t i = names->first_alias; i < aliases; i++) {
         Alias old = ARRAY_AT(b->scene->aliases, Alias, i);
         if (strncmp(old.name, from, length) == 0 && old.name[length] == '.') {
             char alias[MAX_PATH_NAME];
@@ -40,6 +42,8 @@ rey_result build_name(Builder *b, rey_xml_node *node, const char *path) {
     if (*kept) {
         return REY_OK;
     }
+    ARRAY_AT(b->names, NodeNames, node->index) =
+        (NodeNames){.first_param = b->scene->params.count, .first_alias = b->scene->aliases.count};
     rey_xml_node **named = rey_array_push(b->ctx, &b->named, sizeof *named, 1);
     if (named) {
         *named = node;
@@ -52,13 +56,16 @@ rey_result build_visit(Builder *b, rey_xml_node *node, const char *path, bool *f
     const char *former = ARRAY_AT(b->source->paths, char *, node->index);
     *first = node->built < 0;
     if (!*first) {
-        return former ? alias_prefix(b, former, path) : REY_OK;
+        return former ? alias_prefix(b, node, former, path) : REY_OK;
     }
     return build_name(b, node, path);
 }
 
 rey_result build_finish(Builder *b, rey_xml_node *node, const char *path) {
-    return node->id ? alias_prefix(b, path, node->id) : REY_OK;
+    NodeNames *names = &ARRAY_AT(b->names, NodeNames, node->index);
+    names->params = b->scene->params.count;
+    names->aliases = b->scene->aliases.count;
+    return node->id ? alias_prefix(b, node, path, node->id) : REY_OK;
 }
 
 rey_result build_pose(Builder *b, const double matrix[16], const char *path, Param p, int32_t *out) {
@@ -189,13 +196,18 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
     }
     if (result == REY_OK) {
         size_t nodes = (size_t)rey_xml_node_count(b.source->document);
-        result = rey_array_push(ctx, &b.source->paths, sizeof(char *), nodes) ? REY_OK : REY_ERROR_MEMORY;
+        bool room = rey_array_push(ctx, &b.source->paths, sizeof(char *), nodes) &&
+                    rey_array_push(ctx, &b.names, sizeof(NodeNames), nodes);
+        result = room ? REY_OK : REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {
         result = build_scene(&b);
     }
     rey_array_free(ctx, &b.attribute_uses);
     rey_array_free(ctx, &b.named);
+    rey_array_free(ctx, &b.names);
+    rey_array_free(ctx, &b.texture_params);
+    rey_free(ctx, b.groups.slots);
     if (result != REY_OK) {
         rey_scene_destroy(b.scene);
         return result;

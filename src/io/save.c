@@ -135,6 +135,8 @@ rey_result rey_mitsuba_save(const rey_scene *scene, const char *path) {
     rey_array_free(w.ctx, &w.edits);
     rey_free(w.ctx, w.declared);
     rey_free(w.ctx, w.first_edit);
+    rey_free(w.ctx, w.texture_sources);
+    rey_names_free(w.ctx, &w.paths);
     rey_array_free(w.ctx, &w.text);
     return result;
 }

@@ -8,6 +8,7 @@
 #include "shape/sdfgrid.h"
 #include "shape/shape.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const Param *param_at(const Writer *w, int i) {
@@ -21,36 +22,43 @@ static const float *theta(const Writer *w, int32_t at) {
 // ---- whose parameter it is ---------------------------------------------------------------------------------------
 
 static const TextureSource *find_texture(const Writer *w, int32_t texture) {
-    for (size_t i = 0; i < w->source->textures.count; i++) {
-        const TextureSource *s = &ARRAY_AT(w->source->textures, TextureSource, i);
-        if (s->texture == texture) {
-            return s;
-        }
-    }
-    return NULL;
+    int32_t source = w->texture_sources[texture];
+    return source >= 0 ? &ARRAY_AT(w->source->textures, TextureSource, source) : NULL;
 }
 
 static const ShapeRecord *find_shape(const Writer *w, const rey_xml_node *node) {
-    for (size_t i = 0; i < w->source->shapes.count; i++) {
-        ShapeSource s = ARRAY_AT(w->source->shapes, ShapeSource, i);
-        if (s.node == node) {
-            return w->scene->view.shapes + s.shape;
-        }
-    }
-    return NULL;
+    return w->scene->view.shapes + node->built;
+}
+
+static NamedItems paths_of(const Writer *w) {
+    return (NamedItems){&w->source->paths, sizeof(char *)};
 }
 
 // The node whose path and one more word are the parameter's name.
 static const rey_xml_node *find_by_name(const Writer *w, const char *name) {
     const char *dot = strrchr(name, '.');
+    char path[MAX_PATH_NAME];
     size_t length = dot ? (size_t)(dot - name) : 0;
+    snprintf(path, sizeof path, "%.*s", (int)length, name);
+    int32_t node = rey_names_find(&w->paths, paths_of(w), path);
+    return node >= 0 ? rey_xml_node_at(w->source->document, node) : NULL;
+}
+
+// Tables for the two questions above.
+static rey_result prepare_finding(Writer *w) {
+    size_t textures = (size_t)w->scene->view.textures_count;
+    w->texture_sources = rey_alloc_array(w->ctx, textures + 1, sizeof *w->texture_sources);
+    TRY(w->texture_sources ? REY_OK : REY_ERROR_MEMORY);
+    memset(w->texture_sources, 0xff, (textures + 1) * sizeof *w->texture_sources);
+    for (size_t i = w->source->textures.count; i > 0; i--) { // the first counts
+        w->texture_sources[ARRAY_AT(w->source->textures, TextureSource, i - 1).texture] = (int32_t)i - 1;
+    }
     for (size_t i = 0; i < w->source->paths.count; i++) {
-        const char *path = ARRAY_AT(w->source->paths, char *, i);
-        if (path && strncmp(path, name, length) == 0 && !path[length]) {
-            return rey_xml_node_at(w->source->document, (int)i);
+        if (ARRAY_AT(w->source->paths, char *, i)) {
+            TRY(rey_names_add(w->ctx, &w->paths, paths_of(w), (int32_t)i));
         }
     }
-    return NULL;
+    return REY_OK;
 }
 
 static bool is_texture_object(const Writer *w, const rey_xml_node *node) {
@@ -90,6 +98,7 @@ rey_result rey_save_find_edits(Writer *w) {
         return REY_ERROR_MEMORY;
     }
     memset(w->first_edit, 0xff, ((size_t)nodes + 1) * sizeof *w->first_edit);
+    TRY(prepare_finding(w));
     for (int i = (int)w->scene->params.count - 1; i >= 0; i--) { // each node's list comes out in the parameters' order
         if (param_at(w, i)->version == 0) {
             continue;

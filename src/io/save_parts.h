@@ -38,6 +38,8 @@ typedef struct Writer {
     Array files;             // DataFile
     Array edits;             // Edit
     int32_t *first_edit;     // per node: entry of `edits`, -1 = none
+    int32_t *texture_sources; // per texture: entry of the source's textures, -1 = none
+    Names paths;             // of nodes, by number
     int number;              // running number of the files that are written anew
     bool folder_made;
     uint8_t *declared;       // per node: the file holds it where it was declared, or where it was first referred to

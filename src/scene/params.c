@@ -3,13 +3,35 @@
 
 #include <string.h>
 
+static NamedItems params_of(const rey_scene *scene) {
+    return (NamedItems){&scene->params, sizeof(Param)};
+}
+
+static NamedItems aliases_of(const rey_scene *scene) {
+    return (NamedItems){&scene->aliases, sizeof(Alias)};
+}
+
+// Room at the end of an array whose items begin with a name, and that name's entry in the table; null on failure.
+static void *push_named(rey_scene *scene, Array *array, size_t item_bytes, Names *names, const char *name) {
+    char *copy = rey_strdup(scene->ctx, name);
+    void *item = copy ? rey_array_push(scene->ctx, array, item_bytes, 1) : NULL;
+    if (item) {
+        memcpy(item, &copy, sizeof copy);
+        if (rey_names_add(scene->ctx, names, (NamedItems){array, item_bytes}, (int32_t)array->count - 1) == REY_OK) {
+            return item;
+        }
+        array->count--;
+    }
+    rey_free(scene->ctx, copy);
+    return NULL;
+}
+
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param) {
-    param.name = rey_strdup(scene->ctx, name);
-    Param *p = param.name ? rey_array_push(scene->ctx, &scene->params, sizeof *p, 1) : NULL;
+    Param *p = push_named(scene, &scene->params, sizeof *p, &scene->param_names, name);
     if (!p) {
-        rey_free(scene->ctx, param.name);
         return -1;
     }
+    param.name = p->name;
     param.unit = param.unit ? param.unit : "";
     param.description = param.description ? param.description : "";
     param.why = param.why ? param.why : "";
@@ -21,14 +43,25 @@ rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param) {
     if (rey_param_find(scene, name) >= 0) {
         return REY_OK;
     }
-    char *copy = rey_strdup(scene->ctx, name);
-    Alias *alias = copy ? rey_array_push(scene->ctx, &scene->aliases, sizeof *alias, 1) : NULL;
+    Alias *alias = push_named(scene, &scene->aliases, sizeof *alias, &scene->alias_names, name);
     if (!alias) {
-        rey_free(scene->ctx, copy);
         return REY_ERROR_MEMORY;
     }
-    *alias = (Alias){copy, param};
+    alias->param = param;
     return REY_OK;
+}
+
+void rey_scene_forget_params(rey_scene *scene, size_t params, size_t aliases) {
+    for (; scene->params.count > params; scene->params.count--) {
+        int32_t last = (int32_t)scene->params.count - 1;
+        rey_names_remove(&scene->param_names, params_of(scene), last);
+        rey_free(scene->ctx, ARRAY_AT(scene->params, Param, last).name);
+    }
+    for (; scene->aliases.count > aliases; scene->aliases.count--) {
+        int32_t last = (int32_t)scene->aliases.count - 1;
+        rey_names_remove(&scene->alias_names, aliases_of(scene), last);
+        rey_free(scene->ctx, ARRAY_AT(scene->aliases, Alias, last).name);
+    }
 }
 
 static const Param *param_at(const rey_scene *scene, int i) {
@@ -60,17 +93,9 @@ int rey_param_find(const rey_scene *scene, const char *name) {
     if (!scene || !name) {
         return -1;
     }
-    for (size_t i = 0; i < scene->params.count; i++) {
-        if (strcmp(ARRAY_AT(scene->params, Param, i).name, name) == 0) {
-            return (int)i;
-        }
-    }
-    for (size_t i = 0; i < scene->aliases.count; i++) {
-        if (strcmp(ARRAY_AT(scene->aliases, Alias, i).name, name) == 0) {
-            return ARRAY_AT(scene->aliases, Alias, i).param;
-        }
-    }
-    return -1;
+    int32_t param = rey_names_find(&scene->param_names, params_of(scene), name);
+    int32_t alias = param < 0 ? rey_names_find(&scene->alias_names, aliases_of(scene), name) : -1;
+    return alias >= 0 ? ARRAY_AT(scene->aliases, Alias, alias).param : param;
 }
 
 static const char *param_word(void *user, int i) {

@@ -93,12 +93,9 @@ void rey_scene_destroy(rey_scene *scene) {
 #define ARRAY(type, name, comment) rey_array_free(ctx, &scene->build.name);
 #include "scene/arrays.inl"
 #undef ARRAY
-    for (size_t i = 0; i < scene->params.count; i++) {
-        rey_free(ctx, ARRAY_AT(scene->params, Param, i).name);
-    }
-    for (size_t i = 0; i < scene->aliases.count; i++) {
-        rey_free(ctx, ARRAY_AT(scene->aliases, Alias, i).name);
-    }
+    rey_names_free(ctx, &scene->param_names);
+    rey_names_free(ctx, &scene->alias_names);
+    rey_scene_forget_params(scene, 0, 0);
     for (size_t i = 0; i < scene->notes.count; i++) {
         rey_free(ctx, ARRAY_AT(scene->notes, char *, i));
     }

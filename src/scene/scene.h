@@ -1,7 +1,7 @@
 // scene.h: the flat scene. Records are plain 32-bit fields so that lanes can gather them; indices, no pointers.
 #pragma once
 
-#include "base/context.h"
+#include "scene/names.h"
 
 #include <math.h>
 
@@ -187,6 +187,7 @@ struct rey_scene {
     rey_context *ctx;
     SceneView view;
     Array params, aliases;
+    Names param_names, alias_names;
     Array channels;           // of Channel: what a picture holds behind R G B
     Array notes;              // of char *: what a user should know about how the scene was read
     // Loading: each array grows by itself; rey_scene_freeze moves all into the arena.
@@ -218,6 +219,8 @@ rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attri
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);
+// Forgets all parameters and aliases but the first so many.
+void rey_scene_forget_params(rey_scene *scene, size_t params, size_t aliases);
 // Writes a parameter's values after checking them, and counts its version up.
 rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count);
 // Marks the derived data of every parameter whose version is not the one that it was built from.
