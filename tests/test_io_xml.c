@@ -254,6 +254,50 @@ static void test_upgrade(void **state) {
     rey_xml_free(ctx, document);
 }
 
+// Names of 0.5 to 2.x that no version of today has.
+static void test_old_names(void **state) {
+    rey_context *ctx = *state;
+    rey_xml_document *document = read_text(
+        ctx, "<scene version='0.5.0'>"
+             "<film type='ldrfilm'><string name='fileFormat' value='png'/><float name='gamma' value='2.2'/>"
+             "<boolean name='banner' value='false'/><boolean name='highQualityEdges' value='true'/>"
+             "<string name='pixelFormat' value='luminanceAlpha'/></film>"
+             "<film type='hdrfilm'><float name='gamma' value='2.2'/><boolean name='attachLog' value='true'/></film>"
+             "<sampler type='halton'><integer name='scramble' value='3'/></sampler>"
+             "<integrator type='volpath_simple'><boolean name='strictNormals' value='false'/></integrator>"
+             "<integrator type='path'><boolean name='strictNormals' value='true'/></integrator>"
+             "<texture type='bitmap'><float name='gamma' value='1'/><string name='filterType' value='EWA'/></texture>"
+             "<texture type='vertexcolors'/>"
+             "<bsdf type='diffuse'><srgb name='reflectance' value='#ff8000'/>"
+             "<rgb name='other' intent='reflectance' value='0.5'/></bsdf></scene>");
+    rey_xml_node *node[8];
+    for (int i = 0; i < 8; i++) {
+        node[i] = rey_xml_root(document)->children[i].node;
+    }
+    assert_string_equal(node[0]->type, "hdrfilm");
+    assert_int_equal(node[0]->property_count, 2);
+    assert_true(rey_xml_find(node[0], "sample_border")->boolean);
+    assert_string_equal(rey_xml_find(node[0], "pixel_format")->string, "luminance_alpha");
+    assert_int_equal(node[1]->property_count, 1); // gamma is no property of this film
+    assert_string_equal(node[2]->type, "sobol");
+    assert_int_equal(node[2]->property_count, 0);
+    assert_string_equal(node[3]->type, "volpath");
+    assert_int_equal(node[3]->property_count, 0);
+    assert_non_null(rey_xml_find(node[4], "strict_normals")); // true would change the picture
+    assert_true(rey_xml_find(node[5], "raw")->boolean);
+    assert_string_equal(rey_xml_find(node[5], "filter_type")->string, "bilinear");
+    assert_string_equal(node[6]->type, "mesh_attribute");
+    assert_string_equal(rey_xml_find(node[6], "name")->string, "vertex_color");
+    const double *srgb = rey_xml_find(node[7], "reflectance")->vector;
+    assert_true(srgb[0] == 1 && fabs(srgb[1] - 0.21586050) < 1e-6 && srgb[2] == 0);
+    int notes = 0;
+    for (const char *note; (note = rey_xml_note(document, notes)); notes++) {
+        assert_true(strstr(note, "ldrfilm") || strstr(note, "tone") || strstr(note, "halton") || strstr(note, "ewa"));
+    }
+    assert_int_equal(notes, 4);
+    rey_xml_free(ctx, document);
+}
+
 static void test_locale(void **state) {
     rey_context *ctx = *state;
     if (!setlocale(LC_NUMERIC, "de_DE.UTF-8")) {
@@ -334,6 +378,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_substitution, setup, teardown),
         cmocka_unit_test_setup_teardown(test_files, setup, teardown),
         cmocka_unit_test_setup_teardown(test_upgrade, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_old_names, setup, teardown),
         cmocka_unit_test_setup_teardown(test_locale, setup, teardown),
         cmocka_unit_test_setup_teardown(test_conformance, setup, teardown),
     };

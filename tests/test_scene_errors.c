@@ -109,8 +109,49 @@ static void neighbours_are_named(void **state) {
         {"<shape typ='sphere'/>", "unknown attribute 'typ' of <shape>, did you mean 'type'?"},
         {"<shape type='spere'/>", "did you mean 'sphere'?"},
         {"<shap type='sphere'/>", "did you mean 'shape'?"},
+        {"<bsdf type='roughconductor'><string name='distribution' value='gggx'/></bsdf>",
+         "expected one of 'beckmann', 'ggx', did you mean 'ggx'?"},
+        {"<sensor type='perspective'><string name='fov_axis' value='smaler'/></sensor>", "did you mean 'smaller'?"},
+        {"<sensor type='perspective'><film type='hdrfim'/></sensor>", "there is no film 'hdrfim', did you mean 'hdrfilm'?"},
     };
     check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+static void what_is_missing_is_named(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<bsdf type='phong'/>", "bsdf 'phong' is not supported: 'roughplastic' and 'principled' are its nearest kinds"},
+        {"<bsdf type='ward'/>", "'ward' is not supported"},
+        {"<bsdf type='roughdiffuse'/>", "'roughdiffuse' is not supported: 'diffuse' is its limit of no roughness"},
+        {"<integrator type='bdpt'/>", "'bdpt' is not supported: 'path' renders the same light"},
+        {"<emitter type='sunsky'/>", "'sunsky' is not supported"},
+        {"<sensor type='spherical'/>", "'spherical' is not supported"},
+        {"<film type='specfilm'/>", "a film cannot stand at the top level"},
+        {"<sensor type='perspective'><film type='specfilm'/></sensor>", "'specfilm' is not supported"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+static void root_is_a_scene(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<html><body/></html>", "scene.xml:1:1: the root element is <html>, expected <scene version="},
+        {"<bsdf version='3.0.0' type='diffuse'/>", "scene.xml:1:1: the root element is <bsdf>, expected <scene>"},
+    };
+    rey_context *ctx = NULL;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        rey_scene *scene = NULL;
+        FILE *file = fopen(path, "w");
+        assert_non_null(file);
+        fputs(cases[i].text, file);
+        assert_int_equal(fclose(file), 0);
+        assert_int_equal(rey_scene_load(ctx, path, NULL, 0, &scene), REY_ERROR_SCENE);
+        if (!strstr(rey_error(ctx), cases[i].words)) {
+            fail_msg("'%s', expected '%s'", rey_error(ctx), cases[i].words);
+        }
+    }
+    rey_context_destroy(ctx);
 }
 
 #define TWOSIDED(nested) "<bsdf type='twosided'>" nested "</bsdf>"
@@ -194,6 +235,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_finite),
         cmocka_unit_test(neighbours_are_named),
+        cmocka_unit_test(what_is_missing_is_named),
+        cmocka_unit_test(root_is_a_scene),
         cmocka_unit_test(twosided_is_opaque),
         cmocka_unit_test(incomplete_scenes_do_not_render),
         cmocka_unit_test(folders_are_listed_once),

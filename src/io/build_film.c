@@ -11,6 +11,11 @@ static const char *filter_word(void *user, int i) {
     return i < COUNT_OF(words) ? words[i] : NULL;
 }
 
+static const char *film_word(void *user, int i) {
+    UNUSED(user);
+    return i < 1 ? "hdrfilm" : NULL;
+}
+
 enum { MOST_LOBES = 12 }; // more would need a finer table of the filter
 
 static rey_result build_filter(Builder *b, rey_xml_node *node, SensorRecord *s) {
@@ -100,8 +105,7 @@ rey_result build_film(Builder *b, rey_xml_node *node, SensorRecord *s) {
     s->width = 768;
     s->height = 576;
     if (node && strcmp(node->type, "hdrfilm") != 0) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "film '%s' is not supported, expected 'hdrfilm'",
-                            node->type);
+        return build_unknown(b, node, film_word, NULL);
     }
     if (node) {
         TRY(get_size(b, node, "width", 1, LARGEST, 768, &s->width));

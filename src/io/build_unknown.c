@@ -7,6 +7,11 @@ static const char no_polarisation[] = "light has no polarisation here";
 static const char no_media[] = "participating media are missing yet";
 static const char no_sky[] = "sky models are missing; a picture of one can be an 'envmap'";
 static const char no_splats[] = "volumetric primitives are missing";
+static const char same_light[] = "'path' renders the same light";
+static const char inner_alone[] = "the integrator inside it renders the same picture";
+static const char two_lobes[] = "'roughplastic' and 'principled' are its nearest kinds";
+static const char in_layers[] = "'plastic', 'roughplastic' and the clearcoat of 'principled' are the layers that there are";
+static const char no_lens[] = "'perspective', 'thinlens' and 'orthographic' are the cameras that there are";
 static const char missing[] = "it is missing yet";
 
 static const struct {
@@ -37,6 +42,43 @@ static const struct {
                {"sggx", no_media},
                {"prbvolpath", no_media},
                {"volume", missing},
+               {"roughdiffuse", "'diffuse' is its limit of no roughness"},
+               {"phong", two_lobes},
+               {"ward", two_lobes},
+               {"coating", in_layers},
+               {"roughcoating", in_layers},
+               {"mixturebsdf", "'blendbsdf' mixes two, and can stand in itself"},
+               {"difftrans", "'principledthin' with 'diff_trans' lets light through diffusely"},
+               {"hk", "'principledthin' is the nearest kind"},
+               {"irawan", "there is no model of cloth; 'principled' has a 'sheen'"},
+               {"bdpt", same_light},
+               {"photonmapper", same_light},
+               {"ppm", same_light},
+               {"sppm", same_light},
+               {"pssmlt", same_light},
+               {"mlt", same_light},
+               {"erpt", same_light},
+               {"vpl", same_light},
+               {"adaptive", inner_alone},
+               {"irrcache", inner_alone},
+               {"multichannel", "'aov' is the integrator of many channels"},
+               {"field", "'aov' shows such quantities"},
+               {"ao", "it is no light transport; a 'constant' light with max_depth 2 looks alike"},
+               {"prb_reparam", "'prb' is the integrator of today"},
+               {"direct_reparam", "'direct' is the integrator of today"},
+               {"emission_reparam", "'direct' is the integrator of today"},
+               {"telecentric", no_lens},
+               {"spherical", no_lens},
+               {"perspective_rdist", no_lens},
+               {"fluencemeter", "'irradiancemeter' and 'radiancemeter' are the meters that there are"},
+               {"sky", no_sky},
+               {"sun", no_sky},
+               {"collimated", "a beam without extent cannot be met; 'directionalarea' lights a surface's width"},
+               {"heightfield", "a mesh can take its place"},
+               {"gridtexture", "a picture of the grid can be a 'bitmap'"},
+               {"scale", "the numbers of the texture inside can be scaled instead"},
+               {"wireframe", missing},
+               {"curvature", missing},
                {"prb_basic", missing},
                {"direct_projective", missing},
                {"prb_projective", missing}};

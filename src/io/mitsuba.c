@@ -147,7 +147,7 @@ static rey_result build_scene(Builder *b) {
     rey_xml_node *root = rey_xml_root(b->source->document);
     int counts[REY_XML_TAG_COUNT] = {0};
     if (root->tag != REY_XML_SCENE) {
-        return rey_xml_fail(b->ctx, root->at, REY_ERROR_SCENE, "the root is a %s, expected a scene",
+        return rey_xml_fail(b->ctx, root->at, REY_ERROR_SCENE, "the root element is <%s>, expected <scene>",
                             rey_xml_tag_name(root->tag));
     }
     for (int i = 0; i < root->child_count; i++) {
@@ -156,6 +156,10 @@ static rey_result build_scene(Builder *b) {
         TRY(build_forgive(b, &s, child, "", build_child(b, child, counts), NULL));
     }
     TRY(build_default_integrator(b, root));
+    const char *note;
+    for (int i = 0; (note = rey_xml_note(b->source->document, i)); i++) {
+        TRY(rey_scene_add_note(b->scene, "%s", note));
+    }
     TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),

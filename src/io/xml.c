@@ -43,6 +43,7 @@ void rey_xml_free(rey_context *ctx, rey_xml_document *document) {
     }
     rey_array_free(ctx, &document->spectra);
     rey_array_free(ctx, &document->nodes);
+    rey_array_free(ctx, &document->notes);
     rey_array_free(ctx, &document->folders);
     rey_free(ctx, document->ids.slots);
     for (XmlBlock *block = document->blocks; block;) {
@@ -284,6 +285,10 @@ rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index) {
 
 rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id) {
     return rey_xml_lookup_id(&document->ids, id);
+}
+
+const char *rey_xml_note(const rey_xml_document *document, int index) {
+    return (size_t)index < document->notes.count ? ARRAY_AT(document->notes, const char *, index) : NULL;
 }
 
 const char *rey_xml_tag_name(rey_xml_tag tag) {

@@ -124,6 +124,7 @@ rey_xml_node *rey_xml_root(const rey_xml_document *document);
 int rey_xml_node_count(const rey_xml_document *document);
 rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index);      // order of declaration
 rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id); // ids and aliases; null if unknown
+const char *rey_xml_note(const rey_xml_document *document, int index); // what a user should know; null at the end
 const char *rey_xml_tag_name(rey_xml_tag tag);
 const char *rey_xml_kind_name(rey_xml_kind kind);
 

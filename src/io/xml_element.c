@@ -168,11 +168,12 @@ static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttrib
 
 static rey_result end_object(XmlFile *file, XmlFrame *frame) {
     XmlReader *reader = file->reader;
-    if (file->version[0] < 2) {
-        rey_result result = rey_xml_upgrade_object(reader, frame);
-        if (result) {
-            return result;
-        }
+    rey_result result = file->version[0] < 2 ? rey_xml_upgrade_object(reader, frame) : REY_OK;
+    if (!result) {
+        result = rey_xml_renew_object(reader, frame);
+    }
+    if (result) {
+        return result;
     }
     rey_xml_node *node = frame->node;
     size_t property_bytes = frame->properties.count * sizeof(rey_xml_property);

@@ -112,6 +112,16 @@ rey_result rey_xml_get_string(rey_context *ctx, const rey_xml_node *node, const 
     return result;
 }
 
+typedef struct Words {
+    const char *const *words;
+    int count;
+} Words;
+
+static const char *next_word(void *user, int i) {
+    const Words *list = user;
+    return i < list->count ? list->words[i] : NULL;
+}
+
 rey_result rey_xml_get_choice(rey_context *ctx, const rey_xml_node *node, const char *name, const char *const *words,
                               int count, int otherwise, int *out) {
     rey_xml_property *property;
@@ -130,8 +140,9 @@ rey_result rey_xml_get_choice(rey_context *ctx, const rey_xml_node *node, const 
         int written = snprintf(list + used, sizeof list - used, "%s'%s'", i ? ", " : "", words[i]);
         used += written > 0 && (size_t)written < sizeof list - used ? (size_t)written : 0;
     }
-    return rey_xml_fail(ctx, property->at, REY_ERROR_SCENE, "'%s' is '%.100s', expected one of %s", name,
-                        property->string, list);
+    Words known = {words, count};
+    return rey_xml_fail_word(ctx, property->at, property->string, next_word, &known,
+                             "'%s' is '%.100s', expected one of %s", name, property->string, list);
 }
 
 rey_result rey_xml_get_vec3(rey_context *ctx, const rey_xml_node *node, const char *name, const double otherwise[3],

@@ -18,6 +18,7 @@ static const XmlTag tags[] = {
     {"vector", XML_VALUE, REY_XML_VECTOR_VALUE, 1, {"name", "value", "x", "y", "z"}},
     {"point", XML_VALUE, REY_XML_VECTOR_VALUE, 1, {"name", "value", "x", "y", "z"}},
     {"rgb", XML_VALUE, REY_XML_RGB_VALUE, 2, {"name", "value"}},
+    {"srgb", XML_VALUE, REY_XML_RGB_VALUE, 2, {"name", "value"}}, // of version 0.x
     {"transform", XML_VALUE, REY_XML_TRANSFORM_VALUE, 1, {"name"}},
     {"translate", XML_OPERATION, XML_TRANSLATE, 0, {"value", "x", "y", "z"}},
     {"scale", XML_OPERATION, XML_SCALE, 0, {"value", "x", "y", "z"}},
@@ -50,12 +51,20 @@ rey_result rey_xml_find_tag(XmlFile *file, const char *name, bool has_type, cons
     if (file->version[0] < 2 && file->reader->frames.count > file->base && strcmp(name, "lookAt") == 0) {
         name = "lookat"; // spelling of version 0.x
     }
+    if (file->version[0] >= 2 && strcmp(name, "srgb") == 0) {
+        return rey_xml_fail(file->reader->ctx, rey_xml_element_position(file), REY_ERROR_SCENE,
+                            "<srgb> is a tag of version 0.x, expected <rgb> with linear components");
+    }
     bool typed_spectrum = has_type && strcmp(name, "spectrum") == 0;
     for (int i = 0; i < COUNT_OF(tags); i++) {
         if (strcmp(tags[i].name, name) == 0 && (!typed_spectrum || tags[i].class == XML_OBJECT)) {
             *out = &tags[i];
             return REY_OK;
         }
+    }
+    if (!file->parent && file->reader->frames.count == file->base) {
+        return rey_xml_fail(file->reader->ctx, rey_xml_element_position(file), REY_ERROR_SCENE,
+                            "the root element is <%.100s>, expected <scene version=\"3.0.0\">", name);
     }
     return rey_xml_fail_word(file->reader->ctx, rey_xml_element_position(file), name, next_tag, NULL,
                              "unknown tag <%.100s>, expected an object, a value, or one of ref, default, include, "
@@ -118,6 +127,9 @@ rey_result rey_xml_take_attributes(XmlFile *file, const XmlTag *tag, const char 
     out->count = 0;
     for (; given[0]; given += 2) {
         const char *name = given[0];
+        if (file->version[0] < 2 && strcmp(name, "intent") == 0 && tag->class == XML_VALUE) {
+            continue; // of version 0.x: the plugin decides what a colour is meant as
+        }
         if (!takes(tag, name) && !(extra && strcmp(extra, name) == 0)) {
             return rey_xml_fail_word(ctx, attribute_position(file, name), name, next_attribute, (void *)tag,
                                      "unknown attribute '%.100s' of <%s>", name, tag->name);

@@ -29,6 +29,7 @@ struct rey_xml_document {
     rey_xml_node *root;
     Array nodes;   // rey_xml_node *
     Array folders; // const char *, in the order of the <path> tags
+    Array notes;   // const char *, literals: what a user should know about how it was read
     Array spectra; // double *, data of spectra read from files
     XmlIds ids;
     const char *folder; // of the scene file
@@ -174,6 +175,8 @@ rey_result rey_xml_resolve_references(XmlReader *reader);
 // Files older than version 2 (xml_upgrade.c). The name is rewritten into memory of the document.
 rey_result rey_xml_upgrade_name(XmlReader *reader, const char **name);
 rey_result rey_xml_upgrade_object(XmlReader *reader, XmlFrame *frame);
+// Plugins and properties of older versions that have other names now (xml_old_names.c).
+rey_result rey_xml_renew_object(XmlReader *reader, XmlFrame *frame);
 
 rey_result rey_xml_fail_position(rey_context *ctx, rey_xml_position at, rey_result code, const char *format,
                                  va_list arguments);

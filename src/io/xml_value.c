@@ -1,8 +1,10 @@
 // xml_value.c: numbers, lists of numbers and spectra in attributes.
 #include "io/xml_parts.h"
 
+#include "io/image.h"
 #include "io/number.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -156,6 +158,28 @@ static rey_result read_float(XmlReader *reader, const XmlAttribute *value, doubl
     return rey_parse_single(end, &end, out) && !*skip_blanks(end) ? REY_OK : fail_value(reader, value, "a number up to 3.4e38");
 }
 
+// Components in the sRGB curve, as numbers or as #rrggbb.
+static rey_result read_srgb(XmlReader *reader, const XmlAttributes *attributes, double out[3]) {
+    const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
+    rey_result result = REY_OK;
+    if (value->value[0] == '#') {
+        const char *digits = value->value + 1;
+        unsigned long bits = strtoul(digits, NULL, 16);
+        if (strlen(digits) != 6 || strspn(digits, "0123456789abcdefABCDEF") != 6) {
+            return fail_value(reader, value, "#rrggbb or three numbers");
+        }
+        for (int i = 0; i < 3; i++) {
+            out[i] = (double)(bits >> (16 - 8 * i) & 0xff) / 255;
+        }
+    } else {
+        result = rey_xml_read_vector(reader, attributes, 0, out);
+    }
+    for (int i = 0; i < 3; i++) {
+        out[i] = (double)rey_srgb_decode((float)out[i]);
+    }
+    return result;
+}
+
 rey_result rey_xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAttributes *attributes,
                               rey_xml_property *property) {
     const XmlAttribute *value = rey_xml_attribute_named(attributes, "value");
@@ -169,8 +193,12 @@ rey_result rey_xml_read_value(XmlReader *reader, const XmlTag *tag, const XmlAtt
     case REY_XML_STRING_VALUE:
         property->string = rey_xml_keep_text(reader->ctx, reader->document, value->value, strlen(value->value));
         return property->string ? REY_OK : REY_ERROR_MEMORY;
-    case REY_XML_VECTOR_VALUE:
     case REY_XML_RGB_VALUE:
+        if (strcmp(tag->name, "srgb") == 0) {
+            return read_srgb(reader, attributes, property->vector);
+        }
+        return rey_xml_read_vector(reader, attributes, 0, property->vector);
+    case REY_XML_VECTOR_VALUE:
         return rey_xml_read_vector(reader, attributes, 0, property->vector);
     case REY_XML_SPECTRUM_VALUE:
         return read_spectrum(reader, attributes, property);
