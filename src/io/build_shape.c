@@ -2,6 +2,7 @@
 #include "io/build.h"
 #include "io/lenient.h"
 #include "io/build_attribute.h"
+#include "io/build_parts.h"
 #include "shape/shape.h"
 #include "shape/update.h"
 
@@ -84,9 +85,9 @@ static void mesh_transform(rey_mesh *mesh, const double m[16]) {
     }
 }
 
-// *smooth: the normals were computed here.
-static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh, bool *smooth) {
+rey_result build_load_mesh(Builder *b, rey_xml_node *node, rey_mesh *mesh, bool *smooth) {
     char *file = NULL;
+    *smooth = false;
     bool obj = strcmp(node->type, "obj") == 0, ply = strcmp(node->type, "ply") == 0, flip, flat;
     int64_t index = 0;
     double pose[16];
@@ -116,7 +117,7 @@ static rey_result mesh_load(Builder *b, rey_xml_node *node, rey_mesh *mesh, bool
     return REY_OK;
 }
 
-static rey_result copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const char *path, ShapeRecord *shape) {
+rey_result build_copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const char *path, ShapeRecord *shape) {
     rey_scene *scene = b->scene;
     int64_t v = mesh->vertex_count, f = mesh->face_count;
     Param positions = {PARAM_DEFAULTS, .unit = "scene units", .description = "vertex positions", .terms = GEOMETRY_TERMS,
@@ -158,10 +159,10 @@ static rey_result copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const 
 static rey_result build_mesh(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
     rey_mesh mesh = {0};
     bool smooth = false;
-    rey_result result = mesh_load(b, node, &mesh, &smooth);
+    rey_result result = build_load_mesh(b, node, &mesh, &smooth);
     if (result == REY_OK) {
         shape->flags |= smooth ? SHAPE_SMOOTH_NORMALS : 0;
-        result = copy_mesh(b, &mesh, id, path, shape);
+        result = build_copy_mesh(b, &mesh, id, path, shape);
     }
     rey_mesh_free(b->ctx, &mesh);
     return result;
@@ -289,11 +290,11 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     return plugin->kind == SHAPE_SDFGRID ? build_sdfgrid(b, node, id, path, shape) : REY_OK;
 }
 
-// The scattering function and the light of a shape.
-static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
+rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, int32_t id, const char *path,
+                         ShapeRecord *shape) {
     char name[MAX_PATH_NAME];
-    if (rey_xml_count_children(node, REY_XML_BIT(REY_XML_BSDF)) > 1 ||
-        rey_xml_count_children(node, REY_XML_BIT(REY_XML_EMITTER)) > 1) {
+    bool several = rey_xml_count_children(node, REY_XML_BIT(REY_XML_BSDF)) > 1 && !build_has_parts(node);
+    if (several || rey_xml_count_children(node, REY_XML_BIT(REY_XML_EMITTER)) > 1) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape can have one bsdf and one emitter");
     }
     rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
@@ -301,7 +302,6 @@ static rey_result build_surface(Builder *b, rey_xml_node *node, int32_t id, cons
         Snapshot s = build_snapshot(b);
         TRY(build_forgive(b, &s, medium, "", build_unknown(b, medium->node, build_medium_word, NULL), NULL));
     }
-    rey_xml_child *bsdf = rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0);
     rey_xml_child *emitter = rey_xml_child_of(node, REY_XML_BIT(REY_XML_EMITTER), 0);
     rey_xml_child *sensor = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SENSOR), 0);
     build_join(name, path, "bsdf");
@@ -351,13 +351,18 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     bool first, flip;
     double weight;
     TRY(build_visit(b, node, path, &first));
+    TRY(rey_xml_get_bool(b->ctx, node, "flip_normals", false, &flip));
+    TRY(rey_xml_get_float(b->ctx, node, "silhouette_sampling_weight", 1, &weight));
+    shape.flags = (flip ? SHAPE_FLIP_NORMALS : 0) | (b->collection >= 0 ? SHAPE_INSTANCED : 0) | b->shape_flags;
+    if (build_has_parts(node)) {
+        TRY(build_parts(b, node, path, shape));
+        TRY(build_check_unused(b, node));
+        return build_finish(b, node, path);
+    }
     int32_t id = rey_scene_append(b->scene, &b->scene->build.shapes, sizeof shape, 1);
     if (id < 0) {
         return REY_ERROR_MEMORY;
     }
-    TRY(rey_xml_get_bool(b->ctx, node, "flip_normals", false, &flip));
-    TRY(rey_xml_get_float(b->ctx, node, "silhouette_sampling_weight", 1, &weight));
-    shape.flags = (flip ? SHAPE_FLIP_NORMALS : 0) | (b->collection >= 0 ? SHAPE_INSTANCED : 0) | b->shape_flags;
     if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
         TRY(build_mesh(b, node, id, path, &shape));
     } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {
@@ -367,7 +372,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     } else {
         return build_unknown(b, node, shape_word, NULL);
     }
-    TRY(build_surface(b, node, id, path, &shape));
+    TRY(build_surface(b, node, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0), id, path, &shape));
     ARRAY_AT(b->scene->build.shapes, ShapeRecord, id) = shape;
     ShapeSource *source = rey_array_push(b->ctx, &b->source->shapes, sizeof *source, 1);
     if (!source) {
