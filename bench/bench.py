@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reynolds against itself: rates, ratios of widths, threads and modes, start-up and memory, as medians of interleaved
+"""Reynolds against itself: rates, ratios of widths, threads and modes, loading and memory, as medians of interleaved
 repeats in one run. All are ratios of wall time.
 
 usage: bench.py [--reynolds BINARY] [--repeats N] [--folder DIR]"""
@@ -8,7 +8,6 @@ import json
 import os
 import statistics
 import subprocess
-import time
 
 import scenes
 
@@ -25,10 +24,11 @@ def main():
     options = parser.parse_args()
     reynolds = os.path.abspath(options.reynolds)
     print("%-11s %10s %10s %8s %8s %8s %8s %8s %8s %9s %8s" % (
-        "scene", "Mpaths/s", "Mrays/s", "embree", "w16/w1", "w8/w1", "2t/1t", "rev/pri", "fwd/pri", "start ms", "MB"))
+        "scene", "Mpaths/s", "Mrays/s", "embree", "w16/w1", "w8/w1", "2t/1t", "rev/pri", "fwd/pri", "load ms", "MB"))
     for name, scene in scenes.make(options.folder).items():
         path = scene.path
-        settings = ["--spp", "16"] + [x for k, v in scene.defines.items() for x in ("-D", "%s=%s" % (k, v))]
+        defines = [x for k, v in scene.defines.items() for x in ("-D", "%s=%s" % (k, v))]
+        settings = ["--spp", "16"] + defines
         render = ["render", path, "-o", os.path.join(options.folder, "out.exr")] + settings
         grad = ["grad", path, "--param", scene.parameters[0]] + settings
         commands = {"w16": render, "w8": render + ["--lanes", "8"], "w1": render + ["--lanes", "1"],
@@ -39,9 +39,7 @@ def main():
         for _ in range(options.repeats):
             for key, command in commands.items():
                 results[key].append(run(reynolds, *command))
-            begin = time.time()
-            run(reynolds, "info", path)
-            start.append(time.time() - begin)
+            start.append(run(reynolds, "info", path, *defines)["load_seconds"])
         median = {key: statistics.median(r["seconds"] for r in rows) for key, rows in results.items()}
         first = results["w16"][0]
         rate = first["paths"] / median["w16"] / 1e6

@@ -1,7 +1,8 @@
 """Reynolds beside Mitsuba 3 (llvm_ad_rgb): the same scenes, depths and roulette, in turn; the peer warmed up and at its
 best sample count per call. A ratio is printed only when both pictures agree within their noise.
 
-usage: peer.py [REYNOLDS [SCENE...]]"""
+usage: peer.py [--rows loading,cold,...] [REYNOLDS [SCENE...]]"""
+import argparse
 import json
 import os
 import statistics
@@ -17,7 +18,13 @@ REPEATS = 3
 SIZE = 512
 SPP = 16
 FOLDER = "build/bench"
-REYNOLDS = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build/bin/reynolds")
+ROWS = ("primal", "equal_error", "gradients", "cold", "loading")
+parser = argparse.ArgumentParser()
+parser.add_argument("--rows", default=",".join(ROWS))
+parser.add_argument("reynolds", nargs="?", default="build/bin/reynolds")
+parser.add_argument("scenes", nargs="*")
+OPTIONS = parser.parse_args()
+REYNOLDS = os.path.abspath(OPTIONS.reynolds)
 ROW = "%-11s %-34s %12s %12s %8s"
 
 COLD = """
@@ -26,6 +33,17 @@ mi.set_variant('llvm_ad_rgb')
 scene = mi.load_file('%s', **%r)
 mi.util.write_bitmap('%s', mi.render(scene, spp=%d))
 print([line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')][0])
+"""
+
+LOAD = """
+import time
+import mitsuba as mi
+mi.set_variant('%s')
+import drjit as dr
+start = time.time()
+scene = mi.load_file('%s', **%r)
+dr.sync_thread()
+print(time.time() - start)
 """
 
 
@@ -91,6 +109,15 @@ class Pair:
         result = reynolds("render", self.scene.path, *defines(self.scene), "-o", self.out, "--spp", str(spp), "--seed",
                           str(seed), *more)
         return result, np.load(self.out)
+
+    def loading(self):
+        """From the file to a scene that can be rendered, the first time in a process, in two of the peer's variants."""
+        mine = statistics.median(reynolds("info", self.scene.path, *defines(self.scene))["load_seconds"] for _ in range(REPEATS))
+        for variant in ("scalar_rgb", "llvm_ad_rgb"):
+            command = [sys.executable, "-c", LOAD % (variant, self.scene.path, self.scene.defines)]
+            theirs = statistics.median(float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+                                       for _ in range(REPEATS))
+            self.row("loading [1/s], %s, %.0f and %.0f ms" % (variant[:4], 1e3 * theirs, 1e3 * mine), 1 / theirs, 1 / mine)
 
     def primal(self):
         rate = 0
@@ -185,13 +212,11 @@ def main():
     print("Mitsuba %s beside Reynolds, %d threads; a ratio above 1 is in favour of Reynolds" % (mi.__version__, os.cpu_count()))
     print(ROW % ("scene", "what", "peer", "ours", "ratio"))
     for name, scene in scenes.make(FOLDER).items():
-        if len(sys.argv) > 2 and name not in sys.argv[2:]:
+        if OPTIONS.scenes and name not in OPTIONS.scenes:
             continue
         pair = Pair(mi, dr, name, scene)
-        pair.primal()
-        pair.equal_error()
-        pair.gradients()
-        pair.cold()
+        for row in OPTIONS.rows.split(","):
+            getattr(pair, row)()
         del pair
         dr.flush_malloc_cache()
 

@@ -112,6 +112,7 @@ typedef struct Session {
     rey_scene *scene;
     rey_render_def def; // spp, seed, sensor, sampler, terms and progress filled in
     int width, height;  // of the picture of the sensor
+    double load_seconds; // from the file to a scene that can be rendered
     Progress progress;
 } Session;
 

@@ -2,6 +2,7 @@
 #include "cli.h"
 
 #include "base/context.h"
+#include "base/parallel.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -183,6 +184,8 @@ static void print_info_json(const Session *s) {
     for (int i = 0; i < COUNT_ROWS; i++) {
         json_integer(&json, rows[i].name, rows[i].value);
     }
+    json_number(&json, "load_seconds", s->load_seconds);
+    json_number(&json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
     json_array(&json, "bounds");
     for (int i = 0; i < 6; i++) {
         json_number(&json, NULL, info.bounds[i]);

@@ -165,8 +165,10 @@ static rey_result load_scene(Session *s) {
     if (result) {
         return result;
     }
+    double start = rey_seconds();
     result = (o->lenient ? rey_scene_load_lenient : rey_scene_load)(s->ctx, o->files[0], o->defines, o->define_count,
                                                                     &s->scene);
+    s->load_seconds = rey_seconds() - start;
     if (result) {
         return result;
     }
@@ -242,6 +244,7 @@ void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) 
     double seconds = stats->seconds;
     json_number(json, "seconds", seconds);
     json_number(json, "seconds_total", cli_seconds_total());
+    json_number(json, "load_seconds", session->load_seconds);
     json_integer(json, "paths", stats->paths);
     json_integer(json, "rays", stats->rays);
     json_number(json, "paths_per_second", seconds > 0 ? (double)stats->paths / seconds : 0);

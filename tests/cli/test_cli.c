@@ -93,7 +93,8 @@ static void failures_exit_with_one(void **state) {
 }
 
 static const char *const render_keys[] = {"seconds",         "seconds_total", "paths",   "rays", "paths_per_second",
-                                          "rays_per_second", "peak_rss_mb",   "threads", "lanes"};
+                                          "rays_per_second", "peak_rss_mb",   "threads", "lanes",
+                                          "load_seconds"};
 
 static void expect_render_keys(const JsonNode *node) {
     for (size_t i = 0; i < sizeof render_keys / sizeof render_keys[0]; i++) {
