@@ -57,7 +57,8 @@ typedef struct rey_context_def {
     int threads;     /* worker threads, 0 (default) = as many as the affinity mask and cgroup quota allow; more than
                         4 for each of those (16 at least) cost memory and help nobody, so that fewer run */
     int lanes;       /* SIMD width of the kernels: 1, 8, 16; 0 (default) = the widest this machine runs */
-    void *(*alloc)(void *user, size_t bytes, size_t alignment); /* default: the C library's */
+    void *(*alloc)(void *user, size_t bytes, size_t alignment); /* default: the C library's; several threads may call
+                                                                   it at once, unless `threads` is 1 */
     void (*release)(void *user, void *memory);                  /* frees what alloc returned */
     void *user;                                                 /* passed to alloc and release */
 } rey_context_def;

@@ -63,6 +63,7 @@ typedef struct Builder {
     rey_context *ctx;
     rey_scene *scene;
     SceneSource *source;
+    struct LoadAhead *ahead; // files that were read already, null = none
     Array attribute_uses; // of AttributeUse
     Array names;          // of NodeNames, per node
     Array texture_params; // of TextureParams, per texture

@@ -2,7 +2,7 @@
 #include "emitter/table.h"
 #include "io/build.h"
 #include "io/lenient.h"
-#include "io/image.h"
+#include "io/load.h"
 
 #include <string.h>
 
@@ -140,52 +140,11 @@ static rey_result fov_slot(Builder *b, rey_xml_node *node, int32_t picture, int3
 
 // ---- environment pictures ----------------------------------------------------------------------------------------
 
-// At least 2 columns and 3 rows: the last ones are repeated.
-static rey_result envmap_pad(Builder *b, rey_image *image) {
-    int width = image->width < 2 ? 2 : image->width, height = image->height < 3 ? 3 : image->height;
-    if (width == image->width && height == image->height) {
-        return REY_OK;
-    }
-    float *data = rey_alloc_array(b->ctx, (size_t)width * (size_t)height * 3, sizeof *data);
-    if (!data) {
-        return REY_ERROR_MEMORY;
-    }
-    for (int64_t i = 0; i < (int64_t)width * height; i++) {
-        int64_t x = i % width < image->width ? i % width : image->width - 1;
-        int64_t y = i / width < image->height ? i / width : image->height - 1;
-        memcpy(data + 3 * i, image->data + 3 * (y * image->width + x), 3 * sizeof *data);
-    }
-    rey_free(b->ctx, image->data);
-    image->data = data;
-    image->width = width;
-    image->height = height;
-    return REY_OK;
-}
-
-// The environment image: RGB, finite, not negative.
-static rey_result envmap_load(Builder *b, rey_xml_node *node, rey_image *image) {
-    char *file = NULL;
-    TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
-    rey_result result = rey_image_read(b->ctx, file, image);
-    rey_free(b->ctx, file);
-    TRY(result);
-    TRY(rey_image_to_rgb(b->ctx, image));
-    if (image->srgb) {
-        rey_image_decode_srgb(image);
-    }
-    for (int64_t i = 0; i < (int64_t)image->width * image->height * 3; i++) {
-        if (!isfinite(image->data[i]) || image->data[i] < 0) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_FORMAT,
-                                "the environment image has a value that is negative or not finite");
-        }
-    }
-    return envmap_pad(b, image);
-}
-
 static rey_result image_slot(Builder *b, rey_xml_node *node, const EmitterParam *row, const char *path, int32_t *out) {
     rey_scene *scene = b->scene;
-    rey_image image = {0};
-    rey_result result = envmap_load(b, node, &image);
+    LoadedFile file;
+    rey_result result = load_take(b->ctx, b->source->document, b->ahead, node, &file);
+    const rey_image image = file.image;
     int64_t count = (int64_t)image.width * image.height * 3;
     if (result == REY_OK && count > INT32_MAX) {
         result = rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "the environment image has more than 2^31 values");
@@ -206,7 +165,7 @@ static rey_result image_slot(Builder *b, rey_xml_node *node, const EmitterParam 
             (TextureNode){.kind = TEXTURE_BITMAP, .theta = at, .width = image.width, .height = image.height,
                           .channels = 3, .filter = FILTER_BILINEAR, .to_uv = -1, .child = {-1, -1}};
     }
-    rey_image_free(b->ctx, &image);
+    load_free(b->ctx, &file);
     return result;
 }
 

@@ -3,6 +3,7 @@
 #include "io/lenient.h"
 #include "io/build_attribute.h"
 #include "io/build_parts.h"
+#include "io/load.h"
 #include "shape/shape.h"
 #include "shape/update.h"
 
@@ -41,80 +42,12 @@ static rey_result vertex_param(Builder *b, const char *path, const char *name, c
     return rey_scene_add_alias(b->scene, full, param);
 }
 
-static double determinant(const double m[16]) {
-    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-           m[2] * (m[4] * m[9] - m[5] * m[8]);
-}
-
-// World vertices; normals by the cofactor matrix, which is the inverse transpose up to a positive factor once its sign
-// follows the determinant's; a mirroring pose turns the winding over so that outside stays outside.
-static void mesh_transform(rey_mesh *mesh, const double m[16]) {
-    static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    bool mirrored = determinant(m) < 0;
-    if (memcmp(m, identity, sizeof identity) == 0) {
-        return; // a saved scene reads back to the same bits
-    }
-    for (int64_t i = 0; i < mesh->vertex_count; i++) {
-        float *p = mesh->positions + 3 * i;
-        double x = p[0], y = p[1], z = p[2];
-        for (int k = 0; k < 3; k++) {
-            p[k] = (float)(m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z + m[4 * k + 3]);
-        }
-        if (mesh->normals) {
-            float *n = mesh->normals + 3 * i;
-            double v[3] = {n[0], n[1], n[2]}, r[3], length = 0;
-            for (int k = 0; k < 3; k++) {
-                int a = (k + 1) % 3, c = (k + 2) % 3;
-                r[k] = 0;
-                for (int j = 0; j < 3; j++) {
-                    int d = (j + 1) % 3, e = (j + 2) % 3;
-                    r[k] += (m[4 * a + d] * m[4 * c + e] - m[4 * a + e] * m[4 * c + d]) * v[j];
-                }
-                length += r[k] * r[k];
-            }
-            double scale = length > 0 ? (mirrored ? -1 : 1) / sqrt(length) : 0;
-            for (int k = 0; k < 3; k++) {
-                n[k] = (float)(r[k] * scale);
-            }
-        }
-    }
-    for (int64_t i = 0; i < mesh->face_count && mirrored; i++) {
-        uint32_t *f = mesh->faces + 3 * i, first = f[1];
-        f[1] = f[2];
-        f[2] = first;
-    }
-}
-
 rey_result build_load_mesh(Builder *b, rey_xml_node *node, rey_mesh *mesh, bool *smooth) {
-    char *file = NULL;
-    *smooth = false;
-    bool obj = strcmp(node->type, "obj") == 0, ply = strcmp(node->type, "ply") == 0, flip, flat;
-    int64_t index = 0;
-    double pose[16];
-    TRY(rey_xml_get_bool(b->ctx, node, "flip_tex_coords", obj, &flip));
-    TRY(rey_xml_get_bool(b->ctx, node, "face_normals", false, &flat));
-    TRY(rey_xml_get_transform(b->ctx, node, "to_world", pose));
-    if (!obj && !ply) {
-        TRY(rey_xml_get_int(b->ctx, node, "shape_index", 0, 1 << 20, 0, &index));
-    }
-    if (determinant(pose) == 0) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
-    }
-    TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
-    rey_result result = obj   ? rey_mesh_read_obj(b->ctx, file, flip, mesh)
-                        : ply ? rey_mesh_read_ply(b->ctx, file, flip, mesh)
-                              : rey_mesh_read_serialized(b->ctx, file, (int)index, mesh);
-    rey_free(b->ctx, file);
-    TRY(result);
-    mesh_transform(mesh, pose);
-    if (flat || mesh->had_face_normals) {
-        rey_free(b->ctx, mesh->normals);
-        mesh->normals = NULL;
-    } else if (!mesh->normals) {
-        *smooth = true;
-        TRY(rey_mesh_compute_normals(b->ctx, mesh));
-    }
-    return REY_OK;
+    LoadedFile file;
+    rey_result result = load_take(b->ctx, b->source->document, b->ahead, node, &file);
+    *mesh = file.mesh;
+    *smooth = file.smooth_normals;
+    return result;
 }
 
 rey_result build_copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const char *path, ShapeRecord *shape) {
@@ -269,7 +202,7 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     if (plugin) {
         TRY(posed_fold(b, node, plugin, m));
     }
-    if (determinant(m) == 0) {
+    if (rey_matrix_determinant(m) == 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
     }
     Param pose = {PARAM_DEFAULTS, .terms = GEOMETRY_TERMS, .why = moving_why, .geometry = id};
@@ -278,7 +211,7 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
         return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
     }
     shape->kind = plugin->kind;
-    if (plugin->kind == SHAPE_SPHERE && determinant(m) < 0) {
+    if (plugin->kind == SHAPE_SPHERE && rey_matrix_determinant(m) < 0) {
         shape->flags ^= SHAPE_FLIP_NORMALS;
     }
     // Embree reads a sphere's centre and radius from here by one load of 16 bytes, which must be aligned.
@@ -363,7 +296,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     if (id < 0) {
         return REY_ERROR_MEMORY;
     }
-    if (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 || strcmp(node->type, "serialized") == 0) {
+    if (load_kind(node) == FILE_MESH) {
         TRY(build_mesh(b, node, id, path, &shape));
     } else if (strcmp(node->type, "rectangle") == 0 || strcmp(node->type, "cube") == 0 || posed_plugin(node->type)) {
         TRY(build_posed(b, node, id, path, &shape));

@@ -1,7 +1,7 @@
 // build_texture.c: textures and constants of the scene, with their parameters.
 #include "io/build.h"
 #include "io/lenient.h"
-#include "io/image.h"
+#include "io/load.h"
 
 #include <string.h>
 
@@ -86,29 +86,6 @@ rey_result build_number(Builder *b, float value, int32_t *out) {
     return REY_OK;
 }
 
-// The image's values: RGB or one channel, linear.
-static rey_result bitmap_load(Builder *b, rey_xml_node *node, rey_image *image) {
-    char *path = NULL;
-    bool raw;
-    TRY(rey_xml_get_bool(b->ctx, node, "raw", false, &raw));
-    TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &path));
-    rey_result result = rey_image_read(b->ctx, path, image);
-    rey_free(b->ctx, path);
-    TRY(result);
-    if (image->channels != 1) {
-        result = rey_image_to_rgb(b->ctx, image);
-    }
-    if (result == REY_OK && image->srgb && !raw) {
-        rey_image_decode_srgb(image);
-    }
-    for (int64_t i = 0; i < (int64_t)image->width * image->height * image->channels && result == REY_OK; i++) {
-        if (!isfinite(image->data[i])) {
-            result = rey_xml_fail(b->ctx, node->at, REY_ERROR_FORMAT, "the image has a value that is not finite");
-        }
-    }
-    return result;
-}
-
 static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path, int32_t texture, bool smooth) {
     static const char *const why = "nearest texels and clamped borders jump where uv moves across them";
     double m[6];
@@ -142,12 +119,13 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
     static const char *const formats[] = {"auto", "variant", "float16", "uint8"};
     int filter, wrap, format;
     bool accel;
-    rey_image image = {0};
+    LoadedFile file;
     TRY(rey_xml_get_choice(b->ctx, node, "filter_type", filters, 2, FILTER_BILINEAR, &filter));
     TRY(rey_xml_get_choice(b->ctx, node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
     TRY(rey_xml_get_choice(b->ctx, node, "format", formats, 4, 0, &format));
     TRY(rey_xml_get_bool(b->ctx, node, "accel", true, &accel));
-    rey_result result = bitmap_load(b, node, &image);
+    rey_result result = load_take(b->ctx, b->source->document, b->ahead, node, &file);
+    const rey_image image = file.image;
     float *theta;
     int64_t count = (int64_t)image.width * image.height * image.channels;
     if (result == REY_OK) {
@@ -171,7 +149,7 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
         int param = build_texture_param(b, name, p);
         result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR && wrap != WRAP_CLAMP);
     }
-    rey_image_free(b->ctx, &image);
+    load_free(b->ctx, &file);
     return result == REY_OK ? build_note_source(b, node, NULL, *out) : result;
 }
 

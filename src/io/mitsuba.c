@@ -1,6 +1,7 @@
 // mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
 #include "io/build.h"
 #include "io/lenient.h"
+#include "io/load.h"
 #include "io/mitsuba.h"
 
 #include <stdio.h>
@@ -205,8 +206,12 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         result = room ? REY_OK : REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {
+        result = load_ahead(ctx, b.source->document, &b.ahead);
+    }
+    if (result == REY_OK) {
         result = build_scene(&b);
     }
+    load_ahead_free(ctx, b.ahead);
     rey_array_free(ctx, &b.attribute_uses);
     rey_array_free(ctx, &b.named);
     rey_array_free(ctx, &b.names);

@@ -25,3 +25,8 @@ bool rey_affine_inverse(const float m[16], double r[12]) {
     }
     return true;
 }
+
+double rey_matrix_determinant(const double m[16]) {
+    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+           m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
