@@ -6,6 +6,7 @@
 typedef struct ParticleJob {
     PathJob job;            // its tile is all of the film; film: sums of filter weight times flux per pixel
     int64_t first, count;   // of the particles, in their numbering
+    double share;           // of the film's adjoint that a particle's flux has: 1 / pixels
 } ParticleJob;
 
 // The kernels of every width.

@@ -52,7 +52,7 @@ typedef struct Records {
 } Records;
 
 // Tags of path vertices.
-enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL };
+enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL, VERTEX_LIGHT };
 
 // A run of recorded vertices that share tag and group; `count` lanes of the LANES from `first` on are alive.
 typedef struct RecordBatch {

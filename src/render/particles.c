@@ -1,5 +1,5 @@
 // particles.c: the pass of light tracing: particles are cut into shards, each with a film of its own that covers the whole
-// picture, and the films are added up in the order of the shards.
+// picture, or a gradient, and these are added up in the order of the shards.
 #include "base/parallel.h"
 #include "math/rng.h"
 #include "render/particles.h"
@@ -9,11 +9,17 @@
 #include <string.h>
 
 // Shards of the particles: fixed, so that sums do not depend on the threads. Large pictures have fewer, for memory's sake.
+// Mixed into the scramble of the pass from the camera.
+enum { PARTICLES = 2 };
+
 enum { MOST_SHARDS = 8, FEWEST_SHARDS = 2, SHARD_PIXELS = 1 << 25 };
 
 typedef struct Particles {
     Render *r;
+    FilmPlan plan;
+    uint32_t scramble;
     int64_t per_shard, total;
+    double *films;
 } Particles;
 
 bool rey_traces_particles(const rey_scene *scene) {
@@ -48,54 +54,101 @@ static void particle_unit(void *argument, int64_t shard, int worker) {
     ParticleJob p = {.job = r->job, .first = shard * particles->per_shard};
     int64_t left = particles->total - p.first;
     p.count = left < particles->per_shard ? left : particles->per_shard;
-    p.job.x = r->plan.x;
-    p.job.y = r->plan.y;
-    p.job.width = r->plan.width;
-    p.job.height = r->plan.height;
-    p.job.film = r->films + shard * r->plan.tile_floats;
+    p.share = 1.0 / ((double)particles->plan.width * particles->plan.height);
+    p.job.scene = &r->scene->view;
+    p.job.x = particles->plan.x;
+    p.job.y = particles->plan.y;
+    p.job.width = particles->plan.width;
+    p.job.height = particles->plan.height;
+    p.job.scramble = particles->scramble;
+    p.job.film = particles->films ? particles->films + shard * particles->plan.tile_floats : NULL;
+    p.job.gradient = r->gradients ? r->gradients + shard * r->gradient_size : NULL;
     if (p.count > 0) {
         rey_render_run(r, &p.job, &p, worker);
     }
 }
 
 // Adds the shards' films to the first.
-static void sum_films(Render *r) {
-    for (int32_t s = 1; s < r->shards; s++) {
-        const double *film = r->films + s * r->plan.tile_floats;
-        for (int64_t i = 0; i < r->plan.tile_floats; i++) {
-            r->films[i] += film[i];
+static void sum_films(const Particles *p, int32_t shards) {
+    for (int32_t s = 1; s < shards; s++) {
+        const double *film = p->films + s * p->plan.tile_floats;
+        for (int64_t i = 0; i < p->plan.tile_floats; i++) {
+            p->films[i] += film[i];
         }
     }
 }
 
-static rey_result run(Render *r, const rey_render_def *def, double *picture) {
+static bool have_workspaces(Render *r, int32_t shards) {
     rey_context *ctx = r->scene->ctx;
-    int64_t pixels = (int64_t)r->plan.width * r->plan.height;
-    Particles particles = {r, 0, pixels * r->def.spp};
-    plan_whole(&r->plan);
-    r->shards = (int32_t)(SHARD_PIXELS / pixels);
-    r->shards = r->shards > MOST_SHARDS ? MOST_SHARDS : r->shards < FEWEST_SHARDS ? FEWEST_SHARDS : r->shards;
-    particles.per_shard = (particles.total + r->shards - 1) / r->shards;
-    rey_free(ctx, r->films);
-    r->films = rey_alloc_array(ctx, (size_t)r->shards * (size_t)r->plan.tile_floats, sizeof(double));
-    for (int i = 0; i < ctx->def.threads && i < r->shards; i++) {
+    for (int i = 0; i < ctx->def.threads && i < shards; i++) {
         r->workspaces[i] = r->workspaces[i] ? r->workspaces[i] : rey_alloc(ctx, r->job.workspace_bytes);
         if (!r->workspaces[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+int32_t rey_particle_shards(const Render *r) {
+    int64_t shards = SHARD_PIXELS / ((int64_t)r->plan.width * r->plan.height);
+    return shards > MOST_SHARDS ? MOST_SHARDS : shards < FEWEST_SHARDS ? FEWEST_SHARDS : (int32_t)shards;
+}
+
+rey_result rey_particles_run(Render *r, double *picture) {
+    rey_context *ctx = r->scene->ctx;
+    Particles particles = {.r = r, .plan = r->plan, .scramble = rng_mix(r->job.scramble, PARTICLES)};
+    int32_t shards = r->gradients ? r->shards : rey_particle_shards(r);
+    plan_whole(&particles.plan);
+    particles.total = (int64_t)r->plan.width * r->plan.height * r->job.spp;
+    particles.per_shard = (particles.total + shards - 1) / shards;
+    if (!have_workspaces(r, shards)) {
+        return REY_ERROR_MEMORY;
+    }
+    if (picture) {
+        particles.films = rey_alloc_array(ctx, (size_t)shards * (size_t)particles.plan.tile_floats, sizeof(double));
+        if (!particles.films) {
             return REY_ERROR_MEMORY;
         }
     }
-    if (!r->films) {
-        return REY_ERROR_MEMORY;
-    }
-    r->job.spp = r->def.spp;
-    r->job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 2);
-    r->total = r->shards;
     if (r->scene->view.emitters_count > 0) {
-        rey_parallel_for(ctx->def.threads, r->shards, particle_unit, &particles);
+        rey_parallel_for(ctx->def.threads, shards, particle_unit, &particles);
     }
-    sum_films(r);
-    rey_film_merge(&r->plan, r->films, r->columns, r->rows, 1.0 / (double)particles.total, picture);
+    if (picture) {
+        sum_films(&particles, shards);
+        rey_film_merge(&particles.plan, particles.films, r->columns, r->rows, 1.0 / (double)particles.total, picture);
+        rey_free(ctx, particles.films);
+    }
     return REY_OK;
+}
+
+// Refuses what moves the places that particles are connected through.
+static rey_result check_selection(const rey_scene *scene, rey_selection selection) {
+    for (int i = 0; i < selection.count; i++) {
+        const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
+        if (p->texture < 0 && p->to_uv < 0 && p->attribute < 0 && p->normals < 0) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "the gradient of %s needs how places move that light tracing reaches, which does not exist: the "
+                            "integrator 'ptracer' has derivatives of materials, textures and radiance",
+                            p->name);
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_particles_begin(Render *r, rey_selection selection) {
+    rey_scene *scene = r->scene;
+    int32_t depth = scene->view.max_depth;
+    rey_result result = check_sensor(scene, &r->def);
+    if (result == REY_OK) {
+        result = check_selection(scene, selection);
+    }
+    if (depth < 0 || depth > 1) {
+        r->particles = true;
+        r->lights = scene->view;
+        r->lights.max_depth = 1;
+        r->job.scene = &r->lights;
+    }
+    return result;
 }
 
 rey_result rey_render_particles(rey_scene *scene, const rey_render_def *def, int part, int parts, double *picture,
@@ -109,7 +162,10 @@ rey_result rey_render_particles(rey_scene *scene, const rey_render_def *def, int
         result = check_sensor(scene, def);
     }
     if (result == REY_OK) {
-        result = run(&r, def, picture);
+        r.total = rey_particle_shards(&r);
+        r.job.spp = r.def.spp;
+        r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
+        result = rey_particles_run(&r, picture);
     }
     return rey_render_end(&r, result, start, stats);
 }

@@ -317,12 +317,15 @@ static bool selection_given(rey_selection selection) {
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
                                    int32_t mode) {
     rey_result result = rey_render_begin(r, scene, def, mode, 3);
-    if (result == REY_OK && (scene->view.colour_is_depth || rey_traces_particles(scene))) {
+    if (result == REY_OK && scene->view.colour_is_depth) {
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
                           "the integrator '%s' has no derivatives, 'path' has", scene->integrator);
     }
     if (result == REY_OK) {
         result = check_terms(scene, def, selection);
+    }
+    if (result == REY_OK && rey_traces_particles(scene)) {
+        result = rey_particles_begin(r, selection);
     }
     return result == REY_OK ? map_selection(r, selection) : result;
 }
@@ -380,13 +383,14 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
         result = r.gradients ? REY_OK : REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {
-        r.total = (double)r.tiles * def->sets;
+        r.total = (r.tiles + (r.particles ? r.shards : 0.0)) * def->sets;
         r.job.spp = set_spp(&r);
         memset(gradient, 0, (size_t)r.gradient_size * sizeof *gradient);
-        for (int set = 0; set < def->sets && !r.cancelled; set++) {
+        for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(r.gradients, 0, (size_t)r.gradient_size * (size_t)r.shards * sizeof *r.gradients);
             r.job.scramble = set_scramble(&r, set);
             rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
+            result = r.particles ? rey_particles_run(&r, NULL) : REY_OK;
             for (int64_t i = 0; i < r.gradient_size; i++) {
                 double sum = 0;
                 for (int32_t k = 0; k < r.shards; k++) {
@@ -422,14 +426,15 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
     if (result == REY_OK) {
         double *sum = pictures, *one = pictures + n;
         r.job.tangent = tangent;
-        r.total = (double)r.tiles * def->sets;
+        r.total = (r.tiles + (r.particles ? (double)rey_particle_shards(&r) : 0)) * def->sets;
         r.job.spp = set_spp(&r);
-        for (int set = 0; set < def->sets && !r.cancelled; set++) {
+        for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(one, 0, (size_t)n * sizeof *one);
             memset(r.films, 0, (size_t)r.tiles * (size_t)r.plan.tile_floats * sizeof *r.films);
             r.job.scramble = set_scramble(&r, set);
             rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
             collect_films(&r, r.job.spp, one);
+            result = r.particles ? rey_particles_run(&r, one) : REY_OK;
             double mean = 0;
             for (int64_t i = 0; i < n; i++) {
                 sum[i] += one[i] / def->sets;

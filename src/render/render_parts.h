@@ -15,6 +15,8 @@ typedef struct Render {
     FilmPlan plan;
     PathJob job;           // what all units share
     int32_t tiles, shards;
+    bool particles;        // light tracing follows what the sensor sees of lights directly
+    SceneView lights;      // then: the scene for paths of one segment
     void **workspaces;     // one per worker
     double *films;         // primal and forward: one per tile
     double *squares;       // the same of second moments, or null

@@ -3,6 +3,7 @@
 
 #include "base/parallel.h"
 #include "math/rng.h"
+#include "render/particles.h"
 #include "render/render_parts.h"
 #include "render/update.h"
 
@@ -20,6 +21,9 @@ rey_result rey_replay(rey_scene *scene, rey_scene *moved, const rey_render_def *
         return result;
     }
     result = rey_render_begin(&r, scene, def, MODE_REPLAY, 3);
+    if (result == REY_OK && rey_traces_particles(scene)) {
+        result = rey_particles_begin(&r, (rey_selection){NULL, 0});
+    }
     if (result == REY_OK) {
         numbers = (int64_t)r.plan.sensor->crop_width * r.plan.sensor->crop_height * 3;
         picture = rey_alloc_array(scene->ctx, (size_t)numbers, sizeof *picture);
@@ -29,9 +33,12 @@ rey_result rey_replay(rey_scene *scene, rey_scene *moved, const rey_render_def *
         r.job.moved = &moved->view;
         r.job.spp = r.def.spp;
         r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
-        r.total = r.tiles;
+        r.total = r.tiles + (r.particles ? rey_particle_shards(&r) : 0);
         rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
         rey_film_merge(&r.plan, r.films, r.columns, r.rows, 1.0 / r.def.spp, picture);
+        if (r.particles) {
+            result = rey_particles_run(&r, picture);
+        }
         for (int64_t i = 0; i < numbers; i++) {
             image[i] = (float)picture[i];
         }

@@ -1,0 +1,82 @@
+// particle_sight.h: the sensor looked up backwards: where on the film a point of the scene is seen, from which direction,
+// and what it is worth there.
+#pragma once
+
+#include "integrator/stages.h"
+
+// The sensor, ready to be looked up backwards.
+typedef struct Pinhole {
+    Vec3 origin;
+    real to_local[9];       // rows of the inverse of the pose's linear part
+    real tangent, aspect, shift_x, shift_y;
+    real density;           // pixels per area of the film at depth 1, or of the film in the world
+    bool parallel;          // orthographic
+    Vec3 axis;              // of an orthographic sensor, unit
+} Pinhole;
+
+static void pinhole_invert(const float *m, Pinhole *p, double *det) {
+    double a[9];
+    for (int i = 0; i < 9; i++) {
+        a[i] = (double)m[i / 3 * 4 + i % 3];
+    }
+    double c[9] = {a[4] * a[8] - a[5] * a[7], a[2] * a[7] - a[1] * a[8], a[1] * a[5] - a[2] * a[4],
+                   a[5] * a[6] - a[3] * a[8], a[0] * a[8] - a[2] * a[6], a[2] * a[3] - a[0] * a[5],
+                   a[3] * a[7] - a[4] * a[6], a[1] * a[6] - a[0] * a[7], a[0] * a[4] - a[1] * a[3]};
+    *det = a[0] * c[0] + a[1] * c[3] + a[2] * c[6];
+    for (int i = 0; i < 9; i++) {
+        p->to_local[i] = (real)(c[i] / *det);
+    }
+}
+
+static Pinhole pinhole_make(const SceneView *scene, const SensorRecord *s) {
+    const float *m = scene->theta + s->to_world;
+    Pinhole p = {.origin = v3(f_set(m[3]), f_set(m[7]), f_set(m[11])), .aspect = (real)s->width / (real)s->height};
+    double det, pixels = (double)s->width * s->height, aspect = (double)p.aspect;
+    pinhole_invert(m, &p, &det);
+    p.parallel = s->kind == SENSOR_ORTHOGRAPHIC;
+    if (p.parallel) {
+        Vec3 x = v3(f_set(m[0]), f_set(m[4]), f_set(m[8])), y = v3(f_set(m[1]), f_set(m[5]), f_set(m[9]));
+        p.tangent = 1;
+        p.axis = v3_normalize(v3(f_set(m[2]), f_set(m[6]), f_set(m[10])));
+        p.density = (real)(pixels * aspect / 4) / f_lane(v3_length(v3_cross(x, y)), 0);
+        return p;
+    }
+    p.tangent = (real)tan(0.5 * 3.14159265358979323846 / 180 * (double)scene->theta[s->fov]);
+    p.shift_x = (real)scene->theta[s->principal];
+    p.shift_y = (real)scene->theta[s->principal + 1];
+    p.density = (real)(pixels * aspect / (4 * (double)p.tangent * (double)p.tangent));
+    return p;
+}
+
+// How a point is seen: where on the film, from which direction, and the pixels per area of a facing surface there.
+typedef struct Sight {
+    Float x, y, density, length; // length: of the ray up to the near plane
+    Vec3 d;
+    Mask valid;
+} Sight;
+
+KFN Sight pinhole_look(const Pinhole *p, const SensorRecord *s, Vec3 point) {
+    Vec3 q = v3_sub(point, p->origin), local;
+    const real *r = p->to_local;
+    local = v3(r[0] * q.x + r[1] * q.y + r[2] * q.z, r[3] * q.x + r[4] * q.y + r[5] * q.z,
+               r[6] * q.x + r[7] * q.y + r[8] * q.z);
+    Mask inside = m_ge(local.z, f_set(s->near_clip)) & m_le(local.z, f_set(s->far_clip));
+    Float z = f_select(inside, local.z, f_set(1)), scale = p->parallel ? f_set(1) : p->tangent * z;
+    Float distance2 = v3_dot(q, q), distance = f_sqrt(distance2);
+    Sight e;
+    e.x = ((1.0f - local.x / scale) * 0.5f - p->shift_x) * (real)s->width;
+    e.y = ((1.0f - local.y * p->aspect / scale) * 0.5f - p->shift_y) * (real)s->height;
+    if (p->parallel) {
+        e.d = v3_neg(p->axis);
+        e.length = (z - s->near_clip) * (v3_dot(q, p->axis) / z);
+        e.density = f_set(p->density);
+    } else {
+        // A pixel's solid angle is its area at depth 1 times the cube of the cosine; and the surface is that far away.
+        Float cosine = z / f_select(inside, distance, f_set(1));
+        e.d = v3_scale(q, -f_safe_rcp(distance));
+        e.length = distance - s->near_clip / cosine;
+        e.density = p->density * f_safe_rcp(cosine * cosine * cosine * distance2);
+    }
+    e.valid = inside;
+    return e;
+}

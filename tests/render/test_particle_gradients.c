@@ -1,0 +1,211 @@
+// Derivatives of light tracing: reverse against forward mode, against differences along the same particles, and against
+// the path tracer's; the same bits for any number of threads; what is refused.
+#include "render/replay.h"
+#include "rooms.h"
+
+#include <stdlib.h>
+
+enum { LARGEST = 1024, SETS = 16 };
+
+// What moves no light, and jumps nowhere in this scene.
+static int all_local(Room room, int *params) {
+    int n = 0;
+    for (int i = 0; i < rey_param_count(room.scene); i++) {
+        rey_param_info info;
+        rey_param_get_info(room.scene, i, &info);
+        if (has_interior(room, i) && !strstr(info.name, "to_world")) {
+            params[n++] = i;
+        }
+    }
+    return n;
+}
+
+static void random_numbers(float *x, int64_t n, uint64_t random) {
+    for (int64_t i = 0; i < n; i++) {
+        x[i] = (float)uniform(&random);
+    }
+}
+
+static void test_reverse_is_forward(void **state) {
+    UNUSED(state);
+    static float tangent[LARGEST], image[NUMBERS], adjoint[NUMBERS];
+    static double gradient[LARGEST];
+    Room room = room_open("particles.xml", 2, 0);
+    int params[128], count = all_local(room, params);
+    rey_selection selection = {params, count};
+    assert_true(rey_selection_size(room.scene, selection) <= LARGEST);
+    rey_render_def def = def_make(16, 3, 2);
+    random_numbers(adjoint, NUMBERS, 5);
+    random_numbers(tangent, LARGEST, 6);
+    ok(room, rey_vjp(room.scene, &def, selection, adjoint, gradient, NULL, NULL));
+    int64_t at = 0;
+    for (int k = 0; k < count; k++) {
+        rey_param_info info;
+        rey_param_get_info(room.scene, params[k], &info);
+        double reverse = 0, forward = 0, scale = 0;
+        for (int64_t i = at; i < at + info.count; i++) {
+            reverse += (double)tangent[i] * gradient[i];
+            scale += fabs((double)tangent[i] * gradient[i]);
+        }
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){params + k, 1}, tangent + at, image, NULL, NULL));
+        for (int i = 0; i < NUMBERS; i++) {
+            forward += (double)image[i] * (double)adjoint[i];
+        }
+        if (fabs(forward - reverse) > 1e-4 * scale) {
+            fail_msg("%s: forward %.9g, reverse %.9g", info.name, forward, reverse);
+        }
+        if (!(scale > 0)) {
+            fail_msg("%s: the derivative is 0", info.name);
+        }
+        at += info.count;
+    }
+    room_close(room);
+}
+
+// Sums over the picture, with weights.
+static double weighed(const float *image, const float *weights) {
+    double sum = 0;
+    for (int i = 0; i < NUMBERS; i++) {
+        sum += (double)image[i] * (double)weights[i];
+    }
+    return sum;
+}
+
+// Along the same particles nothing jumps, so that differences are as good as their step.
+static void test_differences(void **state) {
+    UNUSED(state);
+    static float tangent[LARGEST], values[LARGEST], image[NUMBERS], weights[NUMBERS];
+    Room room = room_open("particles.xml", 2, 0), moved = room_open("particles.xml", 2, 0);
+    int params[128], count = all_local(room, params);
+    rey_render_def def = def_make(16, 7, 1);
+    random_numbers(weights, NUMBERS, 8);
+    random_numbers(tangent, LARGEST, 9);
+    for (int k = 0; k < count; k++) {
+        rey_param_info info;
+        rey_param_get_info(room.scene, params[k], &info);
+        if (!rey_can_replay(room.scene, params[k])) {
+            continue;
+        }
+        const float *start = rey_param_values(room.scene, params[k]);
+        double quotient[2], scale = 0, weighed_level = 0;
+        for (int i = 0; i < info.count; i++) {
+            scale = fmax(scale, fabs((double)start[i]));
+        }
+        // One-sided: many values lie at the end of their range.
+        const double h = (strstr(info.name, "to_uv") ? 1e-3 : 0.01) * (scale > 0 ? scale : 1);
+        for (int side = 0; side < 2; side++) {
+            double level[3];
+            for (int j = 0; j < 3; j++) {
+                for (int i = 0; i < info.count; i++) {
+                    float step = (float)(h * j / (side + 1)) * tangent[i];
+                    values[i] = start[i] + (start[i] + 2 * step > info.high ? -step : step);
+                }
+                ok(moved, rey_param_set(moved.scene, params[k], values, info.count));
+                ok(room, rey_replay(room.scene, moved.scene, &def, image, NULL));
+                level[j] = weighed(image, weights);
+                weighed_level = level[0];
+            }
+            quotient[side] = (-1.5 * level[0] + 2 * level[1] - 0.5 * level[2]) / (h / (side + 1));
+        }
+        ok(moved, rey_param_set(moved.scene, params[k], start, info.count));
+        float along[LARGEST];
+        for (int i = 0; i < info.count; i++) {
+            along[i] = start[i] + 2 * (float)h * tangent[i] > info.high ? -tangent[i] : tangent[i];
+        }
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){params + k, 1}, along, image, NULL, NULL));
+        double derivative = weighed(image, weights), expected = (4 * quotient[1] - quotient[0]) / 3;
+        double rounding = 1e-6 * weighed_level / h;
+        double slack = fabs(quotient[1] - quotient[0]) + 1e-3 * fabs(expected) + rounding;
+        if (!(fabs(derivative - expected) <= slack)) {
+            fail_msg("%s: derivative %.9g, difference %.9g", info.name, derivative, expected);
+        }
+    }
+    room_close(moved);
+    room_close(room);
+}
+
+// Every entry of the gradient, with its standard error, for light carried either way.
+static void test_path_gradient(void **state) {
+    UNUSED(state);
+    static const char *const files[] = {"particles.xml", "particles_path.xml"};
+    static float adjoint[NUMBERS];
+    static double gradient[2][LARGEST], sets[SETS * LARGEST], error2[2][LARGEST];
+    int64_t size = 0;
+    Room room = {0};
+    random_numbers(adjoint, NUMBERS, 10);
+    for (int k = 0; k < 2; k++) {
+        room = room_open(files[k], 2, 0);
+        int params[128], count = all_local(room, params);
+        rey_selection selection = {params, count};
+        size = rey_selection_size(room.scene, selection);
+        rey_render_def def = def_make(64 * SETS, 23, SETS);
+        def.sampler = REY_SAMPLER_INDEPENDENT; // sets are then independent numbers
+        ok(room, rey_vjp(room.scene, &def, selection, adjoint, gradient[k], sets, NULL));
+        for (int64_t i = 0; i < size; i++) {
+            error2[k][i] = 0;
+            for (int s = 0; s < SETS; s++) {
+                double d = sets[s * size + i] - gradient[k][i];
+                error2[k][i] += d * d / (SETS * (SETS - 1));
+            }
+        }
+        room_close(room);
+    }
+    double worst = 0, square = 0;
+    int judged = 0;
+    for (int64_t i = 0; i < size; i++) {
+        // What few particles bring has no error to speak of: texels of the sky behind everything.
+        if (fabs(gradient[1][i]) < 0.3) {
+            continue;
+        }
+        double z = (gradient[0][i] - gradient[1][i]) / sqrt(error2[0][i] + error2[1][i] + 1e-12);
+        worst = fmax(worst, fabs(z));
+        square += z * z;
+        judged++;
+    }
+    print_message("%d of %d entries: worst z %.2f, mean square %.2f\n", judged, (int)size, worst, square / judged);
+    assert_true(judged > 150 && worst < 5.5 && square < 2 * judged);
+}
+
+static void test_threads(void **state) {
+    UNUSED(state);
+    static float adjoint[NUMBERS], tangent[LARGEST], image[3][NUMBERS];
+    static double gradient[3][LARGEST];
+    random_numbers(adjoint, NUMBERS, 12);
+    random_numbers(tangent, LARGEST, 13);
+    for (int k = 0; k < 3; k++) {
+        Room room = room_open("particles.xml", 2 * k + 1, 0);
+        int params[128], count = all_local(room, params);
+        rey_selection selection = {params, count};
+        rey_render_def def = def_make(8, 14, 2);
+        ok(room, rey_vjp(room.scene, &def, selection, adjoint, gradient[k], NULL, NULL));
+        ok(room, rey_jvp(room.scene, &def, selection, tangent, image[k], NULL, NULL));
+        room_close(room);
+        assert_memory_equal(gradient[k], gradient[0], sizeof gradient[0]);
+        assert_memory_equal(image[k], image[0], sizeof image[0]);
+    }
+}
+
+// Where lights lie decides which places particles reach.
+static void test_places_are_refused(void **state) {
+    UNUSED(state);
+    static float adjoint[NUMBERS];
+    double gradient[16];
+    Room room = room_open("particles.xml", 1, 0);
+    rey_render_def def = def_make(1, 0, 1);
+    static const char *const names[] = {"bulb.position", "sun.to_world", "sky.to_world"};
+    for (int i = 0; i < COUNT_OF(names); i++) {
+        int param = rey_param_find(room.scene, names[i]);
+        assert_true(param >= 0);
+        assert_int_equal(rey_vjp(room.scene, &def, (rey_selection){&param, 1}, adjoint, gradient, NULL, NULL),
+                         REY_ERROR_INCOMPLETE);
+        assert_non_null(strstr(rey_error(room.ctx), "light tracing"));
+    }
+    room_close(room);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_reverse_is_forward), cmocka_unit_test(test_differences),
+                                       cmocka_unit_test(test_path_gradient), cmocka_unit_test(test_threads),
+                                       cmocka_unit_test(test_places_are_refused)};
+    return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
+}
