@@ -1,4 +1,4 @@
-// particle.h: light tracing: particles start on lights, scatter, and every vertex is connected to the pinhole of the
+// particle.h: light tracing: particles start on lights, scatter, and every vertex is connected to a point of the
 // sensor, so that contributions carry a film position of their own. Paths of at least two segments; what the sensor sees
 // of lights directly is left to a camera pass. The weights are those of the path tracer read backwards, shading normals
 // included [veach1997 section 5.3]. In derivative modes every vertex is recorded for particle_adj.h.
@@ -94,11 +94,25 @@ KFN void record_sight(Tracer *t, int32_t record, const Sight *sight, Vec3 d, Flo
     spec_store(r->light_f, record, f);
 }
 
+KFN Sight particle_look(const Tracer *t, const Pinhole *pinhole, const Landing *at, int32_t bounce) {
+    Vec2 u = {f_set(0), f_set(0)};
+    if (t->sensor->kind == SENSOR_PERSPECTIVE || t->sensor->kind == SENSOR_ORTHOGRAPHIC) {
+        return camera_look(pinhole, t->scene, t->sensor, at->si.p, u);
+    }
+    // The vertices of particles sample no lights.
+    SampleKey key = slot_key(t, at->v.slot);
+    u = rng_2d(&key, dimension(bounce + 1, PURPOSE_LIGHT));
+    return t->sensor->kind == SENSOR_BATCH
+               ? batch_look(t->scene, t->sensor, at->si.p, rng_1d(&key, dimension(bounce + 1, PURPOSE_LIGHT_CHOICE)), u)
+               : single_look(pinhole, t->scene, t->sensor, at->si.p, u);
+}
+
 // Adds what the vertices send to the sensor: with F = f |cos| as the path tracer has it, for a viewer at the sensor,
 // beta F |ng . wc| / |ng . wl| x pixels per area.
-static void particle_connect(Tracer *t, const Pinhole *pinhole, const Landing *at, int32_t record) {
+static void particle_connect(Tracer *t, const Pinhole *pinhole, const Landing *at, int32_t bounce,
+                             int32_t record) {
     const PathJob *job = t->job;
-    Sight sight = pinhole_look(pinhole, t->sensor, at->si.p);
+    Sight sight = particle_look(t, pinhole, at, bounce);
     Mask m = at->v.m & sight.valid & m_gt(at->cosine, f_set(0)) & m_ge(sight.x, f_set((real)job->x)) &
              m_lt(sight.x, f_set((real)(job->x + job->width))) & m_ge(sight.y, f_set((real)job->y)) &
              m_lt(sight.y, f_set((real)(job->y + job->height)));
@@ -210,7 +224,7 @@ static int32_t particle_batch(Tracer *t, const Pinhole *pinhole, int32_t group_i
         at.call.surface = &at.surface;
     }
     if (!scene->hide_emitters || group->emitter < 0) {
-        particle_connect(t, pinhole, &at, record);
+        particle_connect(t, pinhole, &at, bounce, record);
     }
     return ends ? next_count : particle_scatter(t, &at, bounce, record, next_count);
 }

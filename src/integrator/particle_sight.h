@@ -3,6 +3,7 @@
 #pragma once
 
 #include "integrator/stages.h"
+#include "math/warp.h"
 
 // The sensor, ready to be looked up backwards.
 typedef struct Pinhole {
@@ -28,7 +29,11 @@ static void pinhole_invert(const float *m, Pinhole *p, double *det) {
     }
 }
 
+// Sensors without a pinhole, and batches, which have several, get one that nobody looks through.
 static Pinhole pinhole_make(const SceneView *scene, const SensorRecord *s) {
+    if (s->kind == SENSOR_IRRADIANCEMETER || s->kind == SENSOR_BATCH) {
+        return (Pinhole){.tangent = 1, .aspect = 1};
+    }
     const float *m = scene->theta + s->to_world;
     Pinhole p = {.origin = v3(f_set(m[3]), f_set(m[7]), f_set(m[11])), .aspect = (real)s->width / (real)s->height};
     double det, pixels = (double)s->width * s->height, aspect = (double)p.aspect;
@@ -50,22 +55,34 @@ static Pinhole pinhole_make(const SceneView *scene, const SensorRecord *s) {
 
 // How a point is seen: where on the film, from which direction, and the pixels per area of a facing surface there.
 typedef struct Sight {
-    Float x, y, density, length; // length: of the ray up to the near plane
+    Float x, y, density, length; // length: of the ray, up to the near plane
     Vec3 d;
     Mask valid;
 } Sight;
 
-KFN Sight pinhole_look(const Pinhole *p, const SensorRecord *s, Vec3 point) {
-    Vec3 q = v3_sub(point, p->origin), local;
+// Through a point on the lens, of which only thin lenses have more than one: slopes of the film's directions and of the
+// rays differ by a constant, so that both kinds see the same density.
+KFN Sight camera_look(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
+    Vec3 origin = p->origin, on_lens = v3_zero();
+    real rcp_focus = 0;
+    if (s->kind == SENSOR_THINLENS) {
+        real radius = (real)scene->theta[s->lens];
+        Vec2 disk = warp_uniform_disk(u);
+        rcp_focus = 1 / (real)scene->theta[s->lens + 1];
+        on_lens = v3(radius * disk.x, radius * disk.y, f_set(0));
+        origin = pose_point(scene, s, on_lens);
+    }
+    Vec3 q = v3_sub(point, origin), local;
     const real *r = p->to_local;
     local = v3(r[0] * q.x + r[1] * q.y + r[2] * q.z, r[3] * q.x + r[4] * q.y + r[5] * q.z,
                r[6] * q.x + r[7] * q.y + r[8] * q.z);
     Mask inside = m_ge(local.z, f_set(s->near_clip)) & m_le(local.z, f_set(s->far_clip));
-    Float z = f_select(inside, local.z, f_set(1)), scale = p->parallel ? f_set(1) : p->tangent * z;
+    Float z = f_select(inside, local.z, f_set(1)), rcp = 1.0f / (p->parallel ? f_set(1) : z);
     Float distance2 = v3_dot(q, q), distance = f_sqrt(distance2);
+    Float x = local.x * rcp + on_lens.x * rcp_focus, y = local.y * rcp + on_lens.y * rcp_focus;
     Sight e;
-    e.x = ((1.0f - local.x / scale) * 0.5f - p->shift_x) * (real)s->width;
-    e.y = ((1.0f - local.y * p->aspect / scale) * 0.5f - p->shift_y) * (real)s->height;
+    e.x = ((1.0f - x / p->tangent) * 0.5f - p->shift_x) * (real)s->width;
+    e.y = ((1.0f - y * p->aspect / p->tangent) * 0.5f - p->shift_y) * (real)s->height;
     if (p->parallel) {
         e.d = v3_neg(p->axis);
         e.length = (z - s->near_clip) * (v3_dot(q, p->axis) / z);
@@ -78,5 +95,51 @@ KFN Sight pinhole_look(const Pinhole *p, const SensorRecord *s, Vec3 point) {
         e.density = p->density * f_safe_rcp(cosine * cosine * cosine * distance2);
     }
     e.valid = inside;
+    return e;
+}
+
+// By a point on the sensor's shape, whose area the pixels divide: E = integral of L cos.
+static NOINLINE Sight meter_look(const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
+    Interaction si = sensor_shape_point(scene, s->shape, u);
+    Vec3 q = v3_sub(point, si.p);
+    Float distance2 = v3_dot(q, q), cosine;
+    Sight e;
+    e.length = f_sqrt(distance2);
+    e.d = v3_scale(q, -f_safe_rcp(e.length));
+    cosine = -v3_dot(e.d, si.sh.n);
+    e.x = u.x * (real)s->width;
+    e.y = u.y * (real)s->height;
+    e.density = (real)s->width * (real)s->height * cosine * f_safe_rcp(distance2);
+    e.valid = m_gt(cosine, f_set(1e-6f)) & m_gt(distance2, f_set(0));
+    return e;
+}
+
+KFN Sight single_look(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
+    return s->kind == SENSOR_IRRADIANCEMETER ? meter_look(scene, s, point, u) : camera_look(p, scene, s, point, u);
+}
+
+// One of a batch's sensors, chosen by `choice`; each fills some columns of the film.
+static NOINLINE Sight batch_look(const SceneView *scene, const SensorRecord *s, Vec3 point, Float choice, Vec2 u) {
+    const int32_t n = s->batch_count;
+    const real width = (real)s->width / (real)n;
+    Int which = i_min(i_from_f(choice * (real)n), i_set(n - 1));
+    Sight e = {f_set(0), f_set(0), f_set(0), f_set(0), v3_zero(), m_set(false)};
+    for (Mask left = m_set(true), mine; m_any(left); left = left & ~mine) {
+        int32_t number = i_lane(which, m_first(left));
+        const SensorRecord *part = scene->batch_sensors + s->batch + number;
+        const real scale_x = width / (real)part->width, scale_y = (real)s->height / (real)part->height;
+        Pinhole p = pinhole_make(scene, part);
+        mine = left & mi_eq(which, i_set(number));
+        Sight one = single_look(&p, scene, part, point, u);
+        Mask on_film = m_ge(one.x, f_set(0)) & m_lt(one.x, f_set((real)part->width)) & m_ge(one.y, f_set(0)) &
+                       m_lt(one.y, f_set((real)part->height));
+        e.x = f_select(mine, (real)number * width + one.x * scale_x, e.x);
+        e.y = f_select(mine, one.y * scale_y, e.y);
+        // The share of a film is stretched, and one sensor stands for all.
+        e.density = f_select(mine, one.density * (scale_x * scale_y * (real)n), e.density);
+        e.length = f_select(mine, one.length, e.length);
+        e.d = v3_select(mine, one.d, e.d);
+        e.valid = e.valid | (mine & one.valid & on_film);
+    }
     return e;
 }

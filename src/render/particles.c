@@ -26,19 +26,29 @@ bool rey_traces_particles(const rey_scene *scene) {
     return scene->integrator && strcmp(scene->integrator, "ptracer") == 0;
 }
 
-static rey_result check_sensor(rey_scene *scene, const rey_render_def *def) {
+// Refuses sensors that see one direction only.
+static rey_result check_one(rey_context *ctx, const SensorRecord *s) {
     static const char *const names[] = {
 #define SENSOR(ENUM, prefix, name) name,
 #include "sensor/kinds.inl"
 #undef SENSOR
-        "batch"};
-    int32_t kind = scene->view.sensors[def->sensor].kind;
-    if (kind == SENSOR_PERSPECTIVE || kind == SENSOR_ORTHOGRAPHIC) {
+    };
+    if (s->kind != SENSOR_RADIANCEMETER && s->kind != SENSOR_DISTANT) {
         return REY_OK;
     }
-    return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                    "the integrator 'ptracer' connects light to the sensors 'perspective' and 'orthographic', not to '%s'",
-                    names[kind]);
+    return rey_fail(ctx, REY_ERROR_UNSUPPORTED,
+                    "the integrator 'ptracer' connects light to points of a sensor, and no light meets the one direction "
+                    "of '%s'",
+                    names[s->kind]);
+}
+
+static rey_result check_sensor(rey_scene *scene, const rey_render_def *def) {
+    const SensorRecord *s = scene->view.sensors + def->sensor;
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < s->batch_count && s->kind == SENSOR_BATCH && result == REY_OK; i++) {
+        result = check_one(scene->ctx, scene->view.batch_sensors + s->batch + i);
+    }
+    return result == REY_OK && s->kind != SENSOR_BATCH ? check_one(scene->ctx, s) : result;
 }
 
 // One tile that covers the whole picture.

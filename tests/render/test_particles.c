@@ -21,9 +21,17 @@ enum { SIZE = 12, NUMBERS = SIZE * SIZE * 3, SEEDS = 6, ACROSS = 2, BLOCKS = ACR
 #define ORTHOGRAPHIC                                                                                                   \
     "<sensor type='orthographic'><transform name='to_world'><scale x='2' y='2'/>"                                      \
     "<lookat origin='0.5, 3, 4' target='0, 0.3, 0' up='0, 1, 0'/></transform>"
+#define THINLENS                                                                                                       \
+    "<sensor type='thinlens'><float name='fov' value='45'/><float name='aperture_radius' value='0.4'/>"                \
+    "<float name='focus_distance' value='4'/>"                                                                         \
+    "<transform name='to_world'><lookat origin='0.5, 3, 4' target='0, 0.3, 0' up='0, 1, 0'/></transform>"
 #define BOX_FILM                                                                                                       \
     "<film type='hdrfilm'><integer name='width' value='12'/><integer name='height' value='12'/><rfilter type='box'/>"  \
     "</film></sensor>"
+#define BATCH "<sensor type='batch'>" PERSPECTIVE BOX_FILM THINLENS BOX_FILM BOX_FILM
+#define METER                                                                                                          \
+    "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='40'/><scale value='0.8'/>"                \
+    "<translate x='0.2' y='1.2' z='1.5'/></transform><bsdf type='diffuse'/><sensor type='irradiancemeter'>" BOX_FILM "</shape>"
 #define CROPPED_FILM                                                                                                   \
     "<film type='hdrfilm'><integer name='width' value='20'/><integer name='height' value='16'/>"                       \
     "<integer name='crop_offset_x' value='5'/><integer name='crop_offset_y' value='2'/>"                               \
@@ -85,6 +93,9 @@ static const Case cases[] = {
      "<emitter type='directional'><vector name='direction' x='0.3' y='-1' z='-0.4'/><rgb name='irradiance' value='3 2 1'/>"
      "</emitter>",
      256},
+    {"area, thin lens", THINLENS BOX_FILM, FLOOR BALL CUBE, LAMP, 256},
+    {"area, batch", BATCH, FLOOR BALL CUBE, LAMP, 256},
+    {"area, irradiance", "", FLOOR METER BALL CUBE, LAMP, 256},
     {"constant and point", PERSPECTIVE BOX_FILM, FLOOR BALL CUBE,
      "<emitter type='constant'><rgb name='radiance' value='0.5 0.7 1'/></emitter>"
      "<emitter type='point'><point name='position' x='0.3' y='2' z='1'/><rgb name='intensity' value='5 4 3'/></emitter>",
@@ -224,20 +235,20 @@ static void test_threads(void **state) {
     }
 }
 
-// A sensor with a lens has no single point to connect to.
+// A sensor with a single direction has no point to connect to.
 static void test_refusal(void **state) {
     (void)state;
-    static const Case lens = {"lens",
-                              "<sensor type='thinlens'><float name='fov' value='45'/><float name='aperture_radius' value='0.1'/>"
-                              "<float name='focus_distance' value='4'/>" BOX_FILM,
-                              FLOOR, LAMP, 1};
+    static const Case ray = {"ray",
+                             "<sensor type='radiancemeter'><film type='hdrfilm'><integer name='width' value='1'/>"
+                             "<integer name='height' value='1'/><rfilter type='box'/></film></sensor>",
+                             FLOOR, LAMP, 1};
     static float image[NUMBERS];
     rey_context *ctx;
     rey_render_def def = rey_default_render_def();
     assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
-    rey_scene *scene = load(ctx, "ptracer", "", &lens);
+    rey_scene *scene = load(ctx, "ptracer", "", &ray);
     assert_int_equal(rey_render(scene, &def, image, NULL), REY_ERROR_UNSUPPORTED);
-    assert_non_null(strstr(rey_error(ctx), "not to 'thinlens'"));
+    assert_non_null(strstr(rey_error(ctx), "'radiancemeter'"));
     rey_scene_destroy(scene);
     rey_context_destroy(ctx);
 }
