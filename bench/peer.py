@@ -124,7 +124,7 @@ class Pair:
         for spp in (SPP, 4 * SPP):
             rate = max(rate, SIZE * SIZE * spp / best(lambda s: self.render(spp, s)) / 1e6)
             self.dr.flush_malloc_cache()
-        mine = statistics.median(self.ours(SPP, s)[0]["paths_per_second"] / 1e6 for s in range(REPEATS))
+        mine = statistics.median(SIZE * SIZE * SPP / self.ours(SPP, s)[0]["seconds"] / 1e6 for s in range(REPEATS))
         self.same = agree(self.ours(64, 9)[1], np.array(self.render(64, 9))[..., :3])
         self.row("primal [Mpaths/s]", rate, mine)
 
@@ -141,7 +141,7 @@ class Pair:
         mi, dr = self.mi, self.dr
         parameters = mi.traverse(self.loaded)
         keys = [k for k in self.scene.parameters if k in parameters]
-        integrator = mi.load_dict({"type": "prb", "max_depth": 8, "rr_depth": 5})
+        integrator = mi.load_dict({"type": "ptracer" if self.name == "particles" else "prb", "max_depth": 8, "rr_depth": 5})
         for k in keys:
             dr.enable_grad(parameters[k])
         parameters.update()
@@ -171,10 +171,10 @@ class Pair:
         paths = SIZE * SIZE * SPP / 1e6
         arguments = [x for k in keys for x in ("--param", k)] + ["--spp", str(SPP)] + defines(self.scene)
         grads = [reynolds("grad", self.scene.path, *arguments, "--mode", "reverse", "--adjoint", "1") for _ in range(REPEATS)]
-        reverse = statistics.median(g["paths"] / g["seconds"] for g in grads) / 1e6
+        reverse = statistics.median(paths / g["seconds"] for g in grads)
         grads = [reynolds("grad", self.scene.path, *arguments) for _ in range(REPEATS)]
-        mine = statistics.median(g["paths"] / g["seconds"] for g in grads) / 1e6
-        picture = statistics.median(self.ours(SPP, s)[0]["paths_per_second"] / 1e6 for s in range(REPEATS))
+        mine = statistics.median(paths / g["seconds"] for g in grads)
+        picture = statistics.median(paths / self.ours(SPP, s)[0]["seconds"] for s in range(REPEATS))
         self.row("reverse, adjoint given [Mpaths/s]", paths / best(backward), reverse)
         self.row("picture, then reverse [Mpaths/s]", paths / best(both), 1 / (1 / picture + 1 / reverse))
         self.row("forward [Mpaths/s]", paths / best(forward), mine)

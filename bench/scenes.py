@@ -1,4 +1,4 @@
-"""The benchmark scenes: Cornell box, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky, 16
+"""The benchmark scenes: Cornell box, the same by light tracing, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky, 16
 principled spheres under a sky, a forest of 100,000 instances, and the matpreview scene of the conformance folder."""
 import collections
 import importlib.util
@@ -13,7 +13,7 @@ assets = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(assets)
 
 HEAD = """<scene version="3.0.0">
-<integrator type="path"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="5"/></integrator>
+<integrator type="%(integrator)s"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="5"/></integrator>
 <sensor type="perspective"><float name="fov" value="39.3"/><float name="near_clip" value="%(near)g"/><float name="far_clip" value="5000"/>
 <transform name="to_world"><lookat origin="%(origin)s" target="%(target)s" up="%(up)s"/></transform>
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
@@ -126,12 +126,15 @@ def make(folder):
         write_blob(os.path.join(folder, "blob1m.ply"), 700, 714, (0, 0, 0), 1)
     write_tree(os.path.join(folder, "tree.obj"))
     assets.write_exr(os.path.join(folder, "sky.exr"), 256, 512, assets.environment(random.Random(3)))
-    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "up": "0, 1, 0", "near": 10, "depth": 8, "size": 512}
+    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "up": "0, 1, 0", "near": 10, "depth": 8, "size": 512,
+           "integrator": "path"}
     board = dict(box, origin="0, -13, 9", target="0, 0, 0.3", up="0, 0, 1", near=0.01)
+    cornell = (WALLS + '<shape type="obj"><string name="filename" value="block.obj"/><boolean name="face_normals" value="true"/>'
+               '<ref id="white"/></shape>')
+    walls = [c + ".reflectance.value" for c in ("white", "red", "green")]
     scenes = {
-        "cornell": (box, WALLS + '<shape type="obj"><string name="filename" value="block.obj"/>'
-                    '<boolean name="face_normals" value="true"/><ref id="white"/></shape>',
-                    [c + ".reflectance.value" for c in ("white", "red", "green")]),
+        "cornell": (box, cornell, walls),
+        "particles": (dict(box, integrator="ptracer"), cornell, walls),
         "box+70k": (box, WALLS + METAL + '<shape type="ply"><string name="filename" value="blob70k.ply"/>'
                     '<ref id="metal"/></shape>', ["metal.alpha.value"]),
         "million": (dict(box, origin="0, 1, -4", target="0, 0, 0", near=0.01), METAL + '<shape type="ply">'
