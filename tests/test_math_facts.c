@@ -65,8 +65,8 @@ static void test_fresnel_limits(void **state) {
     }
     near(fresnel_conductor_one(0.3, 0, 1), 1, 1e-12, 0, "ideal mirror", 0);
     // The fits against the integral 2 int F(c) c dc
-    for (int k = 0; k < 4; k++) {
-        const double etas[4] = {1 / 1.8, 1 / 1.33, 1.3, 1.8};
+    for (int k = 0; k < 7; k++) {
+        const double etas[7] = {1 / 1.8, 1 / 1.33, 1.3, 1.8, 0.1, 0.25, 0.399};
         double sum = 0, cos_t, eta_it, eta_ti;
         for (int i = 0; i < 20000; i++) {
             double c = (i + 0.5) / 20000;

@@ -122,7 +122,7 @@ static void random_input(int leaf, Random *r, double *x, double *scale) {
         }
         break;
     case LEAF_DIFFUSE_REFLECTANCE:
-        x[0] = uniform(r) < 0.5 ? between(r, 0.4, 0.99) : between(r, 1.01, 2.5);
+        x[0] = uniform(r) < 0.5 ? between(r, 0.15, 0.99) : between(r, 1.01, 5);
         break;
     case LEAF_SCHLICK:
         x[0] = between(r, -0.2, 1.2);

@@ -149,20 +149,28 @@ KFN Float fresnel_diffuse_above(Float x, Float *slope) {
     return p;
 }
 
+// The fit for eta < 1 exceeds 1 below 0.26. Below this index it is carried on, without a step, by the relation with the
+// other side, 1 - R(eta) = eta^2 (1 - R(1 / eta)), which follows from the conservation of etendue.
+#define FRESNEL_DIFFUSE_LEAST 0.4f
+#define FRESNEL_DIFFUSE_MATCH 0.95847f
+
 // Reflectance of a smooth dielectric under uniform diffuse light from the side of index 1, polynomial fits:
 // eta < 1 [egan1973], eta > 1 [deon2011 eq. 5 and 6]. The light from inside a body of index n sees eta = 1 / n.
 KFN Float fresnel_diffuse_reflectance(Float eta) {
-    Float x = 1.0f / eta, slope;
+    Mask low = m_lt(eta, f_set(FRESNEL_DIFFUSE_LEAST));
+    Float x = 1.0f / eta, slope, above = fresnel_diffuse_above(f_select(low, eta, x), &slope);
     Float below = (eta * -1.4399f + 0.7099f) * eta + 0.6681f + 0.0636f * x;
-    return f_select(m_lt(eta, f_set(1)), below, fresnel_diffuse_above(x, &slope));
+    below = f_select(low, 1.0f - FRESNEL_DIFFUSE_MATCH * eta * eta * (1.0f - above), below);
+    return f_select(m_lt(eta, f_set(1)), below, above);
 }
 
 KFN void fresnel_diffuse_reflectance_adj(Float eta, Float dr, Float *deta) {
-    Float x = 1.0f / eta, slope;
-    // below = -1.4399 eta^2 + 0.7099 eta + 0.6681 + 0.0636 / eta
+    Mask low = m_lt(eta, f_set(FRESNEL_DIFFUSE_LEAST));
+    Float x = 1.0f / eta, slope, above = fresnel_diffuse_above(f_select(low, eta, x), &slope);
+    // below = -1.4399 eta^2 + 0.7099 eta + 0.6681 + 0.0636 / eta, or 1 - match eta^2 (1 - above(eta))
     Float below = 2.0f * -1.4399f * eta + 0.7099f - 0.0636f * x * x;
+    below = f_select(low, FRESNEL_DIFFUSE_MATCH * eta * (eta * slope - 2.0f * (1.0f - above)), below);
     // above = polynomial in x = 1 / eta
-    fresnel_diffuse_above(x, &slope);
     *deta = *deta + dr * f_select(m_lt(eta, f_set(1)), below, -slope * x * x);
 }
 

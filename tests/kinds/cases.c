@@ -1,24 +1,39 @@
 // cases.c: random scenes for the kind tests.
 #include "cases.h"
 
+#include <stdlib.h>
+
+Random case_random(int number) {
+    const char *seed = getenv("REYNOLDS_TEST_SEED");
+    return (Random){(uint64_t)number + 1000003 * (uint64_t)(seed ? atoi(seed) : 0)};
+}
+
 static const double roughness_extremes[] = {1e-3, 0.05, 0.5, 1};
 
 static double metal_value(Random *r) {
     return uniform(r) < 0.3 ? between(r, 0.05, 1) : between(r, 1, 8);
 }
 
+// From gases seen from inside of a gem to germanium, or hardly an interface at all; 1 itself is none.
+static double index_value(Random *r) {
+    double sort = uniform(r), x = uniform(r);
+    return sort < 0.15 ? 1 + (x < 0.5 ? -1 : 1) * (0.002 + 0.04 * x) : sort < 0.4 ? 0.22 + 0.73 * x : 1.05 + 3.5 * x * x;
+}
+
 static double random_value(Random *r, const ParamDesc *p) {
     bool roughness = p->type == PARAM_ALPHA_U || p->type == PARAM_ALPHA_V ||
                      (p->type == PARAM_REAL && p->low > 0 && p->high <= 1);
+    if (strcmp(p->name, "eta") == 0 && p->type == PARAM_REAL) {
+        return index_value(r);
+    }
     if (roughness) {
         return uniform(r) < 0.5 ? roughness_extremes[below(r, 4)] : exp(between(r, log(1e-3), 0));
     }
     switch (p->type) {
     case PARAM_IOR:
     case PARAM_SMOOTH_IOR:
-        return uniform(r) < 0.3 ? between(r, 0.6, 0.95) : between(r, 1.05, 2.5);
-    case PARAM_SPECULAR: // as eta and as specular alike; 1, or 0 as specular, is no interface
-        return uniform(r) < 0.3 ? between(r, 0.6, 0.95) : between(r, 1.05, 2.5);
+    case PARAM_SPECULAR: // as eta and as specular alike
+        return index_value(r);
     case PARAM_RATE:
         return between(r, 0.2, 3);
     case PARAM_METAL_ETA:
@@ -108,6 +123,8 @@ static void derive_table(KindCase *c, const BsdfNode *node) {
     for (int i = 0; i < c->theta_count; i++) {
         theta[i] = (float)c->theta[i];
     }
+    c->coat_base[0] = c->theta[c->coat_alpha];
+    c->coat_base[1] = c->theta[c->coat_eta];
     rey_scene scene = {0};
     scene.view.theta = theta;
     scene.view.tables = tables;
@@ -143,8 +160,6 @@ static int add_bsdf(KindCase *c, Random *r, int kind, int variant, bool textured
     }
     if (derives) {
         node->table = 0;
-        c->coat_base[0] = c->theta[c->coat_alpha];
-        c->coat_base[1] = c->theta[c->coat_eta];
         derive_table(c, node);
     }
     return id;
@@ -179,6 +194,13 @@ void case_set(KindCase *c, const char *name, double value) {
         if (c->owner[i] >= 0 && strcmp(k->params[c->owner[i]].name, name) == 0) {
             c->theta[i] = value;
         }
+    }
+    case_update(c);
+}
+
+void case_update(KindCase *c) {
+    if (c->bsdfs[c->root].table >= 0) {
+        derive_table(c, c->bsdfs + c->root);
     }
 }
 

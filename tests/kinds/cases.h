@@ -26,6 +26,8 @@ static inline double uniform(Random *r) {
 static inline double between(Random *r, double low, double high) { return low + (high - low) * uniform(r); }
 static inline int below(Random *r, int n) { return (int)(uniform(r) * n); }
 
+// A sequence of its own for each number; the environment variable REYNOLDS_TEST_SEED draws other cases.
+Random case_random(int number);
 // A scene with one function of this kind (and children, for adapters). textured: slots are textures of all sorts,
 // otherwise constants. variant enumerates the uniform switches.
 void case_make(KindCase *c, Random *r, int kind, int variant, bool textured);
@@ -55,6 +57,8 @@ int case_values(KindCase *c, Random *r, const ParamDesc *p, int n, int owner);
 int case_texture(KindCase *c, Random *r, const ParamDesc *p, int owner, bool textured);
 // Sets all values of a parameter of the root; names that it does not have are passed over.
 void case_set(KindCase *c, const char *name, double value);
+// Brings the root's derived table up to date with theta.
+void case_update(KindCase *c);
 // Whether the function turns the shading normal.
 bool case_turns(const KindCase *c);
 // Describes a failing case on standard error.

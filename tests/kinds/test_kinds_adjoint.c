@@ -65,13 +65,16 @@ static bool diverges(const KindCase *c, const Query *q, const double df[3], doub
 static bool matches(const KindCase *c, const Query *q, const double df[3], double *x, double d, double low,
                     double high, double rounding) {
     int side = *x <= low ? 1 : *x >= high ? -1 : 0;
-    double scale = fabs(*x) > 0.01 ? fabs(*x) : 0.01;
-    for (double h = 1e-2; h > 1e-9; h *= 0.1) {
+    double scale = fabs(*x) > 0.01 ? fabs(*x) : 0.01, last = 0;
+    for (double h = 1e-2; h > 1e-11; h *= 0.1) {
         double quotient = difference(c, q, df, x, h * scale, side);
-        double noise = rounding / (h * scale);
-        if (fabs(quotient - d) <= 1e-5 * fmax(fabs(quotient), fabs(d)) + noise) {
+        double noise = rounding / (h * scale), tolerance = 1e-5 * fmax(fabs(quotient), fabs(d)) + noise;
+        // At the end of a range the value itself may jump (the tint of black): J / h is in the quotients then.
+        double beside = (10 * last - quotient) / 9;
+        if (fabs(quotient - d) <= tolerance || (side && h < 5e-3 && fabs(beside - d) <= tolerance)) {
             return true;
         }
+        last = quotient;
     }
     if (side && isfinite(d) && diverges(c, q, df, x, scale, side)) {
         return true;
@@ -159,7 +162,7 @@ static void test_every_kind(void **state) {
         if (strncmp(k->name, only, strlen(only)) != 0) {
             continue;
         }
-        Random r = {(uint64_t)kind * 1000 + 1};
+        Random r = case_random(kind * 1000 + 1);
         double largest[MAX_SLOTS] = {0};
         int here = 0;
         for (int n = 0; n < CASES && here < 5; n++) {

@@ -185,7 +185,7 @@ static void test_every_kind(void **state) {
     }
     double threshold = sidak(0.01, tests);
     for (int kind = 0; kind < rey_bsdf_kind_count; kind++) {
-        Random r = {(uint64_t)kind * 1000 + 7};
+        Random r = case_random(kind * 1000 + 7);
         for (int n = 0; n < CASES_PER_VARIANT * case_variants(kind); n++) {
             KindCase c;
             case_make(&c, &r, kind, n % case_variants(kind), n % 3 == 2);
