@@ -11,8 +11,9 @@ enum { CELLS_THETA = 18, CELLS_PHI = 8, CELLS = CELLS_THETA * CELLS_PHI };
 
 typedef struct SphereGrid {
     double s[3], t[3], n[3];          // the pole is n
-    double edges[CELLS_THETA + 1];
+    double rings[CELLS_THETA + 1];
     int side;                         // -1 or 1: only directions with that sign of z; 0: all
+    bool edges;                       // the density ends abruptly: quadrature does not trust its first agreement
     density_fn *density;
     void *user;
 } SphereGrid;
@@ -44,9 +45,9 @@ static inline SphereGrid grid_make(const double pole[3], double narrow, int side
         g.t[k] = g.n[i] * g.s[j] - g.n[j] * g.s[i];
     }
     for (int i = 1; i <= CELLS_THETA; i++) {
-        g.edges[i] = narrow * pow(pi / narrow, (i - 1.0) / (CELLS_THETA - 1));
+        g.rings[i] = narrow * pow(pi / narrow, (i - 1.0) / (CELLS_THETA - 1));
     }
-    g.edges[CELLS_THETA] = pi;
+    g.rings[CELLS_THETA] = pi;
     return g;
 }
 
@@ -63,7 +64,7 @@ static inline int grid_cell(const SphereGrid *g, const double d[3]) {
     }
     double theta = atan2(hypot(x, y), z), phi = atan2(y, x) / 6.283185307179586;
     int i = 0, j = (int)((phi - floor(phi)) * CELLS_PHI);
-    while (i < CELLS_THETA - 1 && theta >= g->edges[i + 1]) {
+    while (i < CELLS_THETA - 1 && theta >= g->rings[i + 1]) {
         i++;
     }
     return i * CELLS_PHI + (j < CELLS_PHI ? j : CELLS_PHI - 1);
@@ -108,10 +109,10 @@ static inline double grid_integral(const SphereGrid *g, double t0, double t1, do
 // counts and integral differ, the cell is cut finely before any comparison.
 static inline void grid_probabilities(const SphereGrid *g, const int counts[CELLS], int n, double p[CELLS]) {
     for (int i = 0; i < CELLS; i++) {
-        double t0 = g->edges[i / CELLS_PHI], t1 = g->edges[i / CELLS_PHI + 1];
+        double t0 = g->rings[i / CELLS_PHI], t1 = g->rings[i / CELLS_PHI + 1];
         double p0 = 6.283185307179586 * (i % CELLS_PHI) / CELLS_PHI, p1 = p0 + 6.283185307179586 / CELLS_PHI;
         double whole = grid_quadrature(g, t0, t1, p0, p1);
-        p[i] = grid_integral(g, t0, t1, p0, p1, whole, 1e-5, 8, 1);
+        p[i] = grid_integral(g, t0, t1, p0, p1, whole, g->edges ? 2e-6 : 1e-5, 8, g->edges ? 2 : 1);
         if (fabs(counts[i] - n * p[i]) > 2 * sqrt(n * p[i] + 1)) {
             p[i] = grid_integral(g, t0, t1, p0, p1, whole, 1e-6, 10, 4);
         }

@@ -66,6 +66,7 @@ static double check_sampling(const Seen *x, Random *r, int *failures) {
     // Slivers seen edge-on are beyond the quadrature; that they are met where they were sampled is checked above.
     if (best >= 0 && d[best].pdf < 20) {
         SphereGrid g = grid_make(d[best].d, 0.05, 0, light_density, (void *)(uintptr_t)x);
+        g.edges = x->c->emitter.shape >= 0;
         for (int i = 0; i < SAMPLES; i++) {
             if (d[i].valid) {
                 counts[grid_cell(&g, d[i].d)]++;
