@@ -45,7 +45,7 @@ FUZZ_SECONDS ?= 60
 fuzz:
 	@sh scripts/setup.sh $(PACKAGES) clang libclang-rt-14-dev
 	@CC=clang cmake -S . -B build-fuzz -DREYNOLDS_FUZZ=ON -DREYNOLDS_SANITIZE=ON > /dev/null
-	@$(MAKE) --no-print-directory -C build-fuzz -j$(JOBS)
+	@$(MAKE) --no-print-directory -C build-fuzz -j$(JOBS) fuzz
 	@sh scripts/fuzz.sh build-fuzz $(FUZZ_SECONDS)
 
 sanitize: setup
