@@ -1,0 +1,91 @@
+// majorant.h: walking along a ray through supervoxels, each with a bound of the extinction in it, to the next tentative
+// collision [amanatides1987; yue2010]. All lanes step together, each through cells of its own.
+#pragma once
+
+#include "medium/volume.h"
+#include "scene/tables.h"
+
+typedef struct MajorantWalk {
+    Vec3 o, d;        // in the space of sigma_t; d has the length that world distances give it
+    Float t, end;     // where the walk stands and where it leaves the cube [world distance]
+    Int cell[3];
+    Float next[3], step[3]; // distances at which cells end along each axis, and between such ends
+    Float majorant;   // of the cell that the walk stands in
+    Mask m;           // lanes that are still inside
+} MajorantWalk;
+
+// Distances at which the ray enters and leaves [0, 1] along one axis.
+KFN void slab(Float o, Float d, Float *low, Float *high) {
+    Mask parallel = m_lt(f_abs(d), f_set(1e-12f)), inside = m_ge(o, f_set(0)) & m_le(o, f_set(1));
+    Float rcp = 1.0f / f_select(parallel, f_set(1), d), a = -o * rcp, b = (1.0f - o) * rcp;
+    Float never = f_select(inside, f_set(INFINITY), f_set(-INFINITY));
+    *low = f_max(*low, f_select(parallel, f_set(-INFINITY), f_min(a, b)));
+    *high = f_min(*high, f_select(parallel, never, f_max(a, b)));
+}
+
+// From world point o along the unit direction d, for the distance tmax.
+KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium, const VolumeNode *sigma_t, Vec3 o, Vec3 d,
+                                Float tmax, Mask m) {
+    const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
+    MajorantWalk w = {.o = volume_to_local(scene, sigma_t, o, 1), .d = volume_to_local(scene, sigma_t, d, 0)};
+    const Float p[3] = {w.o.x, w.o.y, w.o.z}, v[3] = {w.d.x, w.d.y, w.d.z};
+    w.t = f_set(0);
+    w.end = tmax;
+    w.majorant = f_set(0);
+    for (int k = 0; k < 3 && medium->bounded; k++) {
+        slab(p[k], v[k], &w.t, &w.end);
+    }
+    w.m = m & m_lt(w.t, w.end);
+    w.t = f_select(w.m, w.t, f_set(0));
+    for (int k = 0; k < 3; k++) {
+        Mask up = m_gt(v[k], f_set(0)), still = m_lt(f_abs(v[k]), f_set(1e-12f)) | m_set(!medium->bounded);
+        Float rcp = 1.0f / f_select(still, f_set(1), v[k]);
+        Float at = f_clamp((p[k] + w.t * v[k]) * (real)n[k], f_set(0), f_set((real)n[k]));
+        w.cell[k] = i_min(i_from_f(at), i_set(n[k] - 1));
+        Float border = f_from_i(w.cell[k] + i_select(up, i_set(1), i_set(0))) * (1 / (real)n[k]);
+        w.next[k] = f_select(still, f_set(INFINITY), (border - p[k]) * rcp);
+        w.step[k] = f_select(still, f_set(INFINITY), f_abs(rcp) * (1 / (real)n[k]));
+    }
+    return w;
+}
+
+// One cell on: along the axis whose border comes first. Lanes of m that leave the cube leave the walk.
+KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
+    const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
+    const Float v[3] = {w->d.x, w->d.y, w->d.z};
+    Mask left = m;
+    for (int k = 0; k < 3; k++) {
+        Mask mine = left & m_le(w->next[k], border);
+        Int onward = i_select(m_gt(v[k], f_set(0)), i_set(1), i_set(-1));
+        w->cell[k] = i_select(mine, w->cell[k] + onward, w->cell[k]);
+        w->next[k] = f_select(mine, w->next[k] + w->step[k], w->next[k]);
+        Mask outside = mi_lt(w->cell[k], i_set(0)) | mi_lt(i_set(n[k] - 1), w->cell[k]);
+        w->m = w->m & ~(mine & outside);
+        w->cell[k] = i_max(i_min(w->cell[k], i_set(n[k] - 1)), i_set(0));
+        left = left & ~mine;
+    }
+    w->m = w->m & ~(m & m_ge(w->t, w->end));
+}
+
+// Goes on until the majorants on the way have used up the optical depths. Lanes that get there are returned and stand at
+// w->t under w->majorant; the others have left the medium.
+KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Mask m) {
+    Mask left = m & w->m, found = m_set(false);
+    while (m_any(left)) {
+        Int cell = (w->cell[2] * medium->ny + w->cell[1]) * medium->nx + w->cell[0];
+        Float majorant = table_at(scene, cell + medium->table);
+        Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
+        Float through = majorant * f_max(exit - w->t, f_set(0));
+        Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);
+        w->majorant = f_select(left, majorant, w->majorant);
+        w->t = f_select(here, w->t + depth * f_safe_rcp(majorant), f_select(left, exit, w->t));
+        depth = depth - through;
+        found = found | here;
+        left = left & ~here;
+        majorant_step(medium, w, border, left);
+        left = left & w->m;
+    }
+    return found;
+}
+
+KFN Vec3 majorant_point(const MajorantWalk *w) { return v3_madd(w->o, w->t, w->d); }

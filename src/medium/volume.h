@@ -1,0 +1,140 @@
+// volume.h: fields over space, and their adjoints: to the values, and to the point, through which to_world moves.
+// NOT differentiated: jumps of nearest voxels and of the cube's border under a point that moves.
+#pragma once
+
+#include "medium/medium_node.h"
+#include "scene/sink.h"
+#include "scene/texture.h"
+
+// Where a grid is read: the eight voxels around a point (nearest: the first), and the weights of the upper ones.
+typedef struct Voxels {
+    Int at[8];
+    Float f[3];
+    int32_t count;
+} Voxels;
+
+// The two voxels along one axis, and the weight of the upper one. Voxel i lies at (i + 1/2) / n.
+KFN void voxels_along(const VolumeNode *v, Float x, int32_t n, Int *low, Int *high, Float *f) {
+    // Far-away coordinates lose their fraction anyway; the clamp keeps the integer conversion defined.
+    x = f_clamp(x * (real)n, f_set(-1e7f), f_set(1e7f)) - (v->filter == FILTER_NEAREST ? 0.0f : 0.5f);
+    Float whole = f_floor(x);
+    *f = v->filter == FILTER_NEAREST ? f_set(0) : x - whole;
+    *low = texture_wrap(i_from_f(whole), n, v->wrap);
+    *high = texture_wrap(i_from_f(whole) + 1, n, v->wrap);
+}
+
+KFN Voxels voxels_around(const VolumeNode *v, Vec3 p) {
+    Int x[2], y[2], z[2];
+    Voxels s = {.count = v->filter == FILTER_NEAREST ? 1 : 8};
+    voxels_along(v, p.x, v->nx, &x[0], &x[1], &s.f[0]);
+    voxels_along(v, p.y, v->ny, &y[0], &y[1], &s.f[1]);
+    voxels_along(v, p.z, v->nz, &z[0], &z[1], &s.f[2]);
+    for (int k = 0; k < 8; k++) {
+        s.at[k] = ((z[k >> 2] * v->ny + y[k >> 1 & 1]) * v->nx + x[k & 1]) * v->channels;
+    }
+    return s;
+}
+
+KFN Float voxel_weight(const Voxels *s, int k) {
+    Float w = k & 1 ? s->f[0] : 1.0f - s->f[0];
+    w = w * (k & 2 ? s->f[1] : 1.0f - s->f[1]);
+    return w * (k & 4 ? s->f[2] : 1.0f - s->f[2]);
+}
+
+KFN Spec voxel_value(const SceneView *scene, const VolumeNode *v, Int at) {
+    Spec s;
+    for (int c = 0; c < SPEC_N; c++) {
+        s.c[c] = v->channels == 1 && c ? s.c[0] : theta_at(scene, at + (v->theta + c));
+    }
+    return s;
+}
+
+KFN Spec gridvolume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
+    Voxels s = voxels_around(v, p);
+    if (s.count == 1) {
+        return voxel_value(scene, v, s.at[0]);
+    }
+    Spec value = spec_zero();
+    for (int k = 0; k < 8; k++) {
+        value = spec_madd(value, voxel_weight(&s, k), voxel_value(scene, v, s.at[k]));
+    }
+    return value;
+}
+
+// at: where the values begin in the sink, -1 = not asked for; dp may be null.
+KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, int32_t at, Vec3 *dp, Sink *sink,
+                        Mask m) {
+    Voxels s = voxels_around(v, p);
+    Float along[8];
+    for (int k = 0; k < s.count; k++) {
+        // value = sum_k w_k voxel_k
+        Float w = voxel_weight(&s, k);
+        for (int c = 0; c < SPEC_N && at >= 0; c++) {
+            sink_add(sink, s.at[k] + (at + (v->channels == 1 ? 0 : c)), w * d.c[c], m);
+        }
+        along[k] = dp ? spec_dot(d, voxel_value(scene, v, s.at[k])) : f_set(0);
+    }
+    const int32_t n[3] = {v->nx, v->ny, v->nz};
+    Float slope[3] = {f_set(0), f_set(0), f_set(0)};
+    for (int k = 0; k < 8 && dp && s.count == 8; k++) {
+        // w_k is linear in each of f = n p - 1/2 - floor
+        for (int axis = 0; axis < 3; axis++) {
+            Voxels flat = s;
+            flat.f[axis] = k >> axis & 1 ? f_set(1) : f_set(0);
+            Float rest = voxel_weight(&flat, k) * along[k] * (real)n[axis];
+            slope[axis] = slope[axis] + (k >> axis & 1 ? rest : -rest);
+        }
+    }
+    if (dp) {
+        v3_acc(dp, v3(slope[0], slope[1], slope[2]));
+    }
+}
+
+KFN Spec constvolume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
+    UNUSED(p);
+    return voxel_value(scene, v, i_set(0));
+}
+
+KFN void constvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, int32_t at, Vec3 *dp, Sink *sink,
+                         Mask m) {
+    UNUSED(scene), UNUSED(p), UNUSED(dp);
+    for (int c = 0; c < SPEC_N && at >= 0; c++) {
+        sink_add_uniform(sink, at + (v->channels == 1 ? 0 : c), d.c[c], m);
+    }
+}
+
+// ---- dispatch ----------------------------------------------------------------------------------------------------
+
+KFN Vec3 volume_to_local(const SceneView *scene, const VolumeNode *v, Vec3 p, real w) {
+    if (v->table < 0) {
+        return p;
+    }
+    const float *r = scene->tables + v->table;
+    return v3(r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3] * w, r[4] * p.x + r[5] * p.y + r[6] * p.z + r[7] * w,
+              r[8] * p.x + r[9] * p.y + r[10] * p.z + r[11] * w);
+}
+
+// At a point of the volume's own space.
+KFN Spec volume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
+    switch (v->kind) {
+#define VOLUME(ENUM, prefix, name)                                                                                     \
+    case VOLUME_##ENUM:                                                                                                \
+        return prefix##_eval(scene, v, p);
+    default:
+#include "medium/volumes.inl"
+#undef VOLUME
+    }
+}
+
+KFN void volume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, int32_t at, Vec3 *dp, Sink *sink, Mask m) {
+    switch (v->kind) {
+#define VOLUME(ENUM, prefix, name)                                                                                     \
+    case VOLUME_##ENUM:                                                                                                \
+        prefix##_adj(scene, v, p, d, at, dp, sink, m);                                                                 \
+        break;
+#include "medium/volumes.inl"
+#undef VOLUME
+    default:
+        break;
+    }
+}

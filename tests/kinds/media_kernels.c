@@ -1,0 +1,123 @@
+// media_kernels.c: the kernels of media_kernels.h at one width and precision; compiled once for each, as phase_kernels.c.
+#include <math.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef REAL_DOUBLE
+#define float double
+#define KERNELS media_kernels_double
+#else
+#define KERNELS KNAME(media_kernels)
+#endif
+
+#include "media_kernels.h"
+#include "medium/track.h"
+
+typedef struct View {
+    SceneView scene;
+    float theta[MEDIA_THETA], tables[MEDIA_TABLES], tangent[MEDIA_THETA];
+} View;
+
+static void view_make(const MediaCase *c, View *v) {
+    memset(v, 0, sizeof *v);
+    for (int i = 0; i < MEDIA_THETA; i++) {
+        v->theta[i] = (float)c->theta[i];
+    }
+    for (int i = 0; i < MEDIA_TABLES; i++) {
+        v->tables[i] = (float)c->tables[i];
+    }
+    v->scene.theta = v->theta;
+    v->scene.tables = v->tables;
+}
+
+// Entry k of lane l is item (first + l), the last one repeated past the end.
+#define AT(lane) (first + (lane) < n ? first + (lane) : n - 1)
+#define GATHER(target, expression)                                                                                     \
+    do {                                                                                                               \
+        real gathered_[LANES];                                                                                         \
+        for (int lane = 0; lane < LANES; lane++) {                                                                     \
+            gathered_[lane] = (real)(expression);                                                                      \
+        }                                                                                                              \
+        (target) = f_load(gathered_);                                                                                  \
+    } while (0)
+#define GATHER3(target, field)                                                                                         \
+    do {                                                                                                               \
+        GATHER((target).x, (field)[0]);                                                                                \
+        GATHER((target).y, (field)[1]);                                                                                \
+        GATHER((target).z, (field)[2]);                                                                                \
+    } while (0)
+
+static void run_eval(const MediaCase *c, int n, MediaLookup *q) {
+    View view;
+    view_make(c, &view);
+    for (int first = 0; first < n; first += LANES) {
+        Vec3 p;
+        GATHER3(p, q[AT(lane)].p);
+        Spec s = volume_eval(&view.scene, &c->sigma_t, p);
+        for (int k = 0; k < 3 * LANES; k++) {
+            if (first + k / 3 < n) {
+                q[first + k / 3].value[k % 3] = (double)f_lane(s.c[k % 3], k / 3);
+            }
+        }
+    }
+}
+
+static void run_adj(const MediaCase *c, int n, MediaLookup *q, double *gradient, const double *tangent) {
+    View view;
+    view_make(c, &view);
+    for (int i = 0; tangent && i < c->theta_count; i++) {
+        view.tangent[i] = (float)tangent[i];
+    }
+    Sink sink = {.gradient = gradient, .tangent = gradient ? NULL : view.tangent};
+    for (int first = 0; first < n; first += LANES) {
+        Vec3 p, dp = v3_zero();
+        Spec df;
+        GATHER3(p, q[AT(lane)].p);
+        for (int k = 0; k < 3; k++) {
+            GATHER(df.c[k], q[AT(lane)].df[k]);
+        }
+        sink.derivative = f_set(0);
+        volume_adj(&view.scene, &c->sigma_t, p, df, c->sigma_t.theta, &dp, &sink, m_first_n(n - first));
+        for (int lane = 0; lane < LANES && first + lane < n; lane++) {
+            MediaLookup *to = q + first + lane;
+            to->dp[0] = (double)f_lane(dp.x, lane);
+            to->dp[1] = (double)f_lane(dp.y, lane);
+            to->dp[2] = (double)f_lane(dp.z, lane);
+            to->forward = (double)f_lane(sink.derivative, lane);
+        }
+    }
+}
+
+static void run_track(const MediaCase *c, int n, MediaRay *r) {
+    View view;
+    view_make(c, &view);
+    for (int first = 0; first < n; first += LANES) {
+        Vec3 o, d;
+        Float tmax;
+        int32_t samples[LANES];
+        GATHER3(o, r[AT(lane)].o);
+        GATHER3(d, r[AT(lane)].d);
+        GATHER(tmax, r[AT(lane)].tmax);
+        for (int lane = 0; lane < LANES; lane++) {
+            samples[lane] = (int32_t)r[AT(lane)].sample;
+        }
+        SampleKey key = {.pixel = u_set(0), .sample = (UInt)i_load(samples), .scramble = 7, .sobol = false};
+        Mask m = m_first_n(n - first);
+        Spec transmittance = track_transmittance(&view.scene, &c->medium, &c->sigma_t, o, d, tmax, m, &key, 0);
+        Flight flight = track_flight(&view.scene, &c->medium, &c->sigma_t, o, d, tmax, m, &key, 1u << 20);
+        for (int lane = 0; lane < LANES && first + lane < n; lane++) {
+            MediaRay *to = r + first + lane;
+            for (int k = 0; k < 3; k++) {
+                to->transmittance[k] = (double)f_lane(transmittance.c[k], lane);
+                to->weight[k] = (double)f_lane(flight.weight.c[k], lane);
+            }
+            to->t = (double)f_lane(flight.t, lane);
+            to->collided = i_lane(flight.real, lane) != 0;
+        }
+    }
+}
+
+const MediaKernels KERNELS = {run_eval, run_adj, run_track};

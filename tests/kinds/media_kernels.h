@@ -1,0 +1,33 @@
+// media_kernels.h: what the tests of volumes and of tracking share, compiled as phase_kernels.h says.
+#pragma once
+
+#include "medium/medium_node.h"
+
+enum { MEDIA_THETA = 1024, MEDIA_TABLES = 256 };
+
+typedef struct MediaCase {
+    int32_t theta_count;
+    VolumeNode sigma_t;
+    MediumNode medium;
+    double theta[MEDIA_THETA], tables[MEDIA_TABLES];
+} MediaCase;
+
+typedef struct MediaLookup {
+    double p[3], df[3];
+    double value[3], dp[3], forward; // out
+} MediaLookup;
+
+typedef struct MediaRay {
+    double o[3], d[3], tmax;
+    uint32_t sample;
+    double transmittance[3], t, weight[3]; // out
+    int32_t collided;
+} MediaRay;
+
+typedef struct MediaKernels {
+    void (*eval)(const MediaCase *c, int n, MediaLookup *q);
+    void (*adj)(const MediaCase *c, int n, MediaLookup *q, double *gradient, const double *tangent);
+    void (*track)(const MediaCase *c, int n, MediaRay *r);
+} MediaKernels;
+
+extern const MediaKernels media_kernels_double, media_kernels_w1, media_kernels_w8, media_kernels_w16;
