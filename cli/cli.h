@@ -66,6 +66,8 @@ typedef struct Options {
     int param_count;
     const char **sets; // --set key=value
     int set_count;
+    const char **loads; // --load FILE.xml or NAME=FILE
+    int load_count;
 } Options;
 
 // Parses a subcommand's arguments. Returns true when the command should run; otherwise *status is what it should
@@ -122,6 +124,8 @@ typedef struct Session {
 int cli_context_open(const Options *options, Session *session);
 int cli_session_open(const Options *options, const char *label, Session *session);
 void cli_session_close(Session *session);
+// What --load asks for.
+rey_result cli_load_values(const Options *options, rey_context *ctx, rey_scene *scene);
 
 // Reports a failed library call (words on standard error, one object on standard output with --json)
 // and returns the exit status for it: 130 when the user interrupted, else 1.

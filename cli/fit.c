@@ -141,30 +141,39 @@ static void free_overrides(char **texts, int count) {
     free(texts);
 }
 
-// -D and --spp are entries of the job, as --set would write them. Returns the overrides, owned with their texts; null when
+// PREFIX NAME="VALUE", owned; null when there is no memory.
+static char *entry_text(const char *prefix, const char *name, const char *value) {
+    size_t size = strlen(prefix) + strlen(name) + 2 * strlen(value) + 8;
+    char *text = malloc(size);
+    int at = text ? snprintf(text, size, "%s%s=\"", prefix, name) : 0;
+    for (const char *c = value; text && *c; c++) {
+        if (*c == '"' || *c == '\\') {
+            text[at++] = '\\';
+        }
+        text[at++] = *c;
+    }
+    if (text) {
+        memcpy(text + at, "\"", 2);
+    }
+    return text;
+}
+
+// -D, --load and --spp are entries of the job, as --set would write them. Returns the overrides, owned with their texts; null when
 // there is no memory.
 static char **job_overrides(const Options *o, int *count) {
-    char **texts = calloc((size_t)(o->set_count + o->define_count + 1), sizeof *texts);
+    char **texts = calloc((size_t)(o->set_count + o->define_count + 2), sizeof *texts);
     bool whole = texts != NULL;
     int n = 0;
+    if (o->load_count && whole) { // relative to the job's folder where a job says it, to the current one here
+        char *absolute = realpath(o->loads[0], NULL);
+        whole = (texts[n++] = entry_text("", "load", absolute ? absolute : o->loads[0])) != NULL;
+        free(absolute);
+    }
     for (int i = 0; i < o->set_count && whole; i++) {
         whole = (texts[n++] = strdup(o->sets[i])) != NULL;
     }
     for (int i = 0; i < o->define_count && whole; i++) {
-        const rey_define *d = &o->defines[i];
-        size_t size = strlen(d->name) + 2 * strlen(d->value) + 16;
-        char *text = texts[n++] = malloc(size);
-        whole = text != NULL;
-        int at = whole ? snprintf(text, size, "defines.%s=\"", d->name) : 0;
-        for (const char *c = d->value; whole && *c; c++) {
-            if (*c == '"' || *c == '\\') {
-                text[at++] = '\\';
-            }
-            text[at++] = *c;
-        }
-        if (whole) {
-            memcpy(text + at, "\"", 2);
-        }
+        whole = (texts[n++] = entry_text("defines.", o->defines[i].name, o->defines[i].value)) != NULL;
     }
     if (o->spp && whole) {
         char text[32];
@@ -188,8 +197,19 @@ static char *command_text(int argc, char **argv) {
     char *text = malloc(size);
     size_t at = text ? (size_t)snprintf(text, size, "reynolds") : 0;
     for (int i = 0; text && i < argc; i++) {
-        bool plain = argv[i][0] && !argv[i][strcspn(argv[i], " \t\n'\"$&|;<>()*?[]{}\\`!#~")];
-        at += (size_t)snprintf(text + at, size - at, plain ? " %s" : " '%s'", argv[i]);
+        const char *c = argv[i];
+        bool plain = c[0] && !c[strcspn(c, " \t\n'\"$&|;<>()*?[]{}\\`!#~")];
+        text[at++] = ' ';
+        if (plain) {
+            at += (size_t)snprintf(text + at, size - at, "%s", c);
+            continue;
+        }
+        text[at++] = '\'';
+        for (; *c; c++) { // a quote ends the quoted text, stands by itself, and begins another
+            at += (size_t)snprintf(text + at, size - at, *c == '\'' ? "'\\''" : "%c", *c);
+        }
+        text[at++] = '\'';
+        text[at] = '\0';
     }
     return text;
 }

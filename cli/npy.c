@@ -12,10 +12,11 @@
 typedef struct Header {
     int item_bytes; // 4 or 8
     int64_t count;
+    char shape[64]; // as text: "3x4"
 } Header;
 
-// Product of the numbers of "'shape': (a, b, c)"; -1 when it is malformed or overflows.
-static int64_t shape_count(const char *text) {
+// Product of the numbers of "'shape': (a, b, c)", which come out as "axbxc"; -1 when it is malformed or overflows.
+static int64_t shape_count(const char *text, char shape[64]) {
     const char *s = strstr(text, "'shape':");
     s = s ? strchr(s, '(') : NULL;
     if (!s) {
@@ -30,6 +31,8 @@ static int64_t shape_count(const char *text) {
             if (errno || __builtin_mul_overflow(count, n, &count)) {
                 return -1;
             }
+            size_t used = strlen(shape);
+            snprintf(shape + used, 64 - used, "%s%lld", used ? "x" : "", n);
             s = end - 1;
         } else if (*s != ',' && *s != ' ') {
             return -1;
@@ -57,13 +60,15 @@ static rey_result read_header(rey_context *ctx, FILE *file, const char *path, He
     const char *type = strstr(text, "'descr':");
     bool single = type && strstr(type, "'<f4'"), dual = type && strstr(type, "'<f8'");
     if (!single && !dual) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: expected little-endian float32 or float64 numbers", path);
+        const char *word = type ? strchr(type + 8, '\'') : NULL;
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: expected float32 or float64 numbers ('<f4' or '<f8'), found '%.*s'",
+                        path, word ? (int)strcspn(word + 1, "'") : 1, word ? word + 1 : "?");
     }
     if (strstr(text, "'fortran_order': True")) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: expected an array in C order, this one is in Fortran order", path);
     }
     header->item_bytes = single ? 4 : 8;
-    header->count = shape_count(text);
+    header->count = shape_count(text, header->shape);
     return REY_OK;
 }
 
@@ -84,13 +89,19 @@ static rey_result read_values(rey_context *ctx, FILE *file, const char *path, co
     return REY_OK;
 }
 
-rey_result cli_npy_read(rey_context *ctx, const char *path, int64_t count, float *values) {
+// shape: that the array must have, null = any.
+static rey_result npy_read(rey_context *ctx, const char *path, int64_t count, const char *name, const char *shape,
+                           float *values) {
     FILE *file = fopen(path, "rb");
     if (!file) {
         return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
     }
     Header header = {0};
     rey_result result = read_header(ctx, file, path, &header);
+    if (!result && shape && strcmp(shape, header.shape[0] ? header.shape : "1") != 0) {
+        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s as in the scene", path, name,
+                          header.shape[0] ? header.shape : "1", shape);
+    }
     if (!result && header.count != count) {
         result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: holds %lld numbers, the parameter has %lld", path,
                           (long long)header.count, (long long)count);
@@ -100,4 +111,17 @@ rey_result cli_npy_read(rey_context *ctx, const char *path, int64_t count, float
     }
     fclose(file);
     return result;
+}
+
+rey_result cli_npy_read(rey_context *ctx, const char *path, int64_t count, float *values) {
+    return npy_read(ctx, path, count, NULL, NULL, values);
+}
+
+rey_result cli_npy_read_param(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
+    char shape[64] = "";
+    for (int i = 0; i < info->dims; i++) {
+        size_t used = strlen(shape);
+        snprintf(shape + used, sizeof shape - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
+    }
+    return npy_read(ctx, path, info->count, info->name, info->dims ? shape : "1", values);
 }

@@ -40,6 +40,7 @@ typedef enum OptionId {
     OPTION_RESUME,
     OPTION_OVERWRITE,
     OPTION_LENIENT,
+    OPTION_LOAD,
     OPTION_JSON,
     OPTION_HELP
 } OptionId;
@@ -74,6 +75,8 @@ static const OptionRow option_rows[] = {
     {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR,
      "worker threads (default: all that are allowed)"},
     {OPTION_LANES, 0, "lanes", "1|8|16", RENDERS | FITS | READS | DOCTOR, "SIMD width (default: the widest)"},
+    {OPTION_LOAD, 0, "load", "FILE.xml|NAME=FILE", RENDERS | READS, "values of parameters, by name: from a saved scene, or of one from a picture or .npy; may be repeated"},
+    {OPTION_LOAD, 0, "load", "FILE.xml", FITS, "values of parameters, by name, from a saved scene"},
     {OPTION_LENIENT, 0, "lenient", NULL, RENDERS | READS, "leave out what cannot be read, and list it"},
     {OPTION_JSON, 0, "json", NULL, EVERY, "print one JSON object on standard output"},
     {OPTION_HELP, 'h', "help", NULL, EVERY, "print this text"},
@@ -298,6 +301,9 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         return parse_terms(o, value);
     case OPTION_STEP:
         return parse_step(o, value);
+    case OPTION_LOAD:
+        o->loads[o->load_count++] = value;
+        return true;
     case OPTION_SET:
         return parse_set(o, value);
     default:
@@ -416,11 +422,12 @@ bool cli_options_parse(Command command, int argc, char **argv, Options *options,
     options->define_names = calloc(most, sizeof *options->define_names);
     options->params = calloc(most, sizeof *options->params);
     options->sets = calloc(most, sizeof *options->sets);
+    options->loads = calloc(most, sizeof *options->loads);
     bool help = false;
     for (int i = 1; i < argc && strcmp(argv[i], "--"); i++) { // errors before it are to be told as JSON, too
         options->json = options->json || !strcmp(argv[i], "--json");
     }
-    if (!options->defines || !options->define_names || !options->params || !options->sets) {
+    if (!options->defines || !options->define_names || !options->params || !options->sets || !options->loads) {
         cli_note("out of memory");
         *status = EXIT_FAILED;
     } else if (parse_arguments(options, argc, argv, &help)) {
@@ -444,5 +451,6 @@ void cli_options_free(Options *options) {
     free(options->defines);
     free(options->params);
     free(options->sets);
+    free(options->loads);
     *options = (Options){.command = options->command};
 }

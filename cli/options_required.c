@@ -48,6 +48,8 @@ bool cli_options_required(const Options *o) {
     } else if ((c == COMMAND_RENDER || (c == COMMAND_GRAD && !o->reverse)) && o->output &&
                cli_image_format(o->output) == IMAGE_UNKNOWN) {
         cli_usage_error(o, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
+    } else if (c == COMMAND_FIT && (o->load_count > 1 || (o->load_count && strchr(o->loads[0], '=')))) {
+        cli_usage_error(o, "--load: a fit takes one saved scene; `start` of its parameters takes files");
     } else if (o->resume && o->overwrite) {
         cli_usage_error(o, "--resume continues and --overwrite starts again: give one of them");
     } else if (c == COMMAND_RENDER && !o->output && !o->json) {

@@ -172,6 +172,10 @@ static rey_result load_scene(Session *s) {
     if (result) {
         return result;
     }
+    result = cli_load_values(o, s->ctx, s->scene);
+    if (result) {
+        return result;
+    }
     for (int i = 0; i < rey_scene_ignored_count(s->scene); i++) {
         cli_note("ignored: %s", rey_scene_ignored(s->scene, i));
     }

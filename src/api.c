@@ -1,7 +1,9 @@
 // api.c: the parts of the public interface that belong to no module: they check arguments and hold no logic.
 #include "io/mitsuba.h"
 #include "io/save.h"
+#include "render/load_values.h"
 #include "render/update.h"
+#include "scene/values.h"
 
 static rey_result load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                        rey_scene **out) {
@@ -50,6 +52,25 @@ rey_result rey_scene_save(const rey_scene *scene, const char *path) {
     return result == REY_OK ? rey_mitsuba_save(scene, path) : result;
 }
 
+rey_result rey_scene_load_values(rey_scene *scene, const char *path) {
+    rey_scene *from = NULL;
+    rey_result result = rey_begin(scene ? scene->ctx : NULL, path != NULL);
+    if (result == REY_OK) {
+        result = load(scene->ctx, path, NULL, 0, 0, &from);
+    }
+    if (result == REY_OK) {
+        result = rey_values_check(scene, from, path);
+    }
+    for (ValuesPhase phase = VALUES_POSES; phase < VALUES_PHASES && result == REY_OK; phase++) {
+        result = rey_values_copy(scene, from, path, phase);
+        if (result == REY_OK) {
+            result = rey_scene_update(scene);
+        }
+    }
+    rey_scene_destroy(from);
+    return result;
+}
+
 rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height) {
     rey_result result = rey_begin(scene ? scene->ctx : NULL, width && height);
     if (result != REY_OK) {
@@ -89,6 +110,7 @@ void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info) {
     }
     const SceneView *v = &scene->view;
     *info = (rey_scene_info){.shapes = v->shapes_count,
+                             .instances = v->instances_count,
                              .bsdfs = v->bsdfs_count,
                              .emitters = v->emitters_count,
                              .textures = v->textures_count,

@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "fit/report.h"
 #include "io/file.h"
+#include "render/load_values.h"
 
 #include <locale.h>
 #include <stdio.h>
@@ -75,6 +76,10 @@ static rey_result open_job(Fit *fit) {
     if (!result) {
         result = scene ? rey_scene_load(fit->ctx, scene, fit->job.defines, fit->job.define_count, &fit->scene)
                        : REY_ERROR_MEMORY;
+    }
+    if (!result && fit->job.load) {
+        const char *values = rey_job_path(&fit->job, fit->job.load);
+        result = values ? rey_scene_load_values(fit->scene, values) : REY_ERROR_MEMORY;
     }
     return result;
 }

@@ -245,6 +245,7 @@ static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
 static const Field job_fields[] = {
     {.key = "folder", .type = FIELD_TEXT, .offset = offsetof(Job, folder)},
     {.key = "scene", .type = FIELD_TEXT, .offset = offsetof(Job, scene), .required = true},
+    {.key = "load", .type = FIELD_TEXT, .offset = offsetof(Job, load)},
     {.key = "defines", .type = FIELD_READER, .offset = offsetof(Job, defines), .read = read_defines},
     {.key = "output", .type = FIELD_TEXT, .offset = offsetof(Job, output)},
     {.key = "seed", .type = FIELD_SEED, .offset = offsetof(Job, seed), .high = 4294967295.0},

@@ -64,6 +64,7 @@ typedef struct Job {
     const char *path;   // of the job file
     const char *folder; // that paths are relative to
     const char *scene, *truth_scene, *output;
+    const char *load; // scene file whose values the scene gets, or null
     rey_define *defines;
     int define_count;
     uint32_t seed;

@@ -102,6 +102,9 @@ static void flat_views(Text *t, const Job *job) {
 static void flat_decisive(Text *t, const Job *job) {
     char key[512];
     line_text(t, "scene", job->scene);
+    if (job->load) {
+        line_text(t, "load", job->load);
+    }
     for (int i = 0; i < job->define_count; i++) {
         snprintf(key, sizeof key, "defines.%s", job->defines[i].name);
         line_text(t, key, job->defines[i].value);
@@ -199,6 +202,23 @@ rey_result rey_job_yaml(const Job *job, char **out) {
     return rey_text_take(&nested, out);
 }
 
+static size_t key_length(const char *line) {
+    const char *end = strstr(line, ": ");
+    size_t length = strcspn(line, "\n");
+    return end && (size_t)(end - line) < length ? (size_t)(end - line) : length;
+}
+
+// Has one of the lines the key of `line`?
+static bool has_key(const char *text, const char *line) {
+    size_t length = key_length(line);
+    for (; *text; text += strcspn(text, "\n"), text += *text != 0) {
+        if (key_length(text) == length && strncmp(text, line, length) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 bool rey_job_difference(const char *a, const char *b, char *key, size_t size) {
     while (*a && *b) {
         size_t na = strcspn(a, "\n"), nb = strcspn(b, "\n");
@@ -211,8 +231,8 @@ bool rey_job_difference(const char *a, const char *b, char *key, size_t size) {
     if (!*a && !*b) {
         return false;
     }
-    const char *line = *a ? a : b;
-    const char *end = strstr(line, ": ");
-    snprintf(key, size, "%.*s", end ? (int)(end - line) : (int)strcspn(line, "\n"), line);
+    // A line that stands further down in the other text follows one that was put in there.
+    const char *line = !*a || (*b && !has_key(a, b) && has_key(b, a)) ? b : a;
+    snprintf(key, size, "%.*s", (int)key_length(line), line);
     return true;
 }

@@ -41,6 +41,22 @@ static void fits_take_the_common_options(void **state) {
     assert_int_equal(system(command), 0);
 }
 
+// What a fit wrote loads by name into the scene that it began with, and another fit goes on from there.
+static void saved_values_load_by_name(void **state) {
+    (void)state;
+    char command[4096];
+    snprintf(command, sizeof command,
+             "r='%s'; j='%s'; $r render $j/truth.xml -o target.exr --spp 16 2>words.txt && $r fit $j/job.yaml --set "
+             "views.0.target=$PWD/target.exr --set iterations=3 -o \"it's\" --spp 8 >out.txt 2>words.txt && "
+             "$r render it\\'s/recovered.xml -o a.npy --spp 2 2>words.txt && $r render $j/start.xml --load "
+             "it\\'s/recovered.xml -o b.npy --spp 2 2>words.txt && cmp a.npy b.npy && $r render $j/start.xml -o b.npy "
+             "--spp 2 2>words.txt && ! cmp -s a.npy b.npy && $r fit $j/job.yaml --load it\\'s/recovered.xml --set "
+             "views.0.target=$PWD/target.exr --set iterations=0 -o fourth >out.txt 2>words.txt && $r render "
+             "fourth/recovered.xml -o b.npy --spp 2 2>words.txt && cmp a.npy b.npy",
+             REYNOLDS_COMMAND, TEST_JOBS);
+    assert_int_equal(system(command), 0);
+}
+
 static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
     expect(f, status, arguments);
     if (!strstr(f->words, words)) {
@@ -57,6 +73,18 @@ static void usage_errors_are_json_too(void **state) {
         assert_non_null(json_text(node, "error", NULL));
         json_free(node);
     }
+}
+
+// Values of one parameter from a file must have its shape.
+static void loaded_values_have_shapes(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "render %s -o picture.npy --spp 1");
+    expect_words(f, 1, "render %s -o a.exr --spp 1 --load red.reflectance.value=picture.npy",
+                 "picture.npy: 'red.reflectance.value' has the shape 24x32x3, expected 3 as in the scene");
+    expect_words(f, 1, "render %s -o a.exr --spp 1 --load re.reflectance.value=picture.npy",
+                 "no parameter 're.reflectance.value', did you mean 'red.reflectance.value'?");
+    expect_words(f, 1, "params %s --load nowhere.xml", "nowhere.xml");
+    expect_words(f, 2, "fit job.yaml --load a=b.npy", "a fit takes one saved scene");
 }
 
 static void words_help(void **state) {
@@ -131,6 +159,8 @@ int main(void) {
         cmocka_unit_test(hangups_stop_fits),
         cmocka_unit_test(fits_take_the_common_options),
         cmocka_unit_test(usage_errors_are_json_too),
+        cmocka_unit_test(saved_values_load_by_name),
+        cmocka_unit_test(loaded_values_have_shapes),
         cmocka_unit_test(words_help),
         cmocka_unit_test(tables_are_aligned),
         cmocka_unit_test(unequal_pictures),

@@ -1,6 +1,6 @@
 // test_save.c: a scene that is saved and loaded again renders the same picture, bit for bit.
 #include "io/image.h"
-#include "reynolds/reynolds.h"
+#include "render/load_values.h"
 
 #include <dirent.h>
 #include <setjmp.h>
@@ -173,6 +173,98 @@ static void mesh_flags_come_back(void **state) {
                             "<transform name=\"to_world\"><scale x=\"-1\" y=\"0.5\"/></transform>");
 }
 
+// Moves every parameter a little.
+static void change_all(Fixture *f, rey_scene *scene) {
+    static float values[1 << 16];
+    for (int i = 0; i < rey_param_count(scene); i++) {
+        rey_param_info info;
+        assert_int_equal(rey_param_get_info(scene, i, &info), REY_OK);
+        char pose[256];
+        const char *dot = strrchr(info.name, '.');
+        snprintf(pose, sizeof pose, "%.*s.to_world", (int)(dot - info.name), info.name);
+        bool follows = strcmp(dot, ".positions") == 0 && rey_param_find(scene, pose) >= 0;
+        if (follows || strcmp(dot, ".normals") == 0 || info.count > 1 << 16) {
+            continue;
+        }
+        memcpy(values, rey_param_values(scene, i), (size_t)info.count * sizeof *values);
+        bool posed = strcmp(dot, ".to_world") == 0 || strcmp(dot, ".to_uv") == 0;
+        for (int64_t k = 0; k < info.count; k++) {
+            values[k] += posed ? (k == 3 ? 0.01f : 0) : 0.97f * values[k] >= info.low ? -0.03f * values[k] : 0;
+        }
+        if (rey_param_set(scene, i, values, info.count)) {
+            fail_msg("%s", rey_error(f->ctx));
+        }
+    }
+}
+
+// What was saved loads by name into the scene that it came from.
+static void expect_values(Fixture *f, const char *path, int define_count) {
+    static float original[NUMBERS], before[NUMBERS], after[NUMBERS];
+    char copy[128];
+    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+    rey_scene *scene = load(f, path, define_count);
+    render(f, scene, original);
+    change_all(f, scene);
+    if (rey_scene_save(scene, copy)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    rey_scene *saved = load(f, copy, 0);
+    render(f, saved, before);
+    rey_scene *again = load(f, path, define_count);
+    if (rey_scene_load_values(again, copy)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    render(f, again, after);
+    rey_scene_destroy(scene);
+    rey_scene_destroy(saved);
+    rey_scene_destroy(again);
+    assert_memory_not_equal(original, before, sizeof before);
+    assert_memory_equal(before, after, sizeof before);
+}
+
+static void values_load_by_name(void **state) {
+    Fixture *f = *state;
+    expect_values(f, RENDER_DIR "/materials.xml", 2);
+    expect_values(f, RENDER_DIR "/shapes.xml", 0);
+    expect_values(f, RENDER_DIR "/principled.xml", 2);
+    expect_values(f, RENDER_DIR "/layers.xml", 2);
+}
+
+// What does not fit is refused before anything is changed.
+static void wrong_values_are_refused(void **state) {
+    static const char *const texts[] = {
+        "<bsdf type='diffuse' id='wall'><rgb name='reflectance' value='0.3'/></bsdf><bsdf type='diffuse' id='wal'/>",
+        "<bsdf type='roughconductor' id='wall'/>",
+        "<bsdf type='diffuse' id='wall'><texture type='bitmap' name='reflectance'><string name='filename' "
+        "value='texels.exr'/></texture></bsdf>",
+        "<texture type='bitmap' id='wall'><string name='filename' value='texels.exr'/></texture>",
+    };
+    static const char *const words[] = {
+        "wrong.xml: the scene has no parameter 'wal.reflectance.value', which this file has, did you mean 'wall.refl",
+        "the scene has no parameter 'wall.", "the scene has no parameter 'wall.reflectance.data'",
+        "wrong.xml: 'wall.data' has the shape 3x4x3, expected 5x8x3 as in the scene"};
+    Fixture *f = *state;
+    char path[128], wrong[128];
+    snprintf(path, sizeof path, "%s/own.xml", f->folder);
+    snprintf(wrong, sizeof wrong, "%s/wrong.xml", f->folder);
+    for (int i = 0; i < 4; i++) {
+        FILE *file = fopen(path, "w"), *other = fopen(wrong, "w");
+        assert_true(file && other);
+        fprintf(file, "<scene version='3.0.0'>%s</scene>",
+                i < 3 ? "<bsdf type='diffuse' id='wall'/>"
+                      : "<texture type='bitmap' id='wall'><string name='filename' value='sky.exr'/></texture>");
+        fprintf(other, "<scene version='3.0.0'>%s</scene>", texts[i]);
+        assert_int_equal(fclose(file) | fclose(other), 0);
+        rey_scene *scene = load(f, path, 0);
+        assert_int_equal(rey_scene_load_values(scene, wrong), REY_ERROR_PARAM);
+        if (!strstr(rey_error(f->ctx), words[i])) {
+            fail_msg("'%s', expected '%s'", rey_error(f->ctx), words[i]);
+        }
+        assert_true(rey_param_values(scene, 0)[0] != 0.3f);
+        rey_scene_destroy(scene);
+    }
+}
+
 static int count_files(const char *folder) {
     int count = 0;
     DIR *list = opendir(folder);
@@ -221,6 +313,8 @@ int main(void) {
         cmocka_unit_test(texture_poses_come_back),
         cmocka_unit_test(mesh_flags_come_back),
         cmocka_unit_test(files_are_written_once),
+        cmocka_unit_test(values_load_by_name),
+        cmocka_unit_test(wrong_values_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,0 +1,73 @@
+// load_values.c: --load: values of parameters from a saved scene, or those of one parameter from a file.
+#include "cli.h"
+#include "npy.h"
+
+#include "base/context.h"
+#include "io/image.h"
+#include "render/load_values.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+// The picture's values as they are meant: 8-bit files decoded, grey or three channels as the parameter has them.
+static rey_result read_picture(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
+    rey_image image = {0};
+    rey_result result = rey_image_read(ctx, path, &image);
+    if (result == REY_OK && info->dims == 3 && info->shape[2] == 3) {
+        result = rey_image_to_rgb(ctx, &image);
+    }
+    if (result == REY_OK && image.srgb) {
+        rey_image_decode_srgb(&image);
+    }
+    if (result == REY_OK && (info->dims != 3 || image.height != info->shape[0] || image.width != info->shape[1] ||
+                             image.channels != info->shape[2])) {
+        char expected[64] = "";
+        for (int i = 0; i < info->dims; i++) {
+            size_t used = strlen(expected);
+            snprintf(expected + used, sizeof expected - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
+        }
+        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %dx%dx%d, expected %s as in the scene", path,
+                          info->name, image.height, image.width, image.channels, info->dims ? expected : "one number");
+    }
+    if (result == REY_OK) {
+        memcpy(values, image.data, (size_t)info->count * sizeof *values);
+    }
+    rey_image_free(ctx, &image);
+    return result;
+}
+
+static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name, size_t length, const char *path) {
+    char text[512];
+    rey_param_info info;
+    snprintf(text, sizeof text, "%.*s", (int)length, name);
+    int param = rey_param_find(scene, text);
+    if (param < 0) {
+        const char *nearest = rey_param_nearest(scene, text);
+        return rey_fail(ctx, REY_ERROR_PARAM, "--load %s: the scene has no parameter '%s'%s%s%s", path, text,
+                        nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
+    }
+    rey_result result = rey_param_get_info(scene, param, &info);
+    float *values = result ? NULL : rey_alloc_array(ctx, (size_t)info.count, sizeof *values);
+    size_t size = strlen(path);
+    if (!values) {
+        return result ? result : REY_ERROR_MEMORY;
+    }
+    bool array = size > 4 && strcasecmp(path + size - 4, ".npy") == 0;
+    result = array ? cli_npy_read_param(ctx, path, &info, values) : read_picture(ctx, path, &info, values);
+    if (result == REY_OK) {
+        result = rey_param_set(scene, param, values, info.count);
+    }
+    rey_free(ctx, values);
+    return result;
+}
+
+rey_result cli_load_values(const Options *options, rey_context *ctx, rey_scene *scene) {
+    rey_result result = REY_OK;
+    for (int i = 0; i < options->load_count && result == REY_OK; i++) {
+        const char *text = options->loads[i], *equals = strchr(text, '=');
+        result = equals ? load_one(ctx, scene, text, (size_t)(equals - text), equals + 1)
+                        : rey_scene_load_values(scene, text);
+    }
+    return result;
+}
