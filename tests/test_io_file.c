@@ -1,5 +1,6 @@
 // test_io_file.c: files written whole: through links, into pipes and devices, past limits, under long names.
 #include "io/file.h"
+#include "io/file_stale.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -133,6 +134,39 @@ static void modes_are_those_of_other_files(void **state) {
 }
 
 // The limit's signal must not end the program, the former file stays, and no temporary one does.
+static void make_empty(const char *path) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    assert_int_equal(fclose(file), 0);
+}
+
+// What a killed process left is removed; what another one, or one of another machine, may be writing is not.
+static void what_the_killed_left_is_removed(void **state) {
+    Fixture *f = *state;
+    char stale[256], own[256], foreign[256], output[256], name[64];
+    pid_t child = fork();
+    if (child == 0) {
+        _exit(0);
+    }
+    int status;
+    assert_true(child > 0 && waitpid(child, &status, 0) == child);
+    rey_file_temporary_name(name, sizeof name, 7);
+    snprintf(own, sizeof own, "%s/%s", f->folder, name);
+    char *process = strchr(name + strlen(".reynolds-"), '-');
+    assert_non_null(process);
+    snprintf(stale, sizeof stale, "%s/%.*s-%lx-7", f->folder, (int)(process - name), name, (long)child);
+    snprintf(foreign, sizeof foreign, "%s/.reynolds-0-%lx-7", f->folder, (long)child);
+    snprintf(output, sizeof output, "%s/picture.exr", f->folder);
+    make_empty(stale);
+    make_empty(own);
+    make_empty(foreign);
+    assert_int_equal(rey_file_check_output(f->ctx, output), REY_OK);
+    assert_int_not_equal(access(stale, F_OK), 0);
+    assert_int_equal(access(own, F_OK), 0);
+    assert_int_equal(access(foreign, F_OK), 0);
+    assert_int_equal(unlink(own) | unlink(foreign), 0);
+}
+
 static void limits_are_errors(void **state) {
     Fixture *f = *state;
     expect_write(f, "limited", "former");
@@ -155,6 +189,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(links_stay_links),         cmocka_unit_test(devices_and_pipes_are_written),
         cmocka_unit_test(names_may_be_long),        cmocka_unit_test(wrong_places_are_refused),
-        cmocka_unit_test(modes_are_those_of_other_files), cmocka_unit_test(limits_are_errors)};
+        cmocka_unit_test(modes_are_those_of_other_files), cmocka_unit_test(limits_are_errors),
+        cmocka_unit_test(what_the_killed_left_is_removed)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -13,5 +13,6 @@ rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **byt
 // Devices and pipes are written as they are. On failure the temporary file is removed.
 rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size);
 
-// Whether rey_file_write could write there now, tried with an empty temporary file: asked before long work.
+// Whether rey_file_write could write there now, tried with an empty temporary file: asked before long work. Removes
+// temporary files that a killed process left in the folder.
 rey_result rey_file_check_output(rey_context *ctx, const char *path);

@@ -1,6 +1,7 @@
 // file_write.c: whole files out: complete or not at all, whatever the path names.
 #define _GNU_SOURCE // the GNU strerror_r
 #include "io/file.h"
+#include "io/file_stale.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -87,8 +88,11 @@ static rey_result find_target(rey_context *ctx, const char *path, Target *target
     }
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    int all = snprintf(target->temporary, sizeof target->temporary, "%.*s.reynolds-%lx-%llx", (int)(name - target->path),
-                       target->path, (long)getpid(), (unsigned long long)now.tv_sec * 1000000000u + (unsigned)now.tv_nsec);
+    char temporary[64];
+    rey_file_temporary_name(temporary, sizeof temporary,
+                            (unsigned long long)now.tv_sec * 1000000000u + (unsigned)now.tv_nsec);
+    int all = snprintf(target->temporary, sizeof target->temporary, "%.*s%s", (int)(name - target->path), target->path,
+                       temporary);
     if (all >= (int)sizeof target->temporary) {
         errno = ENAMETOOLONG;
         return fail_errno(ctx, path, "create");
@@ -196,5 +200,10 @@ rey_result rey_file_check_output(rey_context *ctx, const char *path) {
     }
     close(file);
     unlink(target.temporary);
+    char *slash = strrchr(target.path, '/');
+    if (slash) {
+        slash[slash == target.path] = '\0';
+    }
+    rey_file_remove_stale(slash ? target.path : ".");
     return REY_OK;
 }

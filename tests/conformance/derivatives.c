@@ -189,6 +189,9 @@ static void run_parts(Run *r) {
     for (int i = 0; i < COUNT_OF(parts); i++) {
         double samples = (double)part_spp(r, parts[i]) * r->config->width * r->config->height;
         if (r->suite->quick && samples > quick_samples) {
+            char name[320];
+            snprintf(name, sizeof name, "%s %s", r->config->name, parts[i]);
+            suite_report(r->suite, name, VERDICT_SKIP, r->config->gated, "left out by --quick");
             continue;
         }
         Errors worst = {0};
