@@ -18,11 +18,13 @@ KFN Float hg_pdf(const Hg *p, Vec3 wi, Vec3 wo) { return hg_eval(p, wi, wo); }
 
 KFN Vec3 hg_sample(const Hg *p, Vec3 wi, Float u1, Vec2 u2) {
     UNUSED(u1);
-    // The inverse of the distribution, (1 + g^2 - ((1 - g^2) / (1 + g q))^2) / 2 g with q = 2 u - 1, multiplied out so that
-    // nothing is divided by g.
-    Float g = p->g, q = 2.0f * u2.x - 1.0f, g2 = g * g;
-    Float above = q * (1.0f + g2) + 0.5f * g * (q * q * (1.0f + g2) + 3.0f - g2);
-    return phase_direction(wi, f_clamp(above / f_sqr(1.0f + g * q), f_set(-1), f_set(1)), u2.y);
+    // The inverse of the distribution, cos = (1 + a^2 - ((1 - a^2) / s)^2) / 2 a with a = |g| and s = 1 - a + 2 a u, as the
+    // difference from 1: 1 - cos = (1 - a)^2 (1 - u) (1 + a + s) / s^2, in which nothing cancels and nothing is divided by g.
+    Mask forward = m_ge(p->g, f_set(0));
+    Float a = f_abs(p->g), u = f_select(forward, u2.x, 1.0f - u2.x);
+    Float s = (1.0f - a) + 2.0f * a * u, ratio = (1.0f - a) / s;
+    Float h = f_clamp(ratio * ratio * (1.0f - u) * (1.0f + a + s), f_set(0), f_set(2));
+    return phase_direction_at(wi, f_select(forward, 1.0f - h, h - 1.0f), f_safe_sqrt(h * (2.0f - h)), u2.y);
 }
 
 KFN void hg_adj(const Hg *p, Vec3 wi, Vec3 wo, Float df, Hg *dp, Vec3 *dwi, Vec3 *dwo) {

@@ -48,10 +48,14 @@ KFN void phase_cosine_adj(Vec3 wi, Vec3 wo, Float d, Vec3 *dwi, Vec3 *dwo) {
     *dwo = v3_madd(*dwo, -d, wi);
 }
 
-// The direction at an angle from -wi, and at phi around it.
-KFN Vec3 phase_direction(Vec3 wi, Float cosine, Float u) {
-    Float sine = f_safe_sqrt(1.0f - cosine * cosine), sin_phi, cos_phi;
+// The direction at an angle from -wi, turned around it by the share u of a circle.
+KFN Vec3 phase_direction_at(Vec3 wi, Float cosine, Float sine, Float u) {
+    Float sin_phi, cos_phi;
     Frame frame = frame_from_normal(v3_neg(wi));
     f_sincos(TWO_PI * u, &sin_phi, &cos_phi);
     return frame_to_world(&frame, v3(sine * cos_phi, sine * sin_phi, cosine));
+}
+
+KFN Vec3 phase_direction(Vec3 wi, Float cosine, Float u) {
+    return phase_direction_at(wi, cosine, f_safe_sqrt(1.0f - cosine * cosine), u);
 }
