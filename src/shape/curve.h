@@ -29,9 +29,17 @@ KFN CurvePoint curve_sum(const SceneView *scene, const Hit *hit, int n, const Fl
     return p;
 }
 
+// The angle about the tangent from z x tangent on, in [0, 2 pi), as in the format; from x where the tangent is along z.
+// radial is perpendicular to the tangent, so that its z is its part along tangent x (z x tangent).
+KFN Float curve_angle(Vec3 tangent, Vec3 radial) {
+    Mask upright = m_lt(tangent.x * tangent.x + tangent.y * tangent.y, f_set(1e-10f));
+    Float across = f_select(upright, radial.x * tangent.z, radial.y * tangent.x - radial.x * tangent.y);
+    Float angle = f_atan2(f_select(upright, radial.y, radial.z), across);
+    return angle + f_zero_unless(m_lt(angle, f_set(0)), f_set(TWO_PI));
+}
+
 KFN Vec2 curve_uv(const SceneView *scene, const Hit *hit, Vec3 tangent, Vec3 radial) {
-    Frame f = frame_from_normal(tangent);
-    Float angle = f_atan2(v3_dot(radial, f.t), v3_dot(radial, f.s)) + PI;
+    Float angle = curve_angle(tangent, radial);
     Float segments = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count));
     return (Vec2){angle * INV_TWO_PI, (f_from_i(hit->prim) + hit->u) / segments};
 }
