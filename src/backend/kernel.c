@@ -88,7 +88,8 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     for (int32_t i = 0; i < count; i++) {
         double l[SPEC_N], sum = 0;
         for (int c = 0; c < SPEC_N; c++) {
-            l[c] = (double)t->ws.radiance[c][i];
+            bool dropped = t->scene->drops && t->ws.coverage[i] <= 0;
+            l[c] = dropped ? 0 : (double)t->ws.radiance[c][i];
             sum += l[c];
         }
         if (!(sum - sum == 0)) {

@@ -95,6 +95,8 @@ KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
 }
 
 // Alpha of a path is 1 where an environment shows, and where the path meets a surface that does not merely let it pass.
+KFN bool keeps_coverage(const Tracer *t) { return t->job->coverage || (t->scene->drops && !t->derivative); }
+
 KFN void cover(Tracer *t, Int slot, Mask m) { f_scatter(t->ws.coverage, slot, f_set(1), m); }
 
 // Paths that left the scene: the environment, weighed against having been sampled as a light.
@@ -242,7 +244,7 @@ KFN void append_paths(Tracer *t, const Vertex *v, const Interaction *si, const O
     // Lights are weighed as seen from the last vertex that turned the path.
     Vec3 origin = si->p;
     Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(PDF_DELTA));
-    if (t->scene->hide_emitters) {
+    if (t->scene->hide_emitters && !t->scene->solid) {
         Mask absent = mi_eq(w->sample.lobe & 3, i_set(LOBE_NULL)) & m_le(v->pdf, f_set(PDF_VIEWED));
         density = f_select(absent, f_set(PDF_VIEWED), density);
     }
@@ -314,8 +316,9 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     play_roulette(t, key, bounce, &w);
     w.d = frame_to_world(&si->sh, w.sample.wo);
     append_paths(t, v, si, &w, next_count);
-    if (t->job->coverage) {
-        cover(t, v->slot, v->m & ~mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL)));
+    if (keeps_coverage(t)) {
+        Mask passes = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+        cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);
     }
     if (record >= 0) {
         record_onward(t, record, &w);
@@ -352,7 +355,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         if (!t->derivative) {
             slot_add(t, v.slot, spec_mul(v.beta, emission), lit);
         }
-        if (t->job->coverage) {
+        if (keeps_coverage(t)) {
             cover(t, v.slot, lit);
         }
     }
@@ -435,7 +438,7 @@ static void shadow_stage(Tracer *t) {
 // Runs the chunk's paths to their ends. begin: scratch of group count + 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
-    for (int32_t i = 0; t->job->coverage && i < t->active; i++) {
+    for (int32_t i = 0; keeps_coverage(t) && i < t->active; i++) {
         t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters;
     }
     int32_t groups = (int32_t)scene->groups_count + 1;

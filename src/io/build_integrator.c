@@ -40,8 +40,10 @@ static rey_result get_split(Builder *b, rey_xml_node *node, SceneView *view) {
 
 static rey_result get_depths(Builder *b, rey_xml_node *node, SceneView *view) {
     int64_t depth, roulette;
+    view->drops = is(node, "path");
     if (is(node, "direct")) {
         view->max_depth = 2;
+        view->solid = true;
         return get_split(b, node, view);
     }
     TRY(rey_xml_get_int(b->ctx, node, "max_depth", -1, INT32_MAX, is(node, "prb") ? 6 : -1, &depth));

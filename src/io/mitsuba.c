@@ -144,6 +144,27 @@ static rey_result build_default_integrator(Builder *b, const rey_xml_node *root)
     return ignored && !b->scene->integrator ? REY_ERROR_MEMORY : REY_OK;
 }
 
+// Does a scattering function let light pass and scatter it, too?
+static bool passes(const Builder *b, int32_t id, bool *mixed) {
+    const BsdfNode *bsdf = &ARRAY_AT(b->scene->build.bsdfs, BsdfNode, id);
+    const char *name = rey_bsdf_kinds[bsdf->kind].name;
+    bool through = strcmp(name, "null") == 0 || strcmp(name, "thindielectric") == 0 || strcmp(name, "mask") == 0;
+    for (int i = 0; i < MAX_CHILDREN && bsdf->child[i] >= 0; i++) {
+        through = passes(b, bsdf->child[i], mixed) || through;
+    }
+    *mixed = *mixed || (through && bsdf->child[0] >= 0);
+    return through;
+}
+
+// What `path` drops is dropped only where a surface can have scattered light to the camera and let the path pass.
+static void find_drops(Builder *b) {
+    bool mixed = false;
+    for (size_t i = 0; i < b->scene->build.bsdfs.count; i++) {
+        passes(b, (int32_t)i, &mixed);
+    }
+    b->scene->view.drops = b->scene->view.drops && b->scene->view.hide_emitters && mixed;
+}
+
 static rey_result build_scene(Builder *b) {
     rey_xml_node *root = rey_xml_root(b->source->document);
     int counts[REY_XML_TAG_COUNT] = {0};
@@ -163,6 +184,7 @@ static rey_result build_scene(Builder *b) {
     }
     TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
+    find_drops(b);
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);

@@ -218,6 +218,11 @@ static bool has_interior(const Param *p) {
 // Refuses parameters whose derivative would lack a term.
 static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
     const int available = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
+    if (scene->view.drops) {
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
+                        "with hide_emitters, 'path' drops light of a surface that lets a part of it pass, and what it "
+                        "drops has no derivative: 'volpath' drops none");
+    }
     for (int i = 0; i < selection.count; i++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(scene, selection.params[i], &info);

@@ -144,6 +144,8 @@ typedef struct SceneView {
 #undef ARRAY
     int32_t environment;      // emitter index of the constant or envmap light, -1 = none
     int32_t max_depth, rr_depth, hide_emitters;
+    bool solid;               // surfaces that let a ray pass hide nothing behind them, and count in alpha (direct)
+    bool drops;               // with hidden emitters, a path that met only surfaces that let it pass brings nothing (path)
     bool through;             // passing a surface undeviated counts in no depth, and shadow rays do it (volpath)
     // direct: of `split` samples in a row, the first light_samples sample a light and the first scatter_samples the
     // scattering function; 0 = every sample does both.

@@ -441,11 +441,49 @@ static void test_hidden_sky(void **state) {
     }
 }
 
+// With hidden emitters, `path` drops what a path brought that met only surfaces that let it pass, as the format's
+// renderer does: 0.714 of the light of a mask of opacity 0.4 under a sky remains there. `volpath` drops nothing, and
+// `direct` shows the sky behind.
+static void test_dropped_light(void **state) {
+    static const char *const names[] = {"path", "volpath", "direct"};
+    double mean[3] = {0};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        char integrator[128];
+        rey_context *ctx;
+        float image[4 * 4 * 3];
+        double gradient[3];
+        rey_render_def def = rey_default_render_def();
+        def.spp = 1024;
+        snprintf(integrator, sizeof integrator, "<integrator type='%s'><boolean name='hide_emitters' value='true'/></integrator>",
+                 names[i]);
+        assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+        rey_scene *scene = load_text(ctx, integrator, "<emitter type='constant'/><shape type='rectangle'><transform "
+                                                      "name='to_world'><scale value='50'/><rotate y='1' angle='180'/>"
+                                                      "<translate z='3'/></transform><bsdf type='mask'><float name='opacity' "
+                                                      "value='0.4'/><bsdf type='diffuse' id='grey'/></bsdf></shape>");
+        assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
+        for (int k = 0; k < 48; k++) {
+            mean[i] += (double)image[k] / 48;
+        }
+        int param = rey_param_find(scene, "grey.reflectance.value");
+        assert_true(param >= 0);
+        def.spp = 16;
+        assert_int_equal(rey_vjp(scene, &def, (rey_selection){&param, 1}, image, gradient, NULL, NULL),
+                         i == 0 ? REY_ERROR_UNSUPPORTED : REY_OK);
+        rey_scene_destroy(scene);
+        rey_context_destroy(ctx);
+    }
+    near("volpath", 0, 0, mean[1], 0.2, 0.002);
+    near("path", 0, 0, mean[0] / mean[1], 0.714, 0.02);
+    near("direct", 0, 0, mean[2], 0.8, 0.005);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_corridor), cmocka_unit_test(test_corridor_roulette),
                                        cmocka_unit_test(test_through), cmocka_unit_test(test_through_gradient),
                                        cmocka_unit_test(test_split),            cmocka_unit_test(test_layers),
                                        cmocka_unit_test(test_moments),          cmocka_unit_test(test_depth),
-                                       cmocka_unit_test(test_hidden_sky)};
+                                       cmocka_unit_test(test_hidden_sky), cmocka_unit_test(test_dropped_light)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
