@@ -98,6 +98,7 @@ static void print_json(const FitResult *result) {
     json_integer(&json, "threads", rey_threads(result->ctx));
     json_integer(&json, "lanes", rey_lanes(result->ctx));
     json_integer(&json, "numbers", result->numbers);
+    json_integer(&json, "nonfinite", result->nonfinite);
     json_array(&json, "parameters");
     for (size_t i = 0; i < result->rows.count; i++) {
         const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
@@ -124,6 +125,10 @@ static void print_words(const FitResult *result) {
     printf("\n%lld number%s, %d iteration%s%s, %.1f s, loss %.4g\n", (long long)result->numbers,
            PLURAL(result->numbers), result->iterations, PLURAL(result->iterations),
            result->converged ? " (converged)" : "", result->seconds, result->loss);
+    if (result->nonfinite) {
+        cli_note("warning: %lld sample%s not finite and left out of losses and gradients", (long long)result->nonfinite,
+                 result->nonfinite == 1 ? " was" : "s were");
+    }
     if (result->report) {
         printf("report  %s\n", result->report);
     }

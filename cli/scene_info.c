@@ -3,6 +3,8 @@
 
 #include "base/context.h"
 #include "base/parallel.h"
+#include "io/mitsuba.h"
+#include "base/parallel.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -151,6 +153,46 @@ static void count_rows(const rey_scene_info *info, CountRow rows[COUNT_ROWS]) {
     memcpy(rows, all, sizeof all);
 }
 
+// A line for each sort of objects: "bsdf   diffuse 3, plastic 1".
+static void print_kinds(const Session *s) {
+    Array kinds;
+    if (rey_mitsuba_kinds(s->scene, &kinds) != REY_OK) {
+        return;
+    }
+    for (size_t i = 0; i < kinds.count; i++) {
+        const KindCount *k = &ARRAY_AT(kinds, KindCount, i);
+        if (strcmp(k->tag_name, "integrator") == 0) {
+            continue; // has a line of its own
+        }
+        bool first = i == 0 || k[-1].tag != k->tag, last = i + 1 == kinds.count || k[1].tag != k->tag;
+        if (first) {
+            printf("%-17s ", k->tag_name);
+        }
+        printf("%s %d%s", k->type, k->count, last ? "\n" : ", ");
+    }
+    rey_array_free(s->ctx, &kinds);
+}
+
+static void json_kinds(Json *json, const Session *s) {
+    Array kinds;
+    if (rey_mitsuba_kinds(s->scene, &kinds) != REY_OK) {
+        return;
+    }
+    json_object(json, "kinds");
+    for (size_t i = 0; i < kinds.count; i++) {
+        const KindCount *k = &ARRAY_AT(kinds, KindCount, i);
+        if (i == 0 || k[-1].tag != k->tag) {
+            json_object(json, k->tag_name);
+        }
+        json_integer(json, k->type, k->count);
+        if (i + 1 == kinds.count || k[1].tag != k->tag) {
+            json_object_end(json);
+        }
+    }
+    json_object_end(json);
+    rey_array_free(s->ctx, &kinds);
+}
+
 static void print_info(const Session *s) {
     rey_scene_info info;
     rey_scene_get_info(s->scene, &info);
@@ -159,6 +201,8 @@ static void print_info(const Session *s) {
     for (int i = 0; i < COUNT_ROWS; i++) {
         printf("%-17s %lld\n", rows[i].name, (long long)rows[i].value);
     }
+    printf("%-17s %.1f\n", "peak_rss_mb", (double)rey_peak_rss() / 1e6);
+    print_kinds(s);
     printf("%-17s %g %g %g to %g %g %g\n", "bounds", info.bounds[0], info.bounds[1], info.bounds[2], info.bounds[3],
            info.bounds[4], info.bounds[5]);
     printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
@@ -186,6 +230,7 @@ static void print_info_json(const Session *s) {
     }
     json_number(&json, "load_seconds", s->load_seconds);
     json_number(&json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
+    json_kinds(&json, s);
     json_array(&json, "bounds");
     for (int i = 0; i < 6; i++) {
         json_number(&json, NULL, info.bounds[i]);

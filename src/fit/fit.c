@@ -147,6 +147,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
     out->converged = fit->state.converged;
     out->seconds = fit->state.seconds;
     out->numbers = fit->unknowns.count;
+    out->nonfinite = fit->nonfinite;
     int window = fit->state.iteration < LOSS_WINDOW ? fit->state.iteration : LOSS_WINDOW;
     out->loss = rey_fit_mean_loss(&fit->state, fit->state.iteration, window);
     out->output = rey_strdup(fit->ctx, fit->output);

@@ -44,6 +44,7 @@ typedef struct FitResult {
     double loss;    // mean over the last 10 iterations
     double seconds; // of all runs
     int64_t numbers;
+    int64_t nonfinite; // samples of this run that were left out because they were not finite; 0 in a healthy fit
     Array rows;                    // FitRow
     char *output, *report, *scene; // paths; null = not written
     char *note;                    // why the scene was not written, null = it was
@@ -79,6 +80,7 @@ typedef struct Fit {
     double start_seconds; // clock at which this run started, less the time of earlier runs
     int lock;             // descriptor of the locked folder + 1, 0 = none
     bool stop;            // the user asked to stop
+    int64_t nonfinite;    // samples of the iterations that were left out because they were not finite
 } Fit;
 
 // Path of a file in the output folder; freed with rey_free.

@@ -72,15 +72,20 @@ rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set
     return def;
 }
 
-static rey_result render_half(const Fit *fit, const FitView *view, uint32_t set, int spp, float *image) {
+static rey_result render_half(Fit *fit, const FitView *view, uint32_t set, int spp, float *image) {
     rey_render_def def = view_def(fit, view, set, spp);
-    return rey_render(fit->scene, &def, image, NULL);
+    rey_stats stats = {0};
+    rey_result result = rey_render(fit->scene, &def, image, &stats);
+    fit->nonfinite += stats.nonfinite;
+    return result;
 }
 
 static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int spp, const float *adjoint) {
     rey_render_def def = view_def(fit, view, set, spp);
     rey_selection selection = {fit->unknowns.params, (int)fit->unknowns.items.count};
-    rey_result result = rey_vjp(fit->scene, &def, selection, adjoint, fit->gradient, NULL, NULL);
+    rey_stats stats = {0};
+    rey_result result = rey_vjp(fit->scene, &def, selection, adjoint, fit->gradient, NULL, &stats);
+    fit->nonfinite += stats.nonfinite;
     for (int64_t i = 0; i < fit->unknowns.count && !result; i++) {
         fit->unknowns.gradient[i] += fit->gradient[i];
     }

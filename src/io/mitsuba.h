@@ -14,3 +14,13 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
 
 // Of char *: what a lenient reader left out, and why.
 const Array *rey_mitsuba_ignored(const rey_scene *scene);
+
+// One plugin that a scene's file declares; texts live as long as the scene.
+typedef struct KindCount {
+    int tag;
+    const char *tag_name, *type; // "bsdf", "diffuse"
+    int count;                   // objects, each once however often it is referred to
+} KindCount;
+
+// Of KindCount, ordered by tag; the caller frees it with rey_array_free.
+rey_result rey_mitsuba_kinds(const rey_scene *scene, Array *counts);

@@ -234,8 +234,11 @@ static void descriptions(void **state) {
     node = run_json(f, 0, "info %s --json");
     assert_true(json_value(node, "shapes", 0) == 4);
     assert_string_equal(json_text(node, "integrator", ""), "path");
+    assert_true(json_value(node, "kinds.bsdf.diffuse", 0) == 2 && json_value(node, "kinds.bsdf.roughconductor", 0) == 1);
+    assert_true(json_value(node, "peak_rss_mb", 0) > 1);
     json_free(node);
     expect(f, 0, "info %s");
+    assert_non_null(strstr(f->out, "diffuse 2, roughconductor 1"));
     node = run_json(f, 0, "doctor --json");
     assert_true(json_value(node, "passed", 0) == 1);
     json_free(node);
