@@ -279,7 +279,7 @@ static void test_old_names(void **state) {
     assert_true(rey_xml_find(node[0], "sample_border")->boolean);
     assert_string_equal(rey_xml_find(node[0], "pixel_format")->string, "luminance_alpha");
     assert_int_equal(node[1]->property_count, 1); // gamma is no property of this film
-    assert_string_equal(node[2]->type, "sobol");
+    assert_string_equal(node[2]->type, "ldsampler");
     assert_int_equal(node[2]->property_count, 0);
     assert_string_equal(node[3]->type, "volpath");
     assert_int_equal(node[3]->property_count, 0);

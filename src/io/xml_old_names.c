@@ -15,8 +15,8 @@ static const OldType old_types[] = {
     {REY_XML_FILM, "mfilm", "hdrfilm", "the film 'mfilm' was read as 'hdrfilm': an output that ends in .npy holds the numbers"},
     {REY_XML_FILM, "tiledhdrfilm", "hdrfilm", NULL},
     {REY_XML_INTEGRATOR, "volpath_simple", "volpath", NULL},
-    {REY_XML_SAMPLER, "halton", "sobol", "the sampler 'sobol' (Owen-scrambled points) takes the place of 'halton'"},
-    {REY_XML_SAMPLER, "hammersley", "sobol", "the sampler 'sobol' (Owen-scrambled points) takes the place of 'hammersley'"},
+    {REY_XML_SAMPLER, "halton", "ldsampler", "the sampler 'halton' was read as 'ldsampler', the sequence of today"},
+    {REY_XML_SAMPLER, "hammersley", "ldsampler", "the sampler 'hammersley' was read as 'ldsampler', the sequence of today"},
     {REY_XML_TEXTURE, "vertexcolors", "mesh_attribute", NULL},
 };
 
