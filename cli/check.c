@@ -235,6 +235,27 @@ static rey_result try_short_step(Work *w, Check *check, bool central) {
     return result;
 }
 
+// Where the picture has a corner (a weight that is clamped at exactly 1), each side has a slope of its own, and the
+// derivative is that of one of them.
+static rey_result try_one_side(Work *w, Check *check, bool central) {
+    CheckResult first = check->result;
+    double fresh_z = check->fresh_z, h = check->step.h / 8;
+    rey_result result = REY_OK;
+    for (double sign = -1; sign <= 1 && central && !agrees(&check->result) && !result; sign += 2) {
+        Step step = one_sided_step(h, sign);
+        if (first.relative_error > CHECK_WEAK || w->session.options->step > 0) {
+            return REY_OK;
+        }
+        result = differences(w, check, &step);
+        check->kink = agrees(&check->result) && check->result.relative_error <= CHECK_WEAK;
+    }
+    if (!check->kink) {
+        check->result = first;
+        check->fresh_z = fresh_z;
+    }
+    return result;
+}
+
 static rey_result check_direction(Work *w, Check *check) {
     const Direction *d = &check->direction;
     for (int k = 0; k < d->count; k++) {
@@ -260,6 +281,9 @@ static rey_result check_direction(Work *w, Check *check) {
     }
     if (!result) {
         result = try_short_step(w, check, central);
+    }
+    if (!result && !agrees(&check->result)) {
+        result = try_one_side(w, check, central);
     }
     rey_result restored = set_values(w, d, w->original);
     return result ? result : restored;
@@ -371,6 +395,7 @@ static void judge(const Work *w, Check *checks, int count, double *threshold) {
             checks[i].verdict = !same                             ? VERDICT_WRONG
                                 : r->tests == 0                   ? VERDICT_NO_EFFECT
                                 : noisy && !plain                 ? VERDICT_WEAK
+                                : right && checks[i].kink         ? VERDICT_KINK
                                 : right                           ? VERDICT_OK
                                 : partial                         ? VERDICT_PARTIAL
                                                                   : VERDICT_WRONG;

@@ -15,6 +15,7 @@ typedef struct Step {
 
 typedef enum Verdict {
     VERDICT_OK,
+    VERDICT_KINK,    // right on one side of a corner of the picture
     VERDICT_NO_EFFECT,
     VERDICT_WEAK,    // too noisy to say
     VERDICT_WRONG,
@@ -28,6 +29,7 @@ typedef struct Check { // one direction
     Step step;
     bool replays;         // the difference is taken along the derivative's own paths
     CheckResult result;
+    bool kink;            // the difference is that of one side
     double fresh_z;       // of that against the plain quotient of fresh paths; 0 where nothing is replayed
     double reverse_error; // |reverse - forward| over the mean of |derivative|
     Verdict verdict;

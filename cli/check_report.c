@@ -4,7 +4,7 @@
 #include <stdio.h>
 
 const char *check_verdict_name(Verdict verdict) {
-    static const char *const names[] = {"ok", "no effect", "weak", "WRONG", "partial", "refused"};
+    static const char *const names[] = {"ok", "kink", "no effect", "weak", "WRONG", "partial", "refused"};
     return names[verdict];
 }
 
@@ -38,6 +38,10 @@ void check_print_table(const Check *checks, int count, double threshold) {
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
     printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3, fresh z up to %d, reverse = forward to %g\n",
            wrong ? "FAILED" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
+    if (count_verdicts(checks, count, VERDICT_KINK)) {
+        printf("%d of %d stand at a kink: the derivative is that of one side\n", count_verdicts(checks, count, VERDICT_KINK),
+               count);
+    }
     if (weak) {
         printf("%d of %d are weak: noise is more than %g %% of the signal, so that they say little; raise --spp\n", weak,
                count, 100 * CHECK_WEAK);

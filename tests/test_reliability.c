@@ -14,6 +14,7 @@
 
 #include <cmocka.h>
 
+// Every kind of file beside the scene: FOLDER stands for where they are.
 static const char scene_text[] =
     "<scene version=\"3.0.0\"><integrator type=\"path\"><integer name=\"max_depth\" value=\"3\"/></integrator>"
     "<sensor type=\"perspective\"><transform name=\"to_world\"><lookat origin=\"0,0,4\" target=\"0,0,0\" up=\"0,1,0\"/>"
@@ -26,7 +27,18 @@ static const char scene_text[] =
     "<bsdf type=\"mask\"><bsdf type=\"diffuse\" id=\"wall\"/></bsdf></shape>"
     "<shape type=\"rectangle\"><transform name=\"to_world\"><translate z=\"5\"/></transform>"
     "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3\"/></emitter></shape>"
-    "<emitter type=\"constant\"/></scene>";
+    "<shape type=\"bsplinecurve\"><string name=\"filename\" value=\"FOLDER/hair.txt\"/>"
+    "<bsdf type=\"principled\"><float name=\"clearcoat\" value=\"0.5\"/><texture type=\"bitmap\" name=\"base_color\">"
+    "<string name=\"filename\" value=\"FOLDER/sky.pfm\"/><boolean name=\"raw\" value=\"true\"/></texture></bsdf></shape>"
+    "<shape type=\"sdfgrid\"><string name=\"filename\" value=\"FOLDER/ball.vol\"/>"
+    "<bsdf type=\"principledthin\"/></shape>"
+    "<shape type=\"ply\"><string name=\"filename\" value=\"FOLDER/leaf.ply\"/></shape>"
+    "<emitter type=\"envmap\"><string name=\"filename\" value=\"FOLDER/sky.pfm\"/></emitter></scene>";
+
+static const char curve_text[] = "-1 -1 0 0.1\n-0.5 0 0 0.1\n0.5 0 0 0.1\n1 1 0 0.1\n";
+static const char mesh_text[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                "property float z\nproperty float vertex_heat\nelement face 1\n"
+                                "property list uchar int vertex_indices\nend_header\n0 0 1 1\n1 0 1 2\n0 1 1 3\n3 0 1 2\n";
 
 enum { PIXELS = 36, SPP = 2 };
 
@@ -67,22 +79,71 @@ static void meter_release(void *user, void *memory) {
     }
 }
 
-static char scene_path[64];
+static char folder[64], scene_path[128];
+
+static int write_file(const char *name, const void *bytes, size_t size) {
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "wb");
+    bool good = f && fwrite(bytes, 1, size, f) == size;
+    return f && fclose(f) == 0 && good ? 0 : 1;
+}
+
+// Distances to a ball of radius 0.3 at 4 x 4 x 4 nodes of the unit cube.
+static int write_grid(void) {
+    enum { NODES = 4 };
+    struct {
+        unsigned char magic[4];
+        int32_t encoding, nodes[3], channels;
+        float box[6], values[NODES * NODES * NODES];
+    } grid = {{'V', 'O', 'L', 3}, 1, {NODES, NODES, NODES}, 1, {0, 0, 0, 1, 1, 1}, {0}};
+    for (int i = 0; i < NODES * NODES * NODES; i++) {
+        float x = (float)(i % NODES) / 3 - 0.5f, y = (float)(i / NODES % NODES) / 3 - 0.5f;
+        float z = (float)(i / NODES / NODES) / 3 - 0.5f;
+        grid.values[i] = sqrtf(x * x + y * y + z * z) - 0.3f;
+    }
+    return write_file("ball.vol", &grid, sizeof grid);
+}
+
+static int write_sky(void) {
+    enum { WIDTH = 4, HEIGHT = 3 };
+    static const char header[] = "PF\n4 3\n-1\n";
+    float values[WIDTH * HEIGHT * 3];
+    char bytes[sizeof header - 1 + sizeof values];
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+        values[i] = 0.1f + 0.02f * (float)i;
+    }
+    memcpy(bytes, header, sizeof header - 1);
+    memcpy(bytes + sizeof header - 1, values, sizeof values);
+    return write_file("sky.pfm", bytes, sizeof bytes);
+}
 
 static int write_scene(void **state) {
     UNUSED(state);
-    snprintf(scene_path, sizeof scene_path, "/tmp/reynolds_reliability_%ld.xml", (long)getpid());
-    FILE *f = fopen(scene_path, "w");
-    if (!f) {
+    static char text[sizeof scene_text + 8 * sizeof folder];
+    size_t used = 0;
+    snprintf(folder, sizeof folder, "/tmp/reynolds_reliability_XXXXXX");
+    if (!mkdtemp(folder)) {
         return 1;
     }
-    fputs(scene_text, f);
-    return fclose(f);
+    for (const char *at = scene_text, *next; *at; at = next) {
+        next = strstr(at, "FOLDER");
+        size_t n = next ? (size_t)(next - at) : strlen(at);
+        memcpy(text + used, at, n);
+        used += n;
+        used += next ? (size_t)snprintf(text + used, sizeof text - used, "%s", folder) : 0;
+        next = next ? next + strlen("FOLDER") : at + n;
+    }
+    snprintf(scene_path, sizeof scene_path, "%s/scene.xml", folder);
+    return write_file("scene.xml", text, used) || write_file("hair.txt", curve_text, strlen(curve_text)) ||
+           write_file("leaf.ply", mesh_text, strlen(mesh_text)) || write_grid() || write_sky();
 }
 
 static int remove_scene(void **state) {
     UNUSED(state);
-    return unlink(scene_path);
+    char command[128];
+    snprintf(command, sizeof command, "rm -r '%s'", folder);
+    return system(command);
 }
 
 static rey_context *context_with(Meter *m) {
