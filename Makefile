@@ -6,7 +6,7 @@ JOBS ?= $(shell nproc)
 PACKAGES = gcc g++ make cmake pkg-config libembree-dev libexpat1-dev libopenexr-dev libpng-dev libjpeg62-turbo-dev \
            zlib1g-dev libyaml-dev libcmocka-dev python3
 
-.PHONY: all setup demo test test-slow conformance bench bench-peer check fuzz sanitize tsan install clean
+.PHONY: all setup demo test test-slow conformance bench bench-large bench-peer check fuzz sanitize tsan install clean
 
 all: $(BUILD)/CMakeCache.txt
 	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS)
@@ -33,6 +33,10 @@ conformance: all
 
 bench: all
 	@python3 bench/bench.py --reynolds $(BUILD)/bin/reynolds
+
+# A few minutes and 3 GB: meshes, pictures and forests of the largest kind.
+bench-large: all
+	@python3 bench/large.py --reynolds $(BUILD)/bin/reynolds
 
 bench-peer: all
 	@sh bench/peer.sh $(BUILD)/bin/reynolds

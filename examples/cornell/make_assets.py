@@ -84,8 +84,9 @@ def write_knot(path, along=360, around=32, tube=0.52, scale=27.0, centre=(186, 2
             f.write(struct.pack("<B3i", 3, *t))
 
 
-def write_exr(path, height, width, pixel):
-    """A picture of floats, without compression: https://openexr.com/en/latest/OpenEXRFileLayout.html"""
+def write_exr_rows(path, height, width, row):
+    """A picture of floats, without compression; row(y): the floats of row y, all of B, then G, then R.
+    https://openexr.com/en/latest/OpenEXRFileLayout.html"""
     def attribute(name, kind, data):
         return ("%s\0%s\0" % (name, kind)).encode() + struct.pack("<I", len(data)) + data
 
@@ -101,9 +102,15 @@ def write_exr(path, height, width, pixel):
     with open(path, "wb") as f:
         f.write(head + b"".join(struct.pack("<Q", len(head) + 8 * height + y * (8 + row_bytes)) for y in range(height)))
         for y in range(height):
-            row = [pixel((x + 0.5) / width, (y + 0.5) / height) for x in range(width)]
-            f.write(struct.pack("<2i", y, row_bytes))
-            f.write(b"".join(struct.pack("<%df" % width, *(c[k] for c in row)) for k in (2, 1, 0)))
+            f.write(struct.pack("<2i", y, row_bytes) + row(y))
+
+
+def write_exr(path, height, width, pixel):
+    def row(y):
+        colours = [pixel((x + 0.5) / width, (y + 0.5) / height) for x in range(width)]
+        return b"".join(struct.pack("<%df" % width, *(c[k] for c in colours)) for k in (2, 1, 0))
+
+    write_exr_rows(path, height, width, row)
 
 
 def smooth(edge, x, width):
