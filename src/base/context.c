@@ -170,9 +170,10 @@ void *rey_array_push(rey_context *ctx, Array *array, size_t item_bytes, size_t n
         rey_free(ctx, array->data);
         array->data = grown;
         array->capacity = capacity;
+    } else if (n) {
+        memset((char *)array->data + array->count * item_bytes, 0, n * item_bytes);
     }
     void *first = (char *)array->data + array->count * item_bytes;
-    memset(first, 0, n * item_bytes);
     array->count += n;
     return first;
 }

@@ -1,4 +1,4 @@
-// arrays.inl: every array that a kernel can see, once: ARRAY(type, name, comment). They lie in one arena after loading.
+// arrays.inl: every array that a kernel can see, once: ARRAY(type, name, comment). They stay where they are after loading.
 ARRAY(float, theta, "all numbers that could ever be optimised: colours, texels, vertices, poses")
 ARRAY(TextureNode, textures, "textures, constants among them; a slot of any kind is an index into this")
 ARRAY(BsdfNode, bsdfs, "scattering functions; adapters refer to their children by index")

@@ -1,9 +1,14 @@
-// scene.c: life cycle of the flat scene: growing arrays while loading, one arena afterwards.
+// scene.c: life cycle of the flat scene: arrays grow while it is loaded and stay where they are afterwards.
 #include "scene/scene.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+
+enum {
+    ARRAY_TAIL = 16,      // entries behind the end of an array that wide loads may touch
+    ARRAY_LARGE = 1 << 20 // entries that are many
+};
 
 rey_result rey_scene_new(rey_context *ctx, rey_scene **out) {
     rey_scene *scene = rey_alloc(ctx, sizeof *scene);
@@ -25,7 +30,13 @@ int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int6
         return -1;
     }
     size_t first = array->count;
-    return n == 0 || rey_array_push(scene->ctx, array, item_bytes, (size_t)n) ? (int32_t)first : -1;
+    // Room for the tail, and behind much for what little may follow, so that it does not have to move.
+    size_t spare = ARRAY_TAIL + (n >= ARRAY_LARGE ? (size_t)n / 16 : 0);
+    if (n > 0 && !rey_array_push(scene->ctx, array, item_bytes, (size_t)n + spare)) {
+        return -1;
+    }
+    array->count = first + (size_t)n;
+    return (int32_t)first;
 }
 
 rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) {
@@ -48,13 +59,31 @@ rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) {
     return copy && note ? REY_OK : REY_ERROR_MEMORY;
 }
 
+// Makes an array fit: entries behind the end that wide loads may touch, and little more. Most arrays fit already, so that
+// what a scene is made of is not copied.
+static rey_result settle(rey_scene *scene, Array *array, size_t item_bytes) {
+    size_t count = array->count, wanted = count + ARRAY_TAIL;
+    if (count == 0 || (array->capacity >= wanted && array->capacity - wanted <= wanted / 4)) {
+        return REY_OK;
+    }
+    Array exact = {0};
+    if (!rey_array_push(scene->ctx, &exact, item_bytes, wanted)) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(exact.data, array->data, count * item_bytes);
+    exact.count = count;
+    rey_array_free(scene->ctx, array);
+    *array = exact;
+    return REY_OK;
+}
+
 rey_result rey_scene_freeze(rey_scene *scene) {
-    enum { TAIL = 16 }; // entries behind the end that wide loads may touch
-    size_t bytes = 0;
-#define ARRAY(type, name, comment) bytes += ((scene->build.name.count + TAIL) * sizeof(type) + 63) / 64 * 64;
+    size_t largest = 0;
+#define ARRAY(type, name, comment) largest = sizeof(type) > largest ? sizeof(type) : largest;
 #include "scene/arrays.inl"
 #undef ARRAY
-    scene->arena = rey_alloc(scene->ctx, bytes);
+    scene->arena_bytes = ARRAY_TAIL * largest;
+    scene->arena = rey_alloc(scene->ctx, scene->arena_bytes);
     scene->dirty_shapes = rey_alloc(scene->ctx, scene->build.shapes.count + 1);
     scene->dirty_instances = rey_alloc(scene->ctx, scene->build.instances.count + 1);
     scene->dirty_bsdfs = rey_alloc(scene->ctx, scene->build.bsdfs.count + 1);
@@ -62,16 +91,13 @@ rey_result rey_scene_freeze(rey_scene *scene) {
     if (!scene->arena || !scene->dirty_shapes || !scene->dirty_instances || !scene->dirty_bsdfs || !scene->dirty_emitters) {
         return REY_ERROR_MEMORY;
     }
-    scene->arena_bytes = bytes;
-    char *at = scene->arena;
 #define ARRAY(type, name, comment)                                                                                     \
-    scene->view.name = (type *)(void *)at;                                                                             \
-    scene->view.name##_count = (int64_t)scene->build.name.count;                                                       \
-    if (scene->build.name.count) {                                                                                     \
-        memcpy(at, scene->build.name.data, scene->build.name.count * sizeof(type));                                    \
+    if (settle(scene, &scene->build.name, sizeof(type)) != REY_OK) {                                                   \
+        return REY_ERROR_MEMORY;                                                                                       \
     }                                                                                                                  \
-    at += ((scene->build.name.count + TAIL) * sizeof(type) + 63) / 64 * 64;                                            \
-    rey_array_free(scene->ctx, &scene->build.name);
+    scene->view.name = scene->build.name.count ? scene->build.name.data : scene->arena;                                \
+    scene->view.name##_count = (int64_t)scene->build.name.count;                                                       \
+    scene->arena_bytes += scene->build.name.capacity * sizeof(type);
 #include "scene/arrays.inl"
 #undef ARRAY
     memset(scene->dirty_shapes, 1, (size_t)scene->view.shapes_count);

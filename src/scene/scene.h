@@ -192,7 +192,7 @@ struct rey_scene {
     Names param_names, alias_names;
     Array channels;           // of Channel: what a picture holds behind R G B
     Array notes;              // of char *: what a user should know about how the scene was read
-    // Loading: each array grows by itself; rey_scene_freeze moves all into the arena.
+    // Loading: each array grows by itself; rey_scene_freeze makes them fit, and the view points to them.
     struct {
 #define ARRAY(type, name, comment) Array name;
 #include "scene/arrays.inl"
@@ -214,7 +214,7 @@ struct rey_scene {
 rey_result rey_scene_new(rey_context *ctx, rey_scene **out);
 // Appends n zeroed entries to a build array; returns the index of the first, -1 on failure.
 int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n);
-// Moves the build arrays into the arena; theta never moves from here on.
+// The build arrays become what the view shows; theta never moves from here on. `arena` stands for empty arrays.
 rey_result rey_scene_freeze(rey_scene *scene);
 // Records something that a user should know about how the scene was read; once, however often it is said.
 rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attribute__((format(printf, 2, 3)));
