@@ -443,11 +443,37 @@ static void test_huge_counts(void **state) {
     rey_context_destroy(ctx);
 }
 
+// 8-bit values go by a table, others by the curve: the same bits.
+static void test_srgb_table(void **state) {
+    enum { BYTES = 256, WORDS = 65536, COUNT = BYTES + WORDS + 2 };
+    UNUSED(state);
+    rey_context *ctx = context();
+    rey_image image;
+    assert_int_equal(rey_image_new(ctx, "picture", COUNT, 1, 1, &image), REY_ERROR_FORMAT);
+    assert_int_equal(rey_image_new(ctx, "picture", COUNT / 2, 2, 1, &image), REY_OK);
+    for (int i = 0; i < COUNT; i++) {
+        image.data[i] = i < BYTES           ? (float)i / 255.0f
+                        : i < BYTES + WORDS ? (float)(i - BYTES) / 65535.0f
+                                            : 3.0f * (float)(i - COUNT + 1);
+    }
+    float *encoded = malloc(COUNT * sizeof *encoded);
+    assert_non_null(encoded);
+    memcpy(encoded, image.data, COUNT * sizeof *encoded);
+    rey_image_decode_srgb(&image);
+    for (int i = 0; i < COUNT; i++) {
+        float wanted = rey_srgb_decode(encoded[i]);
+        assert_memory_equal(&image.data[i], &wanted, sizeof wanted);
+    }
+    free(encoded);
+    rey_image_free(ctx, &image);
+    rey_context_destroy(ctx);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exr_types),   cmocka_unit_test(test_png_types), cmocka_unit_test(test_jpeg_types),
         cmocka_unit_test(test_raw_types),   cmocka_unit_test(test_round_trips), cmocka_unit_test(test_truncated),
         cmocka_unit_test(test_wrong_magic), cmocka_unit_test(test_huge_counts),
-        cmocka_unit_test(test_exr_barely_compressible)};
+        cmocka_unit_test(test_exr_barely_compressible), cmocka_unit_test(test_srgb_table)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -96,10 +96,19 @@ float rey_srgb_encode(float x) {
     return x <= 0.0031308f ? 12.92f * x : 1.055f * powf(x, 1 / 2.4f) - 0.055f;
 }
 
+// Most pictures have 8 bits a sample, so that a table knows all values.
 void rey_image_decode_srgb(rey_image *image) {
+    enum { LEVELS = 256 };
     int64_t count = (int64_t)image->width * image->height * image->channels;
+    float encoded[LEVELS], decoded[LEVELS];
+    for (int i = 0; i < LEVELS; i++) {
+        encoded[i] = (float)i / 255.0f;
+        decoded[i] = rey_srgb_decode(encoded[i]);
+    }
     for (int64_t i = 0; i < count; i++) {
-        image->data[i] = rey_srgb_decode(image->data[i]);
+        float x = image->data[i];
+        int level = x >= 0 && x <= 1 ? (int)(x * 255 + 0.5f) : 0;
+        image->data[i] = x == encoded[level] ? decoded[level] : rey_srgb_decode(x);
     }
     image->srgb = false;
 }
