@@ -90,22 +90,24 @@ enum {
 
 // ---- dispatch ----------------------------------------------------------------------------------------------------
 
-// f cos_o of the smooth lobe, or the coefficient of a delta lobe. Directions are local; dead lanes hold valid ones.
-static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe) {
-    switch (call->scene->bsdfs[call->node].kind) {
+// One case per function: its record is p, and RUN(prefix, arguments before the directions) says what to do with it.
 #define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
     case BSDF_##ENUM: {                                                                                                \
         Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_eval(&p, wi, wo, lobe);                                                                        \
+        RUN(prefix, &p)                                                                                                \
     }
 #define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
     case BSDF_##ENUM: {                                                                                                \
         Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_eval(call, &p, wi, wo, lobe);                                                                  \
+        RUN(prefix, call, &p)                                                                                          \
     }
+
+// f cos_o of the smooth lobe, or the coefficient of a delta lobe. Directions are local; dead lanes hold valid ones.
+static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define RUN(prefix, ...) return prefix##_eval(__VA_ARGS__, wi, wo, lobe);
 #include "bsdf/kinds.inl"
-#undef BSDF_LEAF
-#undef BSDF_ADAPTER
+#undef RUN
     default:
         return spec_zero();
     }
@@ -114,19 +116,9 @@ static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe)
 // Density of bsdf_sample per solid angle, or the probability of a delta lobe.
 static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe) {
     switch (call->scene->bsdfs[call->node].kind) {
-#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_pdf(&p, wi, wo, lobe);                                                                         \
-    }
-#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_pdf(call, &p, wi, wo, lobe);                                                                   \
-    }
+#define RUN(prefix, ...) return prefix##_pdf(__VA_ARGS__, wi, wo, lobe);
 #include "bsdf/kinds.inl"
-#undef BSDF_LEAF
-#undef BSDF_ADAPTER
+#undef RUN
     default:
         return f_set(0);
     }
@@ -135,21 +127,11 @@ static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe)
 // Value and density at once: one fetch, and what the two have in common is computed once.
 static NOINLINE Spec bsdf_eval_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Float *pdf) {
     switch (call->scene->bsdfs[call->node].kind) {
-#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        *pdf = prefix##_pdf(&p, wi, wo, lobe);                                                                         \
-        return prefix##_eval(&p, wi, wo, lobe);                                                                        \
-    }
-#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        *pdf = prefix##_pdf(call, &p, wi, wo, lobe);                                                                   \
-        return prefix##_eval(call, &p, wi, wo, lobe);                                                                  \
-    }
+#define RUN(prefix, ...)                                                                                               \
+    *pdf = prefix##_pdf(__VA_ARGS__, wi, wo, lobe);                                                                    \
+    return prefix##_eval(__VA_ARGS__, wi, wo, lobe);
 #include "bsdf/kinds.inl"
-#undef BSDF_LEAF
-#undef BSDF_ADAPTER
+#undef RUN
     default:
         *pdf = f_set(0);
         return spec_zero();
@@ -159,23 +141,15 @@ static NOINLINE Spec bsdf_eval_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int l
 // u1 selects lobes, u2 directions. Samples of no use have density 0.
 static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, Vec2 u2) {
     switch (call->scene->bsdfs[call->node].kind) {
-#define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_sample(&p, wi, u1, u2);                                                                        \
-    }
-#define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
-    case BSDF_##ENUM: {                                                                                                \
-        Record p = prefix##_fetch(call);                                                                               \
-        return prefix##_sample(call, &p, wi, u1, u2);                                                                  \
-    }
+#define RUN(prefix, ...) return prefix##_sample(__VA_ARGS__, wi, u1, u2);
 #include "bsdf/kinds.inl"
-#undef BSDF_LEAF
-#undef BSDF_ADAPTER
+#undef RUN
     default:
         return (BsdfSample){wi, i_set(LOBE_NULL), f_set(1)};
     }
 }
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER
 
 static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
                               Vec3 *dwo, Vec2 *duv) {

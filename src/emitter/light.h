@@ -214,3 +214,31 @@ KFN Vec3 light_at_point_adj(Vec3 d, Float distance, const LightMove *move) {
     v3_normalize_adj(v3_scale(d, distance), move->d, &dp);
     return dp;
 }
+
+// A light at the origin of its pose that shines along z; uv is the slope (x, y) / z of the direction to ref.
+KFN LightSample light_along_slope(const SceneView *scene, const Light *l, int slot, Vec3 ref) {
+    LightSample s = light_at_point(ref, v3(light_place(scene, l, slot, 3), light_place(scene, l, slot, 7),
+                                           light_place(scene, l, slot, 11)));
+    Vec3 local = light_to_local(scene, l, ref);
+    Mask front = m_gt(local.z, f_set(0));
+    Float rcp = f_safe_rcp(local.z);
+    s.uv = (Vec2){f_zero_unless(front, local.x * rcp), f_zero_unless(front, local.y * rcp)};
+    s.valid = s.valid & front;
+    return s;
+}
+
+// What moves such a light.
+KFN void slope_move_adj(const SceneView *scene, const Light *l, int slot, Vec3 ref, Vec3 d, Float distance,
+                        const LightMove *move, Sink *sink, Mask m) {
+    // slope = (x, y) / z of the local ref
+    Vec3 local = light_to_local(scene, l, ref);
+    Float rcp = f_safe_rcp(local.z);
+    Vec3 dlocal = v3(move->uv.x * rcp, move->uv.y * rcp,
+                     -(move->uv.x * local.x + move->uv.y * local.y) * rcp * rcp);
+    // local = A^-1 (ref - p)
+    Vec3 q = light_direction_to_local_adj(scene, l, slot, local, dlocal, sink, m);
+    Vec3 dp = v3_sub(light_at_point_adj(d, distance, move), q);
+    light_place_adj(l, slot, 3, dp.x, sink, m);
+    light_place_adj(l, slot, 7, dp.y, sink, m);
+    light_place_adj(l, slot, 11, dp.z, sink, m);
+}

@@ -3,7 +3,7 @@
 // the slopes x/z and y/z of the local direction. NOT differentiated: the jump at the frustum's border.
 #pragma once
 
-#include "emitter/spot.h"
+#include "emitter/light.h"
 
 #define PROJECTOR_PARAMS(P)                                                                                            \
     P(EMISSION, irradiance, 1, 0, INFINITY, "radiance of a white plane at depth 1", "W/(m^2 sr)")                      \
@@ -48,15 +48,7 @@ KFN ProjectorBeam projector_beam(const SceneView *scene, const Light *l, TexCoor
 
 KFN LightSample projector_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
     UNUSED(u);
-    const int slot = SLOT(Projector, to_world);
-    LightSample s = light_at_point(ref, v3(light_place(scene, l, slot, 3), light_place(scene, l, slot, 7),
-                                           light_place(scene, l, slot, 11)));
-    Vec3 local = light_to_local(scene, l, ref);
-    Mask front = m_gt(local.z, f_set(0));
-    Float rcp = f_safe_rcp(local.z);
-    s.uv = (Vec2){f_zero_unless(front, local.x * rcp), f_zero_unless(front, local.y * rcp)};
-    s.valid = s.valid & front;
-    return s;
+    return light_along_slope(scene, l, SLOT(Projector, to_world), ref);
 }
 
 KFN Spec projector_eval(const SceneView *scene, const Light *l, TexCoord slope, Float distance) {

@@ -50,15 +50,7 @@ KFN SpotBeam spot_beam(const SceneView *scene, const Light *l, TexCoord slope) {
 
 KFN LightSample spot_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
     UNUSED(u);
-    const int slot = SLOT(Spot, to_world);
-    LightSample s = light_at_point(ref, v3(light_place(scene, l, slot, 3), light_place(scene, l, slot, 7),
-                                           light_place(scene, l, slot, 11)));
-    Vec3 local = light_to_local(scene, l, ref);
-    Mask front = m_gt(local.z, f_set(0));
-    Float rcp = f_safe_rcp(local.z);
-    s.uv = (Vec2){f_zero_unless(front, local.x * rcp), f_zero_unless(front, local.y * rcp)};
-    s.valid = s.valid & front;
-    return s;
+    return light_along_slope(scene, l, SLOT(Spot, to_world), ref);
 }
 
 KFN Spec spot_eval(const SceneView *scene, const Light *l, TexCoord slope, Float distance) {
@@ -93,22 +85,6 @@ KFN void spot_adj(const SceneView *scene, const Light *l, TexCoord slope, Float 
         move->uv.y = move->uv.y + by_slope * slope.y + 0.5f * duv.y / b.tangent;
         move->distance = move->distance - 2.0f * along * b.falloff * f_safe_rcp(distance);
     }
-}
-
-// Of kinds that lie at the origin of their pose and read their slope: spot and projector.
-KFN void slope_move_adj(const SceneView *scene, const Light *l, int slot, Vec3 ref, Vec3 d, Float distance,
-                        const LightMove *move, Sink *sink, Mask m) {
-    // slope = (x, y) / z of the local ref
-    Vec3 local = light_to_local(scene, l, ref);
-    Float rcp = f_safe_rcp(local.z);
-    Vec3 dlocal = v3(move->uv.x * rcp, move->uv.y * rcp,
-                     -(move->uv.x * local.x + move->uv.y * local.y) * rcp * rcp);
-    // local = A^-1 (ref - p)
-    Vec3 q = light_direction_to_local_adj(scene, l, slot, local, dlocal, sink, m);
-    Vec3 dp = v3_sub(light_at_point_adj(d, distance, move), q);
-    light_place_adj(l, slot, 3, dp.x, sink, m);
-    light_place_adj(l, slot, 7, dp.y, sink, m);
-    light_place_adj(l, slot, 11, dp.z, sink, m);
 }
 
 KFN void spot_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, const LightMove *move,
