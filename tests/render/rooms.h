@@ -90,7 +90,7 @@ static inline int remove_pictures(void **state) {
 }
 
 // A scene of this folder with those pictures that its text names.
-static inline Room room_open(const char *file, int threads, int lanes) {
+static inline rey_scene *room_load(rey_context *ctx, const char *file) {
     static char text[1 << 16], paths[PICTURES][PATH];
     char path[1024];
     snprintf(path, sizeof path, "%s/%s", RENDER_DIR, file);
@@ -109,14 +109,20 @@ static inline Room room_open(const char *file, int threads, int lanes) {
             defines[count++] = (rey_define){pictures[i].name, paths[i]};
         }
     }
+    rey_scene *scene;
+    if (rey_scene_load(ctx, path, defines, count, &scene) != REY_OK) {
+        fail_msg("%s", rey_error(ctx));
+    }
+    return scene;
+}
+
+static inline Room room_open(const char *file, int threads, int lanes) {
     rey_context_def def = rey_default_context_def();
     def.threads = threads;
     def.lanes = lanes;
     Room room;
     assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    if (rey_scene_load(room.ctx, path, defines, count, &room.scene) != REY_OK) {
-        fail_msg("%s", rey_error(room.ctx));
-    }
+    room.scene = room_load(room.ctx, file);
     return room;
 }
 
