@@ -34,6 +34,6 @@ KFN Spec area_eval(const SceneView *scene, const Light *l, TexCoord uv, Float di
 
 KFN void area_adj(const SceneView *scene, const Light *l, TexCoord uv, Float distance, Spec dl, LightMove *move,
                   Sink *sink, Mask m) {
-    UNUSED(distance), UNUSED(move);
-    light_colour_adj(scene, l, SLOT(Area, radiance), uv, dl, NULL, sink, m);
+    UNUSED(distance);
+    light_colour_adj(scene, l, SLOT(Area, radiance), uv, dl, move ? &move->uv : NULL, sink, m);
 }

@@ -107,11 +107,13 @@ KFN void lights_adj(const SceneView *scene, Int light, Mask m, Vec2 uv, Int prim
     }
 }
 
-// The adjoint of where each lane's light sample lies.
+// The adjoint of where each lane's light sample lies; that of the reference point is added to move.
 static NOINLINE void lights_move_adj(const SceneView *scene, Int light, Mask m, Vec3 ref, Vec3 d, Float distance,
-                                     const LightMove *move, Sink *sink) {
+                                     LightMove *move, Sink *sink) {
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         Light l = lights_next(scene, light, left, &mine);
-        emitter_move_adj_as(scene, &l, ref, d, distance, move, sink, mine);
+        LightMove one = *move;
+        emitter_move_adj_as(scene, &l, ref, d, distance, &one, sink, mine);
+        move->ref = v3_select(mine, one.ref, move->ref);
     }
 }

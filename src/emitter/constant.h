@@ -40,6 +40,6 @@ KFN void constant_adj(const SceneView *scene, const Light *l, TexCoord uv, Float
 }
 
 KFN void constant_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance,
-                           const LightMove *move, Sink *sink, Mask m) {
+                           LightMove *move, Sink *sink, Mask m) {
     UNUSED(scene), UNUSED(l), UNUSED(ref), UNUSED(d), UNUSED(distance), UNUSED(move), UNUSED(sink), UNUSED(m);
 }

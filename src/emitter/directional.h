@@ -37,7 +37,7 @@ KFN void directional_adj(const SceneView *scene, const Light *l, TexCoord uv, Fl
 }
 
 KFN void directional_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance,
-                              const LightMove *move, Sink *sink, Mask m) {
+                              LightMove *move, Sink *sink, Mask m) {
     UNUSED(ref), UNUSED(d), UNUSED(distance);
     // d = -normalize(axis)
     Vec3 da = v3_zero();

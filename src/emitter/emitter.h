@@ -80,7 +80,7 @@ KFN void emitter_adj_as(const SceneView *scene, const Light *l, TexCoord uv, Flo
 #define EMITTER_SURFACE(...)
 
 KFN void emitter_move_adj_as(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance,
-                             const LightMove *move, Sink *sink, Mask m) {
+                             LightMove *move, Sink *sink, Mask m) {
     switch (l->e->kind) {
 #define EMITTER_CASE(ENUM, prefix, ...)                                                                                \
     case EMITTER_##ENUM:                                                                                               \
@@ -173,7 +173,7 @@ KFN void emitter_adj(const SceneView *scene, int32_t id, TexCoord uv, Float dist
 }
 
 // Accumulates the adjoint of the sample's place into the light's position or pose.
-KFN void emitter_move_adj(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, Float distance, const LightMove *move,
+KFN void emitter_move_adj(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                           Sink *sink, Mask m) {
     Light l = light_alone(scene->emitters + id, i_set(id));
     emitter_move_adj_as(scene, &l, ref, d, distance, move, sink, m);

@@ -145,7 +145,7 @@ KFN void envmap_adj(const SceneView *scene, const Light *l, TexCoord uv, Float d
 }
 
 // The picture turns over directions that stay.
-KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, const LightMove *move,
+KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                          Sink *sink, Mask m) {
     UNUSED(ref), UNUSED(distance);
     // u = atan2(x, -z) / 2 pi, v = acos(y) / pi

@@ -24,12 +24,16 @@ typedef struct Light {
 
 KFN Light light_alone(const EmitterRecord *e, Int id) { return (Light){e, id, false}; }
 
-// Adjoint of where and from where light arrives: of the sample's direction, distance and uv.
+// Adjoint of where and from where light arrives: of the sample's direction, distance and uv. prefix_move_adj adds that
+// of the reference point, of lights that lie at a point.
 typedef struct LightMove {
     Vec3 d;
     Float distance;
     Vec2 uv;
+    Vec3 ref;
 } LightMove;
+
+KFN LightMove light_move_zero(void) { return (LightMove){v3_zero(), f_set(0), {f_set(0), f_set(0)}, v3_zero()}; }
 
 // A kind's parameters as rows P(type, field, default, low, high, description, unit):
 //   EMISSION  colour texture of radiance, intensity, irradiance    COLOUR    colour texture that filters it
@@ -229,7 +233,7 @@ KFN LightSample light_along_slope(const SceneView *scene, const Light *l, int sl
 
 // What moves such a light.
 KFN void slope_move_adj(const SceneView *scene, const Light *l, int slot, Vec3 ref, Vec3 d, Float distance,
-                        const LightMove *move, Sink *sink, Mask m) {
+                        LightMove *move, Sink *sink, Mask m) {
     // slope = (x, y) / z of the local ref
     Vec3 local = light_to_local(scene, l, ref);
     Float rcp = f_safe_rcp(local.z);
@@ -238,6 +242,7 @@ KFN void slope_move_adj(const SceneView *scene, const Light *l, int slot, Vec3 r
     // local = A^-1 (ref - p)
     Vec3 q = light_direction_to_local_adj(scene, l, slot, local, dlocal, sink, m);
     Vec3 dp = v3_sub(light_at_point_adj(d, distance, move), q);
+    move->ref = v3_sub(move->ref, dp);
     light_place_adj(l, slot, 3, dp.x, sink, m);
     light_place_adj(l, slot, 7, dp.y, sink, m);
     light_place_adj(l, slot, 11, dp.z, sink, m);

@@ -30,10 +30,11 @@ KFN void point_adj(const SceneView *scene, const Light *l, TexCoord uv, Float di
     }
 }
 
-KFN void point_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, const LightMove *move,
+KFN void point_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                         Sink *sink, Mask m) {
     UNUSED(scene), UNUSED(ref);
     Vec3 dp = light_at_point_adj(d, distance, move);
+    move->ref = v3_sub(move->ref, dp);
     light_place_adj(l, SLOT(Point, position), 0, dp.x, sink, m);
     light_place_adj(l, SLOT(Point, position), 1, dp.y, sink, m);
     light_place_adj(l, SLOT(Point, position), 2, dp.z, sink, m);

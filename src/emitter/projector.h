@@ -76,6 +76,6 @@ KFN void projector_adj(const SceneView *scene, const Light *l, TexCoord slope, F
 }
 
 KFN void projector_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance,
-                            const LightMove *move, Sink *sink, Mask m) {
+                            LightMove *move, Sink *sink, Mask m) {
     slope_move_adj(scene, l, SLOT(Projector, to_world), ref, d, distance, move, sink, m);
 }

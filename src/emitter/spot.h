@@ -87,7 +87,7 @@ KFN void spot_adj(const SceneView *scene, const Light *l, TexCoord slope, Float 
     }
 }
 
-KFN void spot_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, const LightMove *move,
+KFN void spot_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                        Sink *sink, Mask m) {
     slope_move_adj(scene, l, SLOT(Spot, to_world), ref, d, distance, move, sink, m);
 }

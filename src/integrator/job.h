@@ -12,7 +12,7 @@ static inline bool mode_records(int32_t mode) {
 }
 
 // What of a group depends on the selected parameters.
-enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2 };
+enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
 
 typedef struct PathJob {
     const SceneView *scene;
@@ -32,7 +32,8 @@ typedef struct PathJob {
     double *gradient;
     const float *tangent;
     const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at, *place_at;
-    bool any_normals, any_attributes, any_places;
+    const int32_t *points_at, *pose_at, *instance_at, *camera_at;
+    bool any_normals, any_attributes, any_places, any_motion, any_camera;
     const int32_t *live;          // per group: LIVE_ mask
     bool live_lights;             // some emitter depends on the selection
     bool watch_turned;            // the selection turns shading normals: note which way they face

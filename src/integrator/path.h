@@ -54,7 +54,7 @@ KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count) {
         return -1;
     }
     int32_t first = t->record_count;
-    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count, false};
+    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count, false, false};
     t->record_count += LANES;
     return first;
 }
@@ -366,6 +366,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
             return next_count;
         }
         record_vertex(t, record, &v, mis, emission);
+        t->ws.batches[t->batch_count - 1].first_vertex = bounce == 0;
     }
     if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth && !scene->through) {
         if (record >= 0) {

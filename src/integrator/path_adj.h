@@ -2,34 +2,10 @@
 // vertex k is  L_k = w_e Le + sum_lights f Le T w_l + f w_s L_(k+1),  so that its derivative with respect to anything
 // in f and Le at that vertex is weighted by delta x throughput, and L is summed from the end of the path: no
 // subtraction, and no division by f, so that nothing is lost where f = 0.
-// NOT differentiated: visibility, positions, sampling decisions, chains of smooth mirrors and glass.
+// NOT differentiated: visibility, sampling decisions, chains of smooth mirrors and glass. What moves: path_move.h.
 #pragma once
 
-#include "integrator/path.h"
-
-KFN Vec3 record_v3(const real *x, const real *y, const real *z, int32_t at) {
-    return v3(f_load(x + at), f_load(y + at), f_load(z + at));
-}
-
-// The adjoint of one slot: in reverse mode the film's, in forward mode channel by channel 1.
-KFN Spec slot_adjoint(const Tracer *t, Int slot, int channel) {
-    if (t->job->mode == MODE_REVERSE) {
-        return spec_gather(t->ws.adjoint, slot);
-    }
-    Spec delta = spec_zero();
-    delta.c[channel] = f_set(1);
-    return delta;
-}
-
-// Forward mode: moves what the sink gathered to the slots' derivative of one channel.
-KFN void forward_flush(Tracer *t, Sink *sink, Int slot, int channel, Mask m) {
-    if (t->job->mode == MODE_FORWARD) {
-        f_scatter_add(t->ws.radiance[channel], slot, sink->derivative, m & m_finite(sink->derivative));
-        sink->derivative = f_set(0);
-    }
-}
-
-KFN int drives(const Tracer *t) { return t->job->mode == MODE_FORWARD ? SPEC_N : 1; }
+#include "integrator/path_move.h"
 
 static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     const Records *r = &t->ws.records;
@@ -45,7 +21,7 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     for (int c = 0; c < drives(t) && t->job->live_lights; c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
-        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
+        LightMove move = light_move_zero();
         emitter_adj(t->scene, t->scene->environment, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl),
                     sink->any_places ? &move : NULL, sink, m);
         if (sink->any_places) {
@@ -55,114 +31,58 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     }
 }
 
-// What the sweep knows of a batch of surface vertices.
-typedef struct SurfaceSweep {
-    Mask m, lit, connected, scattered;
-    Int slot, light, light_prim, lobe;
-    Spec beta, suffix, light_weight, light_value, f_light;
-    Float mis, scatter_weight, light_distance;
-    Vec2 light_uv;
-    Vec3 d, wi, light_d, wo_d, wl, wo;
-    Hit hit;
-    Interaction si;
-    BsdfCall call;
-    BsdfSurface surface;
-    Vec3 dp_dv;
-    const EmitterRecord *emitter;
-    const Group *group;
-} SurfaceSweep;
-
-KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
-    const Records *r = &t->ws.records;
-    int32_t at = batch->first;
-    SurfaceSweep s;
-    s.m = m_first_n(batch->count);
-    s.slot = slot;
-    s.suffix = suffix;
-    s.group = t->scene->groups + batch->group;
-    s.hit.shape = i_load(r->shape + at);
-    s.hit.prim = i_load(r->prim + at);
-    s.hit.instance = i_load(r->instance + at);
-    s.hit.u = f_load(r->u + at);
-    s.hit.v = f_load(r->v + at);
-    s.hit.p = record_v3(r->px, r->py, r->pz, at);
-    s.d = record_v3(r->dx, r->dy, r->dz, at);
-    s.beta = spec_load(r->beta, at);
-    s.mis = f_load(r->mis + at);
-    s.light_weight = spec_load(r->light_weight, at);
-    s.f_light = spec_load(r->light_f, at);
-    s.scatter_weight = f_load(r->sw + at);
-    s.lit = s.m & m_gt(s.mis, f_set(0));
-    s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
-    s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
-    s.light = i_load(r->light + at);
-    s.light_prim = i_load(r->lprim + at);
-    s.lobe = i_load(r->lobe + at);
-    s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
-    s.light_distance = f_load(r->ldist + at);
-    // Lanes without a light sample or a continuation get directions that do no harm.
-    Vec3 back = v3_neg(s.d);
-    s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
-    s.wo_d = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), back);
-    s.lobe = i_select(s.scattered, s.lobe, i_set(LOBE_SMOOTH));
-    s.si = shape_interaction(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
-    s.wi = frame_to_local(&s.si.sh, back);
-    s.wl = frame_to_local(&s.si.sh, s.light_d);
-    s.wo = frame_to_local(&s.si.sh, s.wo_d);
-    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
-    s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
-    return s;
+// Adjoint of the light samples of a vertex for one delta: of L += f Le (T w_l).
+KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, int32_t live, Spec weight,
+                         VertexAdj *d, Sink *sink) {
+    bool moves = sink->any_places || sink->any_motion;
+    Spec both = spec_mul(weight, s->light_weight);
+    if (t->job->live_lights) {
+        lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
+                   spec_zero_unless(s->connected, spec_mul(both, s->f_light)), moves ? &d->light : NULL, sink);
+    }
+    if (live & LIVE_SCATTERING) {
+        Vec3 dwl = v3_zero();
+        Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
+        bsdf_adj(call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &d->wi, &dwl, vertex_uv_adj(s, d, sink));
+        // wl = to_local(d)
+        frame_to_local_adj(&s->si.sh, s->light_d, dwl, &d->frame, &d->light.d);
+        d->lit = spec_dot(df, s->f_light);
+    }
+    if (moves) {
+        lights_move_adj(t->scene, s->light, s->connected, s->si.p, s->light_d, s->light_distance, &d->light, sink);
+    }
 }
 
 // Adjoint of the vertex's outgoing radiance for one delta, by what of the vertex is live.
-KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec delta, Sink *sink) {
+KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec delta, int channel, Sink *sink) {
     Spec weight = spec_mul(delta, s->beta);
-    Vec3 dwi = v3_zero();
-    Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
-    Vec3 unused = v3_zero();
+    VertexAdj d = vertex_adj_zero();
     BsdfCall call = s->call;
-    BsdfSurface dsurface = {f_set(0), f_set(0), f_set(0), v3_zero()};
-    call.dsurface = call.surface && sink->any_normals ? &dsurface : NULL;
-    if (live & LIVE_EMISSION) {
+    call.dsurface = call.surface && (sink->any_normals || sink->any_motion) ? &d.surface : NULL;
+    bool uv_moves = vertex_uv_moves(s, sink);
+    if ((live & LIVE_EMISSION) || (uv_moves && s->emitter)) {
         // L += w_e Le
+        LightMove seen = light_move_zero();
         emitter_adj(t->scene, s->group->emitter, texcoord(s->si.uv, &s->hit), f_set(1),
-                    spec_zero_unless(s->lit, spec_scale(weight, s->mis)), NULL, sink, s->lit);
+                    spec_zero_unless(s->lit, spec_scale(weight, s->mis)), uv_moves ? &seen : NULL, sink, s->lit);
+        d.uv = seen.uv;
     }
     if (m_any(s->connected)) {
-        // L += f Le (T w_l)
-        Vec3 dwl = v3_zero();
-        Spec both = spec_mul(weight, s->light_weight);
-        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
-        if (t->job->live_lights) {
-            lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                       spec_zero_unless(s->connected, spec_mul(both, s->f_light)), sink->any_places ? &move : NULL, sink);
-        }
-        if (live & LIVE_SCATTERING) {
-            Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
-            bsdf_adj(&call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &dwi, &dwl, NULL);
-            // wl = to_local(d)
-            frame_to_local_adj(&s->si.sh, s->light_d, dwl, &dframe, &move.d);
-        }
-        if (sink->any_places) {
-            lights_move_adj(t->scene, s->light, s->connected, s->si.p, s->light_d, s->light_distance, &move, sink);
-        }
+        connections_adj(t, s, &call, live, weight, &d, sink);
     }
     if ((live & LIVE_SCATTERING) && m_any(s->scattered)) {
         // L += f w_s L_next
         Vec3 dwo = v3_zero();
         Spec df = spec_zero_unless(s->scattered, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
-        bsdf_adj(&call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &dwi, &dwo, NULL);
-        frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &dframe, &unused);
+        bsdf_adj(&call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &d.wi, &dwo, vertex_uv_adj(s, &d, sink));
+        frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &d.frame, &d.wo);
     }
-    if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
-        // wi = to_local(-d)
-        frame_to_local_adj(&s->si.sh, v3_neg(s->d), dwi, &dframe, &unused);
-        // ux = s . dp_du, vx = s . dp_dv, vy = t . dp_dv
-        if (call.surface) {
-            v3_acc(&dframe.s, v3_madd(v3_scale(s->si.dp_du, dsurface.ux), dsurface.vx, s->dp_dv));
-            v3_acc(&dframe.t, v3_scale(s->dp_dv, dsurface.vy));
-        }
-        mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &dframe, sink, s->m);
+    if (sink->any_motion) {
+        d.onward = f_zero_unless(s->scattered, spec_dot(spec_mul(weight, s->suffix), spec_load(t->ws.records.weight, s->at)));
+        vertex_move_adj(t, s, &d, live, channel, sink);
+    } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
+        vertex_frame_adj(s, call.surface != NULL, &d);
+        mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &d.frame, sink, s->m);
     }
 }
 
@@ -251,6 +171,12 @@ static Sink sink_of(const PathJob *job) {
                   .any_normals = job->any_normals,
                   .any_attributes = job->any_attributes,
                   .any_places = job->any_places,
+                  .points_at = job->points_at,
+                  .pose_at = job->pose_at,
+                  .instance_at = job->instance_at,
+                  .camera_at = job->camera_at,
+                  .any_motion = job->any_motion,
+                  .any_camera = job->any_camera,
                   .watch_turned = job->watch_turned,
                   .derivative = f_set(0)};
 }
@@ -279,13 +205,16 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     }
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
-        surface_adj(t, &s, live, delta, sink);
+        surface_adj(t, &s, live, delta, c, sink);
         if (live_passing) {
             // L += f Le w_l T
             Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
             walk_adj(t, &walk, spec_zero_unless(s.connected, dt), sink);
         }
         forward_flush(t, sink, slot, c, s.m);
+    }
+    if (job->any_motion) {
+        vertex_keep(t, &s);
     }
 }
 

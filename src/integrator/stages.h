@@ -105,6 +105,9 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         i_store(p->depth + i, i_set(0));
         spec_store(t->ws.radiance, i, spec_zero());
         spec_store(t->ws.suffix, i, spec_zero());
+        if (job->any_motion) {
+            i_store(t->ws.next + i, i_set(-1));
+        }
     }
     t->active = count;
     t->current = 0;

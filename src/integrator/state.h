@@ -38,6 +38,8 @@ enum {
 // Of a camera sample: where it lies on the film, and its alpha.
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
 
+#define MOVE_FLOATS(F) F(next_px) F(next_py) F(next_pz) F(next_nx) F(next_ny) F(next_nz)
+
 #define DECLARE_FLOAT(name) real *name;
 #define DECLARE_SPEC(name) SpecRows name;
 #define DECLARE_INT(name) int32_t *name;
@@ -57,7 +59,8 @@ enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL, VERTEX_LIGHT 
 // A run of recorded vertices that share tag and group; `count` lanes of the LANES from `first` on are alive.
 typedef struct RecordBatch {
     int32_t tag, group, first, count;
-    bool ends; // the paths end here: their depth is reached
+    bool ends;         // the paths end here: their depth is reached
+    bool first_vertex; // these are what the camera sees
 } RecordBatch;
 
 typedef struct Workspace {
@@ -75,6 +78,11 @@ typedef struct Workspace {
     SpecRows radiance, adjoint, suffix;
     SAMPLE_FLOATS(DECLARE_FLOAT)
     int32_t *pixel, *sample;
+    // per slot, of the vertex that the sweep has just left (path_move.h): its record (-1: none), position and normal, and
+    // per channel the adjoint of the direction back to the vertex before it
+    int32_t *next;
+    MOVE_FLOATS(DECLARE_FLOAT)
+    real *back_x[SPEC_N], *back_y[SPEC_N], *back_z[SPEC_N];
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
@@ -134,6 +142,13 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     SAMPLE_FLOATS(CARVE_SAMPLE)
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
+    if (derivative) {
+        CARVE(ws->next, n)
+        MOVE_FLOATS(CARVE_SAMPLE)
+        CARVE_SPEC(ws->back_x, n)
+        CARVE_SPEC(ws->back_y, n)
+        CARVE_SPEC(ws->back_z, n)
+    }
     for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {
         CARVE(ws->channel[c], n)
     }

@@ -64,6 +64,7 @@ typedef struct SensorNumber {
     const char *name, *unit, *text;
     double value;
     float low, high;
+    int32_t camera; // CAMERA_
 } SensorNumber;
 
 static rey_result add_numbers(Builder *b, const char *path, const SensorNumber *numbers, int n, int32_t *out) {
@@ -79,6 +80,7 @@ static rey_result add_numbers(Builder *b, const char *path, const SensorNumber *
         p.description = numbers[k].text;
         p.low = numbers[k].low;
         p.high = numbers[k].high;
+        p.camera = numbers[k].camera;
         if (rey_scene_add_param(b->scene, name, p) < 0) {
             return REY_ERROR_MEMORY;
         }
@@ -118,9 +120,9 @@ static rey_result camera_numbers(Builder *b, rey_xml_node *node, const char *pat
     TRY(rey_xml_get_float(b->ctx, node, "principal_point_offset_x", 0, &x));
     TRY(rey_xml_get_float(b->ctx, node, "principal_point_offset_y", 0, &y));
     const SensorNumber numbers[] = {
-        {"x_fov", "degrees", "horizontal field of view", fov, 1e-3f, 179.9f},
-        {"principal_point_offset_x", "film widths", "shift of the principal point", x, -INFINITY, INFINITY},
-        {"principal_point_offset_y", "film widths", "shift of the principal point", y, -INFINITY, INFINITY}};
+        {"x_fov", "degrees", "horizontal field of view", fov, 1e-3f, 179.9f, CAMERA_FOV},
+        {"principal_point_offset_x", "film widths", "shift of the principal point", x, -INFINITY, INFINITY, CAMERA_PRINCIPAL_X},
+        {"principal_point_offset_y", "film widths", "shift of the principal point", y, -INFINITY, INFINITY, CAMERA_PRINCIPAL_Y}};
     TRY(add_numbers(b, path, numbers, COUNT_OF(numbers), &s->fov));
     s->principal = s->fov + 1;
     return REY_OK;
@@ -138,8 +140,8 @@ static rey_result lens_numbers(Builder *b, rey_xml_node *node, const char *path,
                             "aperture_radius %g and focus_distance %g, expected positive numbers", radius, focus);
     }
     const SensorNumber numbers[] = {
-        {"aperture_radius", "scene units", "radius of the aperture", radius, 0, INFINITY},
-        {"focus_distance", "scene units", "distance along the axis that is sharp", focus, 1e-6f, INFINITY}};
+        {"aperture_radius", "scene units", "radius of the aperture", radius, 0, INFINITY, CAMERA_APERTURE},
+        {"focus_distance", "scene units", "distance along the axis that is sharp", focus, 1e-6f, INFINITY, CAMERA_FOCUS}};
     return add_numbers(b, path, numbers, COUNT_OF(numbers), &s->lens);
 }
 
@@ -161,6 +163,7 @@ static rey_result sensor_pose(Builder *b, rey_xml_node *node, const char *path, 
                             "to_world of a %s may turn and move it, but not scale or shear it", node->type);
     }
     Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY, .why = why_moving};
+    p.camera = s->kind == SENSOR_DISTANT ? -1 : CAMERA_POSE;
     return build_pose(b, pose, path, p, &s->to_world);
 }
 

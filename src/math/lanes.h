@@ -232,6 +232,12 @@ KFN void f_scatter(real *base, Int index, Float x, Mask m) {
         base[i_lane(index, lane)] = f_lane(x, lane);
     }
 }
+KFN void i_scatter(int32_t *base, Int index, Int x, Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        base[i_lane(index, lane)] = i_lane(x, lane);
+    }
+}
 KFN void f_scatter_add(real *base, Int index, Float x, Mask m) {
     for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
         int lane = __builtin_ctz(bits);

@@ -37,14 +37,28 @@ static bool emitter_live(const SceneView *view, const PathJob *job, int32_t id) 
     return live;
 }
 
+// Groups of surfaces of which something selected moves a point.
+static void moving_groups(const SceneView *view, const PathJob *job, int32_t *live) {
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        const ShapeRecord *shape = view->shapes + i;
+        bool moves = job->points_at[i] >= 0 || job->pose_at[i] >= 0 || job->normals_at[i] >= 0;
+        for (int64_t k = 0; k < view->instances_count && (shape->flags & SHAPE_INSTANCED) && !moves; k++) {
+            moves = job->instance_at[k] >= 0 && view->instances[k].group == shape->collection;
+        }
+        live[shape->group] |= moves && job->any_motion ? LIVE_MOTION : 0;
+    }
+}
+
 void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
     for (int64_t i = 0; i < view->groups_count; i++) {
         const Group *group = view->groups + i;
-        // A light that moves changes the directions from which every surface is lit.
-        bool scattering = job->any_normals || job->any_places || bsdf_live(view, job, group->bsdf);
+        // What moves changes the directions from which every surface is lit.
+        bool scattering = job->any_normals || job->any_places || job->any_motion || bsdf_live(view, job, group->bsdf);
         live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0);
     }
+    moving_groups(view, job, live);
     job->live = live;
+    job->live_lights |= job->any_motion;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
         job->live_lights |= emitter_live(view, job, i);
     }

@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "math/rng.h"
 #include "render/live.h"
+#include "render/motion.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
 #include "render/update.h"
@@ -31,6 +32,7 @@ static void render_free(Render *r) {
     rey_free(ctx, r->rows);
     rey_free(ctx, r->offsets);
     rey_free(ctx, r->adjoint);
+    rey_free(ctx, r->tangent);
     pthread_mutex_destroy(&r->lock);
 }
 
@@ -211,8 +213,8 @@ static int64_t picture_floats(const Render *r) {
 // ---- derivatives -------------------------------------------------------------------------------------------------
 
 // Whether the kernels know the derivative of the path integrand with respect to a parameter.
-static bool has_interior(const Param *p) {
-    return p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0 || p->emitter >= 0;
+static bool has_interior(const rey_scene *scene, const rey_render_def *def, const Param *p) {
+    return rey_motion_known(scene, scene->view.sensors + def->sensor, p) || p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0 || p->emitter >= 0;
 }
 
 // Refuses parameters whose derivative would lack a term.
@@ -233,7 +235,7 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         int missing = info.terms & ~available;
-        bool interior = has_interior(&ARRAY_AT(scene->params, Param, selection.params[i]));
+        bool interior = has_interior(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
         if (missing && !def->terms) {
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
@@ -258,7 +260,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     int64_t textures = view->textures_count, shapes = view->shapes_count;
     enum { PAD = 16 };
     int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
-    int64_t n = 2 * textures + shapes + view->attributes_count + places + view->groups_count + PAD;
+    int64_t n = 2 * textures + 3 * shapes + view->instances_count + CAMERA_NUMBERS + view->attributes_count + places +
+                view->groups_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
@@ -266,6 +269,11 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     memset(r->offsets, 0xff, (size_t)n * sizeof *r->offsets);
     int32_t *texture_at = r->offsets, *to_uv_at = r->offsets + textures, *normals_at = r->offsets + 2 * textures;
     int32_t *attribute_at = normals_at + shapes, *place_at = attribute_at + view->attributes_count;
+    r->job.points_at = place_at + places;
+    r->job.pose_at = r->job.points_at + shapes;
+    r->job.instance_at = r->job.pose_at + shapes;
+    r->job.camera_at = r->job.instance_at + view->instances_count;
+    r->job.normals_at = normals_at;
     int64_t at = 0;
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
@@ -274,7 +282,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
                         : p->normals >= 0 ? &normals_at[p->normals]
                         : p->attribute >= 0 ? &attribute_at[p->attribute]
                         : p->emitter >= 0 ? &place_at[MAX_EMITTER_SLOTS * p->emitter + p->place]
-                                          : NULL;
+                                          : rey_motion_slot(r, p);
         if (slot && *slot >= 0) {
             return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "%s is selected twice", p->name);
         }
@@ -294,13 +302,14 @@ static rey_result map_selection(Render *r, rey_selection selection) {
             return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
         }
     }
+    r->selection_size = at;
+    rey_motion_add_normals(r, &at);
     r->gradient_size = at;
     r->job.texture_at = texture_at;
     r->job.to_uv_at = to_uv_at;
-    r->job.normals_at = normals_at;
     r->job.attribute_at = attribute_at;
     r->job.place_at = place_at;
-    rey_live_groups(view, &r->job, place_at + places);
+    rey_live_groups(view, &r->job, (int32_t *)(uintptr_t)r->job.camera_at + CAMERA_NUMBERS);
     return REY_OK;
 }
 
@@ -370,6 +379,29 @@ static rey_result prepare_adjoint(Render *r, const float *adjoint) {
     return REY_OK;
 }
 
+// Adds the shards' gradients up in the first one.
+static rey_result sum_shards(Render *r) {
+    for (int64_t i = 0; i < r->gradient_size; i++) {
+        double sum = 0;
+        for (int32_t k = 0; k < r->shards; k++) {
+            sum += r->gradients[k * r->gradient_size + i];
+        }
+        r->gradients[i] = sum;
+    }
+    return rey_motion_gradient(r, r->gradients);
+}
+
+// The tangent, continued behind the selection.
+static rey_result prepare_tangent(Render *r, const float *tangent) {
+    r->tangent = rey_alloc_array(r->scene->ctx, (size_t)r->gradient_size + 1, sizeof *r->tangent);
+    if (!r->tangent) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(r->tangent, tangent, (size_t)r->selection_size * sizeof *tangent);
+    r->job.tangent = r->tangent;
+    return rey_motion_tangent(r, r->tangent);
+}
+
 rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *adjoint,
                    double *gradient, double *set_gradients, rey_stats *stats) {
     double start = rey_seconds();
@@ -390,20 +422,17 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
     if (result == REY_OK) {
         r.total = (r.tiles + (r.particles ? r.shards : 0.0)) * def->sets;
         r.job.spp = set_spp(&r);
-        memset(gradient, 0, (size_t)r.gradient_size * sizeof *gradient);
+        memset(gradient, 0, (size_t)r.selection_size * sizeof *gradient);
         for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(r.gradients, 0, (size_t)r.gradient_size * (size_t)r.shards * sizeof *r.gradients);
             r.job.scramble = set_scramble(&r, set);
             rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
             result = r.particles ? rey_particles_run(&r, NULL) : REY_OK;
-            for (int64_t i = 0; i < r.gradient_size; i++) {
-                double sum = 0;
-                for (int32_t k = 0; k < r.shards; k++) {
-                    sum += r.gradients[k * r.gradient_size + i];
-                }
-                gradient[i] += sum / def->sets;
+            result = result == REY_OK ? sum_shards(&r) : result;
+            for (int64_t i = 0; i < r.selection_size && result == REY_OK; i++) {
+                gradient[i] += r.gradients[i] / def->sets;
                 if (set_gradients) {
-                    set_gradients[set * r.gradient_size + i] = sum;
+                    set_gradients[set * r.selection_size + i] = r.gradients[i];
                 }
             }
         }
@@ -426,11 +455,10 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
     if (result == REY_OK) {
         n = picture_floats(&r);
         pictures = rey_alloc_array(scene->ctx, 2 * (size_t)n, sizeof *pictures);
-        result = pictures ? REY_OK : REY_ERROR_MEMORY;
+        result = pictures ? prepare_tangent(&r, tangent) : REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {
         double *sum = pictures, *one = pictures + n;
-        r.job.tangent = tangent;
         r.total = (r.tiles + (r.particles ? (double)rey_particle_shards(&r) : 0)) * def->sets;
         r.job.spp = set_spp(&r);
         for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {

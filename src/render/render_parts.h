@@ -22,9 +22,10 @@ typedef struct Render {
     double *squares;       // the same of second moments, or null
     double *coverage;      // the same of alpha and of 1, or null
     double *gradients;     // reverse: one per shard
-    int64_t gradient_size;
+    int64_t gradient_size, selection_size; // numbers selected, and what is gathered behind them for others
+    float *tangent;        // forward: those numbers' motion
     double *columns, *rows;
-    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, live
+    int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
     float *adjoint;
     int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;

@@ -96,6 +96,17 @@ typedef struct SensorRecord {
     int32_t batch, batch_count; // batch: its first sensor in `batch_sensors`, their number
 } SensorRecord;
 
+// Numbers of a sensor that derivatives know.
+enum {
+    CAMERA_POSE,
+    CAMERA_FOV,
+    CAMERA_PRINCIPAL_X,
+    CAMERA_PRINCIPAL_Y,
+    CAMERA_APERTURE,
+    CAMERA_FOCUS,
+    CAMERA_NUMBERS
+};
+
 // What a distant sensor sees.
 enum { SENSOR_AIM_SCENE, SENSOR_AIM_POINT, SENSOR_AIM_SHAPE };
 
@@ -173,12 +184,13 @@ typedef struct Param {
     int32_t attribute;        // entry of `attributes` that these are the values of, -1 = none
     int32_t geometry;         // shape whose geometry follows, -1 = none
     int32_t instance;         // instance whose pose this is, -1 = none
+    int32_t camera;           // which of a sensor's numbers that is: CAMERA_, -1 = none
     int32_t emitter;          // emitter whose place this is, -1 = none
     int32_t place;            // which of its slots that is
     uint32_t version;         // counts changes of the values
     uint32_t built;           // the version that derived data was built from
 } Param;
-#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
+#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .camera = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
 
 typedef struct Alias {
     char *name;

@@ -17,7 +17,12 @@ typedef struct Sink {
     const int32_t *normals_at; // per shape: its vertex normals
     const int32_t *attribute_at; // like view.attributes: every second entry
     const int32_t *place_at;   // per emitter and slot: position or pose
+    const int32_t *points_at;   // per shape: its vertex positions
+    const int32_t *pose_at;     // per shape: its to_world
+    const int32_t *instance_at; // per instance: its to_world
+    const int32_t *camera_at;   // CAMERA_ numbers
     bool any_normals, any_attributes, any_places;
+    bool any_motion, any_camera; // surfaces or the sensor move; the sensor does
     bool watch_turned; // see PathJob
     int32_t faces;     // FACES_ bits
     Float derivative;          // forward: accumulates

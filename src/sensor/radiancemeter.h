@@ -1,5 +1,4 @@
 // radiancemeter.h: the radiance along one ray, from the origin of its pose along local +z.
-// NOT differentiated: the pose.
 #pragma once
 
 #include "sensor/pose.h"
@@ -12,4 +11,11 @@ KFN SensorRay radiancemeter_ray(const SceneView *scene, const SensorRecord *s, F
     r.ray.tmax = f_set(INFINITY);
     r.weight = f_set(1);
     return r;
+}
+
+KFN void radiancemeter_ray_adj(const SceneView *scene, const SensorRecord *s, Float x, Float y, Vec2 lens,
+                               const RayAdj *ray, Sink *sink, Mask m) {
+    Vec3 unused = v3_zero();
+    UNUSED(x), UNUSED(y), UNUSED(lens);
+    pose_ray_adj(scene, s, v3_zero(), v3(f_set(0), f_set(0), f_set(1)), ray, &unused, &unused, sink, m);
 }

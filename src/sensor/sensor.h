@@ -24,6 +24,28 @@ KFN SensorRay single_sensor_ray(const SceneView *scene, const SensorRecord *s, F
     }
 }
 
+// Accumulates the adjoint of where the ray goes into the sensor's numbers.
+// NOT differentiated: irradiancemeters, distant sensors and batches.
+static NOINLINE void sensor_ray_adj(const SceneView *scene, const SensorRecord *s, Float x, Float y, Vec2 lens,
+                                    const RayAdj *ray, Sink *sink, Mask m) {
+    switch (s->kind) {
+    case SENSOR_PERSPECTIVE:
+        perspective_ray_adj(scene, s, x, y, lens, ray, sink, m);
+        break;
+    case SENSOR_THINLENS:
+        thinlens_ray_adj(scene, s, x, y, lens, ray, sink, m);
+        break;
+    case SENSOR_ORTHOGRAPHIC:
+        orthographic_ray_adj(scene, s, x, y, lens, ray, sink, m);
+        break;
+    case SENSOR_RADIANCEMETER:
+        radiancemeter_ray_adj(scene, s, x, y, lens, ray, sink, m);
+        break;
+    default:
+        break;
+    }
+}
+
 // The film of a batch is divided into columns of equal width, one per sensor.
 static NOINLINE SensorRay batch_ray(const SceneView *scene, const SensorRecord *s, Float x, Float y, Vec2 lens) {
     real width = (real)s->width / (real)s->batch_count;

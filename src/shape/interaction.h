@@ -1,5 +1,5 @@
 // interaction.h: what kernels know of a point of a surface: position, geometric normal, shading frame, texture
-// coordinates. NOT differentiated here: positions (geometry that moves needs further terms).
+// coordinates. How it changes with the geometry stands in motion.h.
 #pragma once
 
 #include "scene/tables.h"
@@ -30,8 +30,8 @@ KFN Frame frame_from_tangent(Vec3 n, Vec3 dp_du) {
     return f;
 }
 
-// Accumulates the adjoint of frame_from_tangent into dn (dp_du is held fixed).
-KFN void frame_from_tangent_adj(const Frame *f, Vec3 dp_du, const Frame *df, Vec3 *dn) {
+// Accumulates the adjoint of frame_from_tangent into dn and dtangent (null: dp_du is held fixed).
+KFN void frame_from_tangent_adj(const Frame *f, Vec3 dp_du, const Frame *df, Vec3 *dn, Vec3 *dtangent) {
     Vec3 ds = df->s;
     v3_acc(dn, df->n);
     // t = n x s
@@ -42,6 +42,9 @@ KFN void frame_from_tangent_adj(const Frame *f, Vec3 dp_du, const Frame *df, Vec
     Mask usable = m_gt(v3_dot(q, q), 1e-12f * v3_dot(dp_du, dp_du));
     v3_normalize_adj(v3_select(usable, q, f->s), v3_select(usable, ds, v3_zero()), &dq);
     v3_acc(dn, v3_madd(v3_scale(dq, -projection), -v3_dot(f->n, dq), dp_du));
+    if (dtangent) {
+        v3_acc(dtangent, v3_madd(dq, -v3_dot(f->n, dq), f->n));
+    }
 }
 
 // Origin of a ray that leaves si towards d: off the surface by an epsilon of the coordinates' size.

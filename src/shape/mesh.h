@@ -1,4 +1,5 @@
-// mesh.h: triangle meshes: interaction with its adjoint in the vertex normals, and uniform sampling of their area.
+// mesh.h: triangle meshes: interaction with its adjoint in the vertex normals, and uniform sampling of their area. What
+// moving vertices do stands in mesh_move.h.
 // Points are rebuilt from barycentrics, A + (u e1 + v e2), which is the most precise form in float.
 #pragma once
 
@@ -53,6 +54,27 @@ KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hi
     return si;
 }
 
+// Adds the adjoint dsum of the interpolated normals' sum to the vertex normals that are asked for.
+KFN void mesh_normals_add(const Hit *hit, const Corners *c, Vec3 dsum, Sink *sink, Mask m) {
+    Float w[3] = {1.0f - hit->u - hit->v, hit->u, hit->v};
+    Int begin = i_gather(sink->normals_at, hit->shape);
+    m = m & mi_lt(i_set(-1), begin);
+    begin = i_max(begin, i_set(0));
+    for (int k = 0; k < 3; k++) {
+        Int at = i_select(m, begin + c->i[k] * 3, i_set(0));
+        sink_add(sink, at, w[k] * dsum.x, m);
+        sink_add(sink, at + 1, w[k] * dsum.y, m);
+        sink_add(sink, at + 2, w[k] * dsum.z, m);
+    }
+}
+
+KFN Vec3 mesh_normal_sum(const SceneView *scene, const Hit *hit, const Corners *c) {
+    Int normals = SHAPE_FIELD(scene, hit->shape, normals);
+    Vec3 sum = v3_scale(theta_v3(scene, normals + c->i[0] * 3), 1.0f - hit->u - hit->v);
+    sum = v3_madd(sum, hit->u, theta_v3(scene, normals + c->i[1] * 3));
+    return v3_madd(sum, hit->v, theta_v3(scene, normals + c->i[2] * 3));
+}
+
 // Accumulates the adjoint df of the shading frame into the vertex normals of the mesh.
 KFN void mesh_interaction_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
                               const Frame *df, Sink *sink, Mask m) {
@@ -60,30 +82,17 @@ KFN void mesh_interaction_adj(const SceneView *scene, int32_t flags, const Hit *
         return;
     }
     Corners c = mesh_corners(scene, hit->shape, hit->prim);
-    Int normals = SHAPE_FIELD(scene, hit->shape, normals);
-    Float w[3] = {1.0f - hit->u - hit->v, hit->u, hit->v};
-    Vec3 dn = v3_zero(), dsum = v3_zero(), sum = v3_zero();
-    frame_from_tangent_adj(&si->sh, si->dp_du, df, &dn);
+    Vec3 dn = v3_zero(), dsum = v3_zero(), sum = mesh_normal_sum(scene, hit, &c);
+    frame_from_tangent_adj(&si->sh, si->dp_du, df, &dn, NULL);
     // n = +- normalize(sum), sum = sum_k w_k n_k
     if (flags & SHAPE_FLIP_NORMALS) {
         dn = v3_neg(dn);
-    }
-    for (int k = 0; k < 3; k++) {
-        sum = v3_madd(sum, w[k], theta_v3(scene, normals + c.i[k] * 3));
     }
     if (flags & SHAPE_INSTANCED) {
         dn = instance_normal_adj(scene, hit, v3_normalize(sum), dn);
     }
     v3_normalize_adj(sum, dn, &dsum);
-    Int begin = i_gather(sink->normals_at, hit->shape);
-    m = m & mi_lt(i_set(-1), begin);
-    begin = i_max(begin, i_set(0));
-    for (int k = 0; k < 3; k++) {
-        Int at = i_select(m, begin + c.i[k] * 3, i_set(0));
-        sink_add(sink, at, w[k] * dsum.x, m);
-        sink_add(sink, at + 1, w[k] * dsum.y, m);
-        sink_add(sink, at + 2, w[k] * dsum.z, m);
-    }
+    mesh_normals_add(hit, &c, dsum, sink, m);
 }
 
 // Uniform over the area: triangle by binary search in the cumulative areas, then uniform inside it.

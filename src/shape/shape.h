@@ -64,6 +64,12 @@ KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     }
 }
 
+// Kinds that move.h knows.
+KFN bool shape_moves(int32_t kind) {
+    return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK || kind == SHAPE_CYLINDER ||
+           kind == SHAPE_BSPLINE;
+}
+
 // With a shape of the same kind per lane, of kinds that know how.
 KFN bool shape_samples_many(int32_t kind) { return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK; }
 

@@ -391,7 +391,7 @@ static void light_adjoint(const KindCase *c, int n, const LightDraw *d, Adjoint 
         GATHER(distance, d[AT(lane)].distance);
         Mask m = m_first_n(n - first);
         sink.derivative = f_set(0);
-        LightMove move = {v3_zero(), f_set(0), {f_set(0), f_set(0)}};
+        LightMove move = light_move_zero();
         GATHER3(move.d, a[AT(lane)].dwo);
         emitter_adj_as(&view.scene, &light, texcoord(uv, NULL), distance, spec_zero_unless(m, gather_df(a, first, n)),
                        moves ? &move : NULL, &sink, m);

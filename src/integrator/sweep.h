@@ -1,0 +1,91 @@
+// sweep.h: what the backward sweep knows of the recorded vertices, and of the film's adjoint.
+#pragma once
+
+#include "integrator/path.h"
+
+KFN Vec3 record_v3(const real *x, const real *y, const real *z, int32_t at) {
+    return v3(f_load(x + at), f_load(y + at), f_load(z + at));
+}
+
+// The adjoint of one slot: in reverse mode the film's, in forward mode channel by channel 1.
+KFN Spec slot_adjoint(const Tracer *t, Int slot, int channel) {
+    if (t->job->mode == MODE_REVERSE) {
+        return spec_gather(t->ws.adjoint, slot);
+    }
+    Spec delta = spec_zero();
+    delta.c[channel] = f_set(1);
+    return delta;
+}
+
+// Forward mode: moves what the sink gathered to the slots' derivative of one channel.
+KFN void forward_flush(Tracer *t, Sink *sink, Int slot, int channel, Mask m) {
+    if (t->job->mode == MODE_FORWARD) {
+        f_scatter_add(t->ws.radiance[channel], slot, sink->derivative, m & m_finite(sink->derivative));
+        sink->derivative = f_set(0);
+    }
+}
+
+KFN int drives(const Tracer *t) { return t->job->mode == MODE_FORWARD ? SPEC_N : 1; }
+
+// What the sweep knows of a batch of surface vertices.
+typedef struct SurfaceSweep {
+    int32_t at;           // first record of the batch
+    bool first;           // the vertices that the camera sees
+    Mask m, lit, connected, scattered;
+    Int slot, light, light_prim, lobe;
+    Spec beta, suffix, light_weight, light_value, f_light;
+    Float mis, scatter_weight, light_distance;
+    Vec2 light_uv;
+    Vec3 d, wi, light_d, wo_d, wl, wo;
+    Hit hit;
+    Interaction si;
+    BsdfCall call;
+    BsdfSurface surface;
+    Vec3 dp_dv;
+    const EmitterRecord *emitter;
+    const Group *group;
+} SurfaceSweep;
+
+KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
+    const Records *r = &t->ws.records;
+    int32_t at = batch->first;
+    SurfaceSweep s;
+    s.at = at;
+    s.first = batch->first_vertex;
+    s.m = m_first_n(batch->count);
+    s.slot = slot;
+    s.suffix = suffix;
+    s.group = t->scene->groups + batch->group;
+    s.hit.shape = i_load(r->shape + at);
+    s.hit.prim = i_load(r->prim + at);
+    s.hit.instance = i_load(r->instance + at);
+    s.hit.u = f_load(r->u + at);
+    s.hit.v = f_load(r->v + at);
+    s.hit.p = record_v3(r->px, r->py, r->pz, at);
+    s.d = record_v3(r->dx, r->dy, r->dz, at);
+    s.beta = spec_load(r->beta, at);
+    s.mis = f_load(r->mis + at);
+    s.light_weight = spec_load(r->light_weight, at);
+    s.f_light = spec_load(r->light_f, at);
+    s.scatter_weight = f_load(r->sw + at);
+    s.lit = s.m & m_gt(s.mis, f_set(0));
+    s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
+    s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
+    s.light = i_load(r->light + at);
+    s.light_prim = i_load(r->lprim + at);
+    s.lobe = i_load(r->lobe + at);
+    s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
+    s.light_distance = f_load(r->ldist + at);
+    // Lanes without a light sample or a continuation get directions that do no harm.
+    Vec3 back = v3_neg(s.d);
+    s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
+    s.wo_d = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), back);
+    s.lobe = i_select(s.scattered, s.lobe, i_set(LOBE_SMOOTH));
+    s.si = shape_interaction(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
+    s.wi = frame_to_local(&s.si.sh, back);
+    s.wl = frame_to_local(&s.si.sh, s.light_d);
+    s.wo = frame_to_local(&s.si.sh, s.wo_d);
+    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
+    s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
+    return s;
+}

@@ -1,0 +1,129 @@
+// motion.c: which motions derivatives know, and vertex normals that follow their vertices.
+#include "render/motion.h"
+
+#include "sensor/kinds.h"
+#include "shape/normals.h"
+#include "shape/shape.h"
+
+// Sensors whose rays do not depend on surfaces.
+static bool ray_is_free(const SceneView *view, const SensorRecord *s) {
+    if (s->kind != SENSOR_BATCH) {
+        return s->kind != SENSOR_IRRADIANCEMETER && s->kind != SENSOR_DISTANT;
+    }
+    for (int32_t i = 0; i < s->batch_count; i++) {
+        if (!ray_is_free(view, view->batch_sensors + s->batch + i)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+// Whether all surfaces know how to slide; group: of this shapegroup alone, unless it is -1.
+static bool surfaces_slide(const SceneView *view, int32_t group) {
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (!shape_moves(view->shapes[i].kind) && (group < 0 || view->shapes[i].collection == group)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p) {
+    const SceneView *view = &scene->view;
+    if (!ray_is_free(view, sensor)) {
+        return false;
+    }
+    if (p->geometry >= 0) {
+        return shape_moves(view->shapes[p->geometry].kind);
+    }
+    if (p->instance >= 0) {
+        return surfaces_slide(view, view->instances[p->instance].group);
+    }
+    return p->camera >= 0 && sensor->kind != SENSOR_BATCH && surfaces_slide(view, -1);
+}
+
+// Where a sensor keeps one of its numbers.
+static int32_t camera_theta(const SensorRecord *s, int32_t number) {
+    switch (number) {
+    case CAMERA_POSE:
+        return s->to_world;
+    case CAMERA_FOV:
+        return s->fov;
+    case CAMERA_APERTURE:
+        return s->lens;
+    case CAMERA_FOCUS:
+        return s->lens < 0 ? -1 : s->lens + 1;
+    default:
+        return s->fov < 0 ? -1 : s->principal + number - CAMERA_PRINCIPAL_X;
+    }
+}
+
+int32_t *rey_motion_slot(Render *r, const Param *p) {
+    const SceneView *view = &r->scene->view;
+    PathJob *job = &r->job;
+    if (p->geometry >= 0) {
+        bool pose = p->theta == view->shapes[p->geometry].to_world;
+        job->any_motion = true;
+        return (int32_t *)(uintptr_t)(pose ? job->pose_at : job->points_at) + p->geometry;
+    }
+    if (p->instance >= 0) {
+        job->any_motion = true;
+        return (int32_t *)(uintptr_t)job->instance_at + p->instance;
+    }
+    if (p->camera >= 0 && camera_theta(r->plan.sensor, p->camera) == p->theta) {
+        job->any_motion = job->any_camera = true;
+        return (int32_t *)(uintptr_t)job->camera_at + p->camera;
+    }
+    return NULL;
+}
+
+static bool normals_follow(const Render *r, int64_t shape) {
+    return r->job.points_at[shape] >= 0 && (r->scene->view.shapes[shape].flags & SHAPE_SMOOTH_NORMALS);
+}
+
+void rey_motion_add_normals(Render *r, int64_t *size) {
+    const SceneView *view = &r->scene->view;
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (normals_follow(r, i) && r->job.normals_at[i] < 0) {
+            ((int32_t *)(uintptr_t)r->job.normals_at)[i] = (int32_t)*size;
+            *size += 3 * (int64_t)view->shapes[i].vertex_count;
+        }
+    }
+}
+
+static MeshView mesh_of(const SceneView *view, const ShapeRecord *shape) {
+    return (MeshView){view->theta + shape->positions, (const uint32_t *)view->triangles + 3 * (size_t)shape->triangle,
+                      (const uint32_t *)view->welded + shape->welded, shape->vertex_count, shape->triangle_count};
+}
+
+rey_result rey_motion_gradient(const Render *r, double *gradient) {
+    const SceneView *view = &r->scene->view;
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (!normals_follow(r, i)) {
+            continue;
+        }
+        MeshView mesh = mesh_of(view, view->shapes + i);
+        rey_result result = rey_normals_adj(r->scene->ctx, &mesh, gradient + r->job.normals_at[i],
+                                            gradient + r->job.points_at[i]);
+        if (result != REY_OK) {
+            return result;
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_motion_tangent(const Render *r, float *tangent) {
+    const SceneView *view = &r->scene->view;
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (!normals_follow(r, i)) {
+            continue;
+        }
+        MeshView mesh = mesh_of(view, view->shapes + i);
+        rey_result result = rey_normals_tangent(r->scene->ctx, &mesh, tangent + r->job.points_at[i],
+                                                tangent + r->job.normals_at[i]);
+        if (result != REY_OK) {
+            return result;
+        }
+    }
+    return REY_OK;
+}

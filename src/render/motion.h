@@ -1,0 +1,17 @@
+// motion.h: the selected parameters that move surfaces or the sensor.
+#pragma once
+
+#include "render/render_parts.h"
+
+// Whether the kernels know the interior term of a parameter that moves something, as the sensor sees it.
+bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p);
+
+// Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
+int32_t *rey_motion_slot(Render *r, const Param *p);
+
+// Vertex normals that follow selected vertices (SHAPE_SMOOTH_NORMALS) get room behind the selection, from *size on.
+void rey_motion_add_normals(Render *r, int64_t *size);
+// Reverse: adds what the gradient of those normals makes of the gradient of their vertices.
+rey_result rey_motion_gradient(const Render *r, double *gradient);
+// Forward: the motion of those normals that the vertices' makes.
+rey_result rey_motion_tangent(const Render *r, float *tangent);

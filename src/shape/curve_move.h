@@ -1,0 +1,171 @@
+// curve_move.h: B-spline tubes whose control points move. Points keep their position along the segment and their angle
+// about the tangent, so that their texture coordinates stay. NOT here: polylines.
+#pragma once
+
+#include "shape/curve.h"
+#include "shape/motion.h"
+
+// Accumulates the adjoints ds, dt of the axes of frame_from_normal(n) into dn.
+KFN void frame_from_normal_adj(Vec3 n, Vec3 ds, Vec3 dt, Vec3 *dn) {
+    // s = (1 + sign x^2 a, sign b, -sign x), t = (b, sign + y^2 a, -y), a = -1 / (sign + z), b = x y a
+    Float sign = f_sign(n.z), a = -1.0f / (sign + n.z);
+    Float da = sign * n.x * n.x * ds.x + n.y * n.y * dt.y, db = sign * ds.y + dt.x;
+    da = da + db * n.x * n.y;
+    dn->x = dn->x + sign * (2.0f * n.x * a * ds.x - ds.z) + db * n.y * a;
+    dn->y = dn->y + 2.0f * n.y * a * dt.y - dt.z + db * n.x * a;
+    dn->z = dn->z + da * a * a;
+}
+
+// Weights of the control points in value, first, second and third derivative.
+typedef struct CurveWeights {
+    Float b[BSPLINE_POINTS], b1[BSPLINE_POINTS], b2[BSPLINE_POINTS], b3[BSPLINE_POINTS];
+} CurveWeights;
+
+KFN CurveWeights bspline_weights(Float v) {
+    Float w = 1.0f - v, v2 = v * v;
+    return (CurveWeights){{w * w * w * (1.0f / 6), (3.0f * v2 * v - 6.0f * v2 + 4.0f) * (1.0f / 6),
+                           (-3.0f * v2 * v + 3.0f * v2 + 3.0f * v + 1.0f) * (1.0f / 6), v2 * v * (1.0f / 6)},
+                          {-0.5f * w * w, 0.5f * (3.0f * v2 - 4.0f * v), 0.5f * (-3.0f * v2 + 2.0f * v + 1.0f), 0.5f * v2},
+                          {w, 3.0f * v - 2.0f, 1.0f - 3.0f * v, v},
+                          {f_set(-1), f_set(3), f_set(-3), f_set(1)}};
+}
+
+// The tube at a hit: tangent, unit vectors away from the axis and around it, and the former's coordinates in the frame
+// about the tangent, which attached points keep.
+typedef struct CurveAxes {
+    CurvePoint p;
+    Vec3 tangent, e, around;
+    Float speed, x, y;
+} CurveAxes;
+
+KFN CurveAxes curve_axes(CurvePoint p, Vec3 point) {
+    CurveAxes c;
+    c.p = p;
+    c.speed = v3_length(p.c1);
+    c.tangent = v3_scale(p.c1, f_safe_rcp(c.speed));
+    Vec3 away = v3_sub(point, p.c);
+    c.e = v3_normalize(v3_madd(away, -v3_dot(away, c.tangent), c.tangent));
+    c.around = v3_cross(c.tangent, c.e);
+    Frame f = frame_from_normal(c.tangent);
+    c.x = v3_dot(c.e, f.s);
+    c.y = v3_dot(c.e, f.t);
+    return c;
+}
+
+// Adjoints of the centre, its derivatives, radii, and on the way of tangent, e and speed.
+typedef struct CurveAdj {
+    Vec3 c, c1, c2, tangent, e;
+    Float r, r1, speed;
+} CurveAdj;
+
+KFN CurveAdj curve_adj_zero(void) {
+    Vec3 z = v3_zero();
+    return (CurveAdj){z, z, z, z, z, f_set(0), f_set(0), f_set(0)};
+}
+
+// dp_du = 2 pi r tangent x e
+KFN void curve_around_adj(const CurveAxes *c, Vec3 d, CurveAdj *out) {
+    out->r = out->r + TWO_PI * v3_dot(d, c->around);
+    v3_cross_adj(c->tangent, c->e, v3_scale(d, TWO_PI * c->p.r), &out->tangent, &out->e);
+}
+
+// From the axes back to the control points, and to the sink.
+KFN void curve_finish_adj(const SceneView *scene, const Hit *hit, const CurveAxes *c, const CurveWeights *w, int points,
+                          CurveAdj *d, Sink *sink, Mask m) {
+    // e = x s + y t
+    frame_from_normal_adj(c->tangent, v3_scale(d->e, c->x), v3_scale(d->e, c->y), &d->tangent);
+    // tangent = c1 / speed
+    v3_normalize_adj(c->p.c1, d->tangent, &d->c1);
+    d->c1 = v3_madd(d->c1, d->speed, c->tangent);
+    Int segment = SHAPE_FIELD(scene, hit->shape, segment) + hit->prim;
+    Int begin = i_gather(sink->points_at, hit->shape);
+    m = m & mi_lt(i_set(-1), begin);
+    Int at = i_select(m, begin + i_gather(scene->segments, segment) * 4, i_set(0));
+    for (int k = 0; k < points; k++) {
+        Vec3 p = v3_madd(v3_madd(v3_scale(d->c, w->b[k]), w->b1[k], d->c1), w->b2[k], d->c2);
+        sink_add(sink, at + 4 * k, p.x, m);
+        sink_add(sink, at + (4 * k + 1), p.y, m);
+        sink_add(sink, at + (4 * k + 2), p.z, m);
+        sink_add(sink, at + (4 * k + 3), w->b[k] * d->r + w->b1[k] * d->r1, m);
+    }
+}
+
+KFN CurveAxes bspline_axes(const SceneView *scene, const Hit *hit, const CurveWeights *w) {
+    return curve_axes(curve_sum(scene, hit, BSPLINE_POINTS, w->b, w->b1, w->b2), hit->p);
+}
+
+KFN void bspline_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                          const SurfaceAdj *d, Sink *sink, Mask m) {
+    CurveWeights w = bspline_weights(hit->u);
+    CurveAxes c = bspline_axes(scene, hit, &w);
+    const CurvePoint *p = &c.p;
+    CurveAdj out = curve_adj_zero();
+    Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1), rcp = f_safe_rcp(c.speed), bend = v3_dot(p->c2, c.e) * rcp;
+    Float stretch = c.speed - p->r * bend, dstretch;
+    // p = c + r e
+    out.c = d->p;
+    out.r = v3_dot(d->p, c.e);
+    out.e = v3_scale(d->p, p->r);
+    // ng = normalize(v), v = stretch e - r' tangent; the area vector is along r v
+    Vec3 v = v3_madd(v3_scale(c.e, stretch), -p->r1, c.tangent), dv = v3_zero();
+    v3_normalize_adj(v, v3_scale(v3_add(d->n, d->ng), sign), &dv);
+    dv = v3_madd(dv, sign * f_safe_rcp(v3_length(v)), d->area);
+    out.r = out.r + v3_dot(d->area, si->ng) * f_safe_rcp(p->r);
+    dstretch = v3_dot(dv, c.e);
+    out.e = v3_madd(out.e, stretch, dv);
+    out.r1 = -v3_dot(dv, c.tangent);
+    out.tangent = v3_scale(dv, -p->r1);
+    curve_around_adj(&c, d->dp_du, &out);
+    // dp_dv = n (stretch tangent + r' e)
+    Vec3 along = curve_along(scene, hit, d->dp_dv);
+    dstretch = dstretch + v3_dot(along, c.tangent);
+    out.tangent = v3_madd(out.tangent, stretch, along);
+    out.r1 = out.r1 + v3_dot(along, c.e);
+    out.e = v3_madd(out.e, p->r1, along);
+    // stretch = speed - r (c'' . e) / speed
+    out.speed = dstretch * (1.0f + p->r * bend * rcp);
+    out.r = out.r - dstretch * bend;
+    out.c2 = v3_scale(c.e, -dstretch * p->r * rcp);
+    out.e = v3_madd(out.e, -dstretch * p->r * rcp, p->c2);
+    curve_finish_adj(scene, hit, &c, &w, BSPLINE_POINTS, &out, sink, m);
+}
+
+// ---- sliding: along dp_du and dp_dv --------------------------------------------------------------------------------
+
+// Turns of the frame about the tangent, as that moves by dtangent, about itself: texture coordinates begin there.
+KFN Float curve_twist(const CurveAxes *c, Vec3 dtangent) {
+    Frame f = frame_from_normal(c->tangent);
+    Vec3 by = v3_zero(), none = v3_zero();
+    frame_from_normal_adj(c->tangent, f.t, none, &by); // t . ds
+    return v3_dot(by, dtangent);
+}
+
+KFN void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+    CurveWeights w = bspline_weights(hit->u);
+    CurveAxes c = bspline_axes(scene, hit, &w);
+    CurvePoint p = c.p, higher = curve_sum(scene, hit, BSPLINE_POINTS, w.b3, w.b2, w.b);
+    Vec3 c3 = higher.c;
+    Float r2 = higher.r1, rcp = f_safe_rcp(c.speed), n = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count));
+    Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1), bend = v3_dot(p.c2, c.e) * rcp, stretch = c.speed - p.r * bend;
+    Vec3 v = v3_madd(v3_scale(c.e, stretch), -p.r1, c.tangent);
+    // around: e goes along `around`, that along -e
+    Float ds = -p.r * v3_dot(p.c2, c.around) * rcp;
+    Vec3 dv = v3_madd(v3_scale(c.e, ds), stretch, c.around);
+    out[0] = slide_along(si->dp_du, f_set(1), f_set(0));
+    out[0].n = out[0].ng = v3_scale(slide_normalized(v, dv), sign * TWO_PI);
+    out[0].dp_du = v3_scale(c.e, -TWO_PI * TWO_PI * p.r);
+    out[0].dp_dv = v3_scale(v3_madd(v3_scale(c.tangent, ds), p.r1, c.around), n * TWO_PI);
+    // along: e stays perpendicular to the tangent
+    Float slowing = v3_dot(c.tangent, p.c2);
+    Vec3 dtangent = v3_scale(v3_madd(p.c2, -slowing, c.tangent), rcp);
+    Vec3 de = v3_scale(c.tangent, -v3_dot(dtangent, c.e));
+    Float dbend = (v3_dot(c3, c.e) + v3_dot(p.c2, de) - bend * slowing) * rcp;
+    ds = slowing - p.r1 * bend - p.r * dbend;
+    dv = v3_madd(v3_madd(v3_madd(v3_scale(c.e, ds), stretch, de), -r2, c.tangent), -p.r1, dtangent);
+    out[1] = slide_along(si->dp_dv, -n * INV_TWO_PI * curve_twist(&c, dtangent), f_set(1));
+    out[1].n = out[1].ng = v3_scale(slide_normalized(v, dv), sign * n);
+    Vec3 turned = v3_add(v3_cross(dtangent, c.e), v3_cross(c.tangent, de));
+    out[1].dp_du = v3_scale(v3_madd(v3_scale(c.around, p.r1), p.r, turned), n * TWO_PI);
+    Vec3 second = v3_madd(v3_scale(dtangent, stretch), ds, c.tangent);
+    out[1].dp_dv = v3_scale(v3_madd(v3_madd(second, r2, c.e), p.r1, de), n * n);
+}

@@ -1,0 +1,104 @@
+// posed_move.h: shapes of one surface that move with their pose: spheres, disks, cylinders. They slide along dp_du and
+// dp_dv. NOT here: grids of distances.
+#pragma once
+
+#include "shape/cylinder.h"
+#include "shape/disk.h"
+#include "shape/motion.h"
+#include "shape/sphere.h"
+
+// Shapes whose points are A q + t with a fixed q.
+KFN void affine_move_adj(const SceneView *scene, const Hit *hit, const Interaction *si, const SurfaceAdj *d, Sink *sink,
+                         Mask m) {
+    Int at = i_gather(sink->pose_at, hit->shape);
+    pose_move_adj(scene, SHAPE_FIELD(scene, hit->shape, to_world), at, si, d, sink, m);
+}
+
+// ---- disks: p = o + r (cos phi x + sin phi y), uv = (r, phi / 2 pi) ----------------------------------------------
+
+KFN void disk_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+    Int pose = SHAPE_FIELD(scene, hit->shape, to_world);
+    UNUSED(flags);
+    out[0] = slide_along(si->dp_du, f_set(1), f_set(0));
+    out[1] = slide_along(si->dp_dv, f_set(0), f_set(1));
+    out[0].dp_dv = out[1].dp_du = v3_scale(si->dp_dv, f_safe_rcp(si->uv.x));
+    out[1].dp_dv = v3_scale(v3_sub(si->p, pose_theta_column(scene, pose, 3)), f_set(-TWO_PI * TWO_PI));
+}
+
+KFN void disk_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, const SurfaceAdj *d,
+                       Sink *sink, Mask m) {
+    UNUSED(flags);
+    affine_move_adj(scene, hit, si, d, sink, m);
+}
+
+// ---- cylinders: p = o + cos phi x + sin phi y + v z, uv = (phi / 2 pi, v) ----------------------------------------
+
+KFN void cylinder_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+    Int pose = SHAPE_FIELD(scene, hit->shape, to_world), at = SHAPE_FIELD(scene, hit->shape, table);
+    Float sine, cosine;
+    f_sincos(TWO_PI * si->uv.x, &sine, &cosine);
+    out[0] = slide_along(si->dp_du, f_set(1), f_set(0));
+    out[1] = slide_along(si->dp_dv, f_set(0), f_set(1));
+    // n = normalize(cos phi a + sin phi b) with the first rows a, b of the inverse
+    Vec3 a = table_v3(scene, at + 12), b = table_v3(scene, at + 16);
+    Vec3 dn = slide_normalized(v3_madd(v3_scale(a, cosine), sine, b), v3_madd(v3_scale(b, cosine), -sine, a));
+    out[0].n = out[0].ng = v3_scale(dn, f_set(flags & SHAPE_FLIP_NORMALS ? -TWO_PI : TWO_PI));
+    Vec3 x = pose_theta_column(scene, pose, 0), y = pose_theta_column(scene, pose, 1);
+    out[0].dp_du = v3_scale(v3_madd(v3_scale(x, cosine), sine, y), f_set(-TWO_PI * TWO_PI));
+}
+
+KFN void cylinder_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                           const SurfaceAdj *d, Sink *sink, Mask m) {
+    UNUSED(flags);
+    affine_move_adj(scene, hit, si, d, sink, m);
+}
+
+// ---- spheres: p = c + r n, uv = (phi / 2 pi, theta / pi) ---------------------------------------------------------
+
+KFN void sphere_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+    Int at = SHAPE_FIELD(scene, hit->shape, table);
+    Vec3 away = v3_sub(si->p, table_v3(scene, at)), pole = table_v3(scene, at + 10);
+    Float radius = table_at(scene, at + 3), rcp = f_safe_rcp(radius);
+    Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);
+    out[0] = slide_along(si->dp_du, f_set(1), f_set(0));
+    out[1] = slide_along(si->dp_dv, f_set(0), f_set(1));
+    for (int k = 0; k < 2; k++) {
+        out[k].n = out[k].ng = v3_scale(out[k].p, sign * rcp);
+    }
+    // p_uu = -4 pi^2 (p - c without its part along the axis), p_uv = pi cot theta p_u, p_vv = -pi^2 (p - c)
+    Float z = v3_dot(away, pole);
+    Vec3 ring = v3_madd(away, -z, pole);
+    out[0].dp_du = v3_scale(ring, f_set(-TWO_PI * TWO_PI));
+    out[0].dp_dv = out[1].dp_du = v3_scale(si->dp_du, PI * z * f_safe_rcp(v3_length(ring)));
+    out[1].dp_dv = v3_scale(away, f_set(-PI * PI));
+}
+
+// The table of a sphere: centre t, radius r = |A e_x|, and local coordinates r A^-1 n. Attached points go along
+// n = A q / |A q|; their distances from the centre are r also where A does not stay a similarity. (Then the axes are
+// taken to turn with A, which matters to anisotropic functions alone.)
+KFN void sphere_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                         const SurfaceAdj *d, Sink *sink, Mask m) {
+    Int at = SHAPE_FIELD(scene, hit->shape, table), pose = SHAPE_FIELD(scene, hit->shape, to_world);
+    Float radius = table_at(scene, at + 3), rcp = f_safe_rcp(radius), sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);
+    Vec3 n = v3_scale(si->ng, sign), zero = v3_zero();
+    Vec3 q = v3(v3_dot(table_v3(scene, at + 4), n), v3_dot(table_v3(scene, at + 7), n), v3_dot(table_v3(scene, at + 10), n));
+    Matrix3 b = {{zero, zero, zero}}, a = b, inverse = pose_theta_inverse(scene, pose);
+    // p = t + r n; ng and the area vector are along n
+    Vec3 dn = v3_madd(v3_scale(v3_add(v3_add(d->n, d->ng), d->area), sign), radius, d->p);
+    Float dr = v3_dot(d->p, n);
+    // area ~ r^2 det A / |A q|^3
+    Float grows = v3_dot(d->area, si->ng);
+    dr = dr + 2.0f * grows * rcp;
+    b.row[0].x = b.row[1].y = b.row[2].z = grows;
+    // v = acos(q.z r / |A q|) / pi
+    Float dratio = -d->uv.y * INV_PI * q.z * f_safe_rcp(f_safe_sqrt(1.0f - q.z * q.z));
+    dr = dr + dratio * rcp;
+    // n = A q / |A q|, |A q| = r now
+    Vec3 along = v3_scale(n, -(3.0f * grows + dratio));
+    Vec3 dq = v3_scale(v3_add(v3_madd(dn, -v3_dot(n, dn), n), along), rcp);
+    matrix_add_outer(&a, dq, q);
+    matrix_add_outer(&a, v3_scale(pose_theta_column(scene, pose, 0), dr * rcp), v3(f_set(1), f_set(0), f_set(0)));
+    matrix_add_outer(&b, d->dp_du, si->dp_du);
+    matrix_add_outer(&b, d->dp_dv, si->dp_dv);
+    pose_sink_add(&b, &inverse, &a, d->p, i_gather(sink->pose_at, hit->shape), sink, m);
+}

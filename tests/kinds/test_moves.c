@@ -1,0 +1,340 @@
+// Surfaces that move, in double: the adjoint of an interaction at an attached point against central differences in every
+// vertex, vertex normal and entry of every pose, and what an interaction does where its point slides along the surface
+// against points found where a moved ray meets it. For every kind of surface that moves, flipped and in instances too.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define REAL_DOUBLE
+#define LANES 1
+#define float double
+#include "shape/move.h"
+
+enum { POSITIONS, NORMALS = 9, UVS = 18, POSE = 24, INSTANCE = 40, CONTROL_POINTS = 56, NUMBERS = 72 };
+
+typedef struct Case {
+    const char *name;
+    int32_t kind, flags;
+    bool posed_mesh;
+} Case;
+
+static const Case cases[] = {
+    {"mesh", SHAPE_MESH, 0, false},
+    {"mesh with texture coordinates", SHAPE_MESH, SHAPE_HAS_UVS, false},
+    {"mesh with normals", SHAPE_MESH, SHAPE_HAS_NORMALS | SHAPE_HAS_UVS, false},
+    {"flipped mesh", SHAPE_MESH, SHAPE_HAS_NORMALS | SHAPE_FLIP_NORMALS, false},
+    {"mesh in an instance", SHAPE_MESH, SHAPE_HAS_NORMALS | SHAPE_HAS_UVS | SHAPE_INSTANCED, false},
+    {"mesh that follows a pose", SHAPE_MESH, SHAPE_HAS_UVS, true},
+    {"sphere", SHAPE_SPHERE, 0, false},
+    {"flipped sphere", SHAPE_SPHERE, SHAPE_FLIP_NORMALS, false},
+    {"sphere in an instance", SHAPE_SPHERE, SHAPE_INSTANCED, false},
+    {"disk", SHAPE_DISK, 0, false},
+    {"flipped disk in an instance", SHAPE_DISK, SHAPE_INSTANCED | SHAPE_FLIP_NORMALS, false},
+    {"cylinder", SHAPE_CYLINDER, 0, false},
+    {"flipped cylinder", SHAPE_CYLINDER, SHAPE_FLIP_NORMALS, false},
+    {"cylinder in an instance", SHAPE_CYLINDER, SHAPE_INSTANCED, false},
+    {"curve", SHAPE_BSPLINE, 0, false},
+    {"flipped curve in an instance", SHAPE_BSPLINE, SHAPE_INSTANCED | SHAPE_FLIP_NORMALS, false},
+};
+
+static double uniform(uint64_t *state) {
+    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
+}
+
+// One shape in one scene, and an attached point: barycentrics, or a position in the space of the pose.
+typedef struct World {
+    const Case *c;
+    SceneView scene;
+    ShapeRecord shape;
+    InstanceRecord instance;
+    double theta[NUMBERS], tables[64], a[2];
+    int32_t triangles[3], segments[2];
+    Vec3 q; // curves: along e, in the frame about the tangent
+} World;
+
+static void inverse_rows(const double *m, double *r) {
+    Vec3 x = {m[0], m[4], m[8]}, y = {m[1], m[5], m[9]}, z = {m[2], m[6], m[10]}, t = {m[3], m[7], m[11]};
+    double det = v3_dot(x, v3_cross(y, z));
+    Vec3 rows[3] = {v3_cross(y, z), v3_cross(z, x), v3_cross(x, y)};
+    for (int k = 0; k < 3; k++) {
+        Vec3 row = v3_scale(rows[k], 1 / det);
+        memcpy(r + 4 * k, (double[4]){row.x, row.y, row.z, -v3_dot(row, t)}, 4 * sizeof *r);
+    }
+}
+
+enum { INSTANCE_AT = 32 };
+
+// What shape and instance derive from theta.
+static void follow(World *w) {
+    double *t = w->tables;
+    const double *m = w->theta + POSE;
+    memcpy(t, m, 12 * sizeof *t);
+    inverse_rows(m, t + 12);
+    if (w->c->kind == SHAPE_SPHERE) {
+        double inverse[12], radius = sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]);
+        memcpy(inverse, t + 12, sizeof inverse);
+        for (int k = 0; k < 3; k++) {
+            t[k] = m[4 * k + 3];
+            for (int i = 0; i < 3; i++) {
+                t[4 + 3 * k + i] = inverse[4 * k + i] * radius;
+            }
+        }
+        t[3] = radius;
+    }
+    memcpy(t + INSTANCE_AT, w->theta + INSTANCE, 12 * sizeof *t);
+    inverse_rows(w->theta + INSTANCE, t + INSTANCE_AT + 12);
+    if (w->c->posed_mesh) {
+        const double unit[3][2] = {{-1, -1}, {1, -1}, {1, 1}};
+        for (int k = 0; k < 9; k++) {
+            const double *row = m + 4 * (k % 3);
+            w->theta[POSITIONS + k] = row[0] * unit[k / 3][0] + row[1] * unit[k / 3][1] + row[3];
+        }
+    }
+}
+
+static void world_make(World *w, const Case *c, uint64_t *random) {
+    memset(w, 0, sizeof *w);
+    w->c = c;
+    for (int i = 0; i < NUMBERS; i++) {
+        w->theta[i] = uniform(random);
+    }
+    for (int k = 0; k < 3; k++) { // normals about z, poses not too far from the identity
+        w->theta[NORMALS + 3 * k + 2] += 2;
+        w->theta[POSE + 5 * k] += 3;
+        w->theta[INSTANCE + 5 * k] += 3;
+    }
+    if (c->kind == SHAPE_SPHERE) { // a rotation times a scale
+        double angle = uniform(random) * 3, size = 1.5 + 0.5 * uniform(random);
+        Vec3 axis = v3_normalize(v3(uniform(random), uniform(random), uniform(random)));
+        for (int column = 0; column < 3; column++) {
+            Vec3 e = v3(column == 0, column == 1, column == 2);
+            Vec3 r = v3_madd(v3_scale(e, cos(angle)), sin(angle), v3_cross(axis, e));
+            r = v3_scale(v3_madd(r, (1 - cos(angle)) * v3_dot(axis, e), axis), size);
+            w->theta[POSE + column] = r.x;
+            w->theta[POSE + 4 + column] = r.y;
+            w->theta[POSE + 8 + column] = r.z;
+        }
+    }
+    for (int k = 0; k < 4; k++) { // a tube along z
+        w->theta[CONTROL_POINTS + 4 * k + 2] += 3 * k;
+        w->theta[CONTROL_POINTS + 4 * k + 3] = 0.7 + 0.2 * w->theta[CONTROL_POINTS + 4 * k + 3];
+    }
+    w->triangles[1] = 1;
+    w->triangles[2] = 2;
+    w->shape = (ShapeRecord){.kind = c->kind, .flags = c->flags, .triangle_count = 1, .vertex_count = 3,
+                             .positions = c->kind == SHAPE_BSPLINE ? CONTROL_POINTS : POSITIONS, .segment_count = 2, .normals = NORMALS, .uvs = UVS, .to_world = POSE};
+    w->instance = (InstanceRecord){.to_world = INSTANCE, .table = INSTANCE_AT};
+    w->a[0] = 0.3 + 0.1 * uniform(random);
+    w->a[1] = 0.4 + 0.1 * uniform(random);
+    double phi = uniform(random) * 3, z = 0.5 + 0.3 * uniform(random);
+    w->q = c->kind == SHAPE_SPHERE  ? v3(cos(phi) * sqrt(1 - z * z), sin(phi) * sqrt(1 - z * z), z)
+           : c->kind == SHAPE_DISK ? v3(z * cos(phi), z * sin(phi), 0)
+                                    : v3(cos(phi), sin(phi), z);
+    follow(w);
+}
+
+static void world_link(World *w) {
+    w->scene.theta = w->theta;
+    w->scene.tables = w->tables;
+    w->scene.shapes = &w->shape;
+    w->scene.instances = &w->instance;
+    w->scene.triangles = w->triangles;
+    w->scene.segments = w->segments;
+}
+
+static Vec3 apply(const double *m, Vec3 p) {
+    return v3(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+              m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
+}
+
+// The point of a curve at v whose e has the coordinates x and y in the frame about the tangent.
+static Vec3 curve_point(const World *w, double v, double x, double y) {
+    CurveWeights b = bspline_weights(v);
+    Vec3 c = v3_zero(), c1 = v3_zero();
+    double r = 0;
+    for (int k = 0; k < 4; k++) {
+        const double *p = w->theta + CONTROL_POINTS + 4 * k;
+        c = v3_madd(c, b.b[k], v3(p[0], p[1], p[2]));
+        c1 = v3_madd(c1, b.b1[k], v3(p[0], p[1], p[2]));
+        r += b.b[k] * p[3];
+    }
+    Frame f = frame_from_normal(v3_normalize(c1));
+    return v3_madd(c, r, v3_normalize(v3_madd(v3_scale(f.s, x), y, f.t)));
+}
+
+static Hit attached(const World *w, const double a[2], Vec3 q) {
+    Vec3 p = w->c->kind == SHAPE_BSPLINE ? curve_point(w, a[0], q.x, q.y) : apply(w->theta + POSE, q);
+    Hit hit = {0, 0, a[0], a[1], p, 0};
+    if (w->c->flags & SHAPE_INSTANCED) {
+        hit.p = apply(w->theta + INSTANCE, p);
+    }
+    return hit;
+}
+
+static Interaction look(World *w, const Hit *hit) {
+    world_link(w);
+    return shape_interaction(&w->scene, w->c->kind, w->c->flags, hit);
+}
+
+// A patch around the attached point, as area times normal.
+static Vec3 patch(World *w) {
+    const double e = 1e-5;
+    Vec3 p[3];
+    Frame f = frame_from_normal(w->c->kind == SHAPE_DISK ? v3(0, 0, 1) : v3_normalize(w->q));
+    for (int k = 0; k < 3; k++) {
+        double a[2] = {w->a[0] + e * (k == 1), w->a[1] + e * (k == 2)};
+        Vec3 q = v3_madd(v3_madd(w->q, e * (k == 1), f.s), e * (k == 2), f.t);
+        if (w->c->kind == SHAPE_CYLINDER || w->c->kind == SHAPE_BSPLINE) {
+            double phi = atan2(w->q.y, w->q.x) + e * (k == 1);
+            q = v3(cos(phi), sin(phi), w->q.z + e * (k == 2));
+            a[0] = w->a[0] + e * (k == 2);
+        }
+        q = w->c->kind == SHAPE_SPHERE ? v3_normalize(q) : q;
+        Hit hit = attached(w, a, q);
+        p[k] = look(w, &hit).p;
+    }
+    return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 1 / (e * e));
+}
+
+static SurfaceAdj random_adj(uint64_t *random, bool axes) {
+    double v[22];
+    for (int i = 0; i < 22; i++) {
+        v[i] = uniform(random);
+    }
+    SurfaceAdj d = surface_adj_zero();
+    d.p = v3(v[0], v[1], v[2]);
+    d.ng = v3(v[3], v[4], v[5]);
+    d.n = v3(v[6], v[7], v[8]);
+    if (axes) {
+        d.dp_du = v3(v[9], v[10], v[11]);
+        d.dp_dv = v3(v[12], v[13], v[14]);
+    }
+    d.area = v3(v[15], v[16], v[17]);
+    d.uv = (Vec2){v[18], v[19]};
+    d.at = (Vec2){v[20], v[21]};
+    return d;
+}
+
+// The interaction's worth. unit: size of the patch to begin with, 0 = without it.
+static double worth(World *w, const Hit *hit, const SurfaceAdj *d, double unit, double side) {
+    Interaction si = look(w, hit);
+    double sum = v3_dot(d->p, si.p) + v3_dot(d->ng, si.ng) + v3_dot(d->n, si.sh.n) + v3_dot(d->dp_du, si.dp_du) +
+                 v3_dot(d->dp_dv, si.dp_dv) + d->uv.x * si.uv.x + d->uv.y * si.uv.y;
+    return unit > 0 ? sum + side * v3_dot(d->area, patch(w)) / unit : sum + d->at.x * hit->u + d->at.y * hit->v;
+}
+
+static double worth_attached(World *w, const SurfaceAdj *d, double unit, double side) {
+    Hit hit = attached(w, w->a, w->q);
+    return worth(w, &hit, d, unit, side);
+}
+
+static void test_adjoint(void **state) {
+    const Case *c = *state;
+    static World w, moved;
+    uint64_t random = (uint64_t)(c - cases) + 1;
+    const bool curve = c->kind == SHAPE_BSPLINE, free_mesh = c->kind == SHAPE_MESH && !c->posed_mesh;
+    const int32_t points = curve ? CONTROL_POINTS : c->posed_mesh ? -1 : POSITIONS, pose = curve || free_mesh ? -1 : POSE;
+    const int32_t normals = NORMALS, instance = INSTANCE;
+    double size = 0;
+    for (int round = 0; round < 20; round++) {
+        world_make(&w, c, &random);
+        SurfaceAdj d = random_adj(&random, c->kind != SHAPE_SPHERE);
+        double gradient[NUMBERS] = {0};
+        Sink sink = {.gradient = gradient, .points_at = &points, .pose_at = &pose, .normals_at = &normals,
+                     .instance_at = &instance};
+        Hit hit = attached(&w, w.a, w.q);
+        Interaction si = look(&w, &hit);
+        Vec3 area = patch(&w);
+        double unit = v3_length(area), side = v3_dot(area, si.ng) < 0 ? -1 : 1;
+        shape_move_adj(&w.scene, c->kind, c->flags, &hit, &si, &d, &sink, m_set(true));
+        for (int i = 0; i < NUMBERS; i++) {
+            const double h = 1e-4;
+            double difference = 0;
+            if (c->posed_mesh && i < POSE) {
+                continue;
+            }
+            for (int k = -1; k <= 1; k += 2) {
+                moved = w;
+                moved.theta[i] += k * h;
+                follow(&moved);
+                difference += k * worth_attached(&moved, &d, unit, side) / (2 * h);
+            }
+            size += fabs(difference);
+            if (i >= UVS && i < POSE) {
+                continue; // texture coordinates are no parameters
+            }
+            if (fabs(difference - gradient[i]) > 2e-4 * (1 + fabs(difference))) {
+                fail_msg("%s: number %d has derivative %.8g, expected %.8g", c->name, i, gradient[i], difference);
+            }
+        }
+    }
+    assert_true(size > 1);
+}
+
+// Where the ray p + t d meets the surface near the attached point.
+static Hit meet(World *w, Vec3 p, Vec3 d) {
+    Hit hit = attached(w, w->a, w->q);
+    for (int i = 0; i < 20; i++) {
+        Interaction si = look(w, &hit);
+        Slide s[2];
+        shape_slide(&w->scene, w->c->kind, w->c->flags, &hit, &si, s);
+        Vec3 off = v3_sub(p, si.p), b1 = v3_cross(s[1].p, d), b2 = v3_cross(d, s[0].p);
+        double det = v3_dot(s[0].p, b1), x = v3_dot(off, b1) / det, y = v3_dot(off, b2) / det;
+        hit.u += w->c->kind == SHAPE_BSPLINE ? 2 * y : x; // of two segments
+        hit.v += y;
+        hit.p = v3_madd(v3_madd(si.p, x, s[0].p), y, s[1].p);
+    }
+    return hit;
+}
+
+static void test_slide(void **state) {
+    const Case *c = *state;
+    static World w;
+    uint64_t random = (uint64_t)(c - cases) + 100;
+    for (int round = 0; round < 20; round++) {
+        world_make(&w, c, &random);
+        SurfaceAdj adjoint = random_adj(&random, true);
+        if (c->kind != SHAPE_MESH) {
+            adjoint.at = (Vec2){0, 0};
+        }
+        Hit hit = attached(&w, w.a, w.q);
+        Interaction si = look(&w, &hit);
+        Slide slide[2];
+        shape_slide(&w.scene, c->kind, c->flags, &hit, &si, slide);
+        Vec3 away = v3(uniform(&random), uniform(&random), uniform(&random));
+        Vec3 d = v3_normalize(v3_madd(away, v3_dot(away, si.ng) < 0 ? -2 : 2, si.ng));
+        Vec3 g = slide_adj(slide, d, &adjoint), v = v3(uniform(&random), uniform(&random), uniform(&random));
+        const double h = 1e-5;
+        double difference = 0;
+        for (int k = -1; k <= 1; k += 2) {
+            Hit at = meet(&w, v3_madd(si.p, k * h, v), d);
+            difference += k * worth(&w, &at, &adjoint, 0, 0) / (2 * h);
+        }
+        if (fabs(v3_dot(g, v) - difference) > 1e-6 * (1 + fabs(difference))) {
+            fail_msg("%s: sliding is worth %.8g, expected %.8g", c->name, v3_dot(g, v), difference);
+        }
+    }
+}
+
+int main(void) {
+    enum { CASES = sizeof cases / sizeof *cases };
+    struct CMUnitTest tests[2 * CASES];
+    static char names[2 * CASES][64];
+    for (int i = 0; i < 2 * CASES; i++) {
+        void *c = (void *)(uintptr_t)(cases + i / 2);
+        snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "slide" : "adjoint", cases[i / 2].name);
+        tests[i] = (struct CMUnitTest){names[i], i % 2 ? test_slide : test_adjoint, NULL, NULL, c};
+    }
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
