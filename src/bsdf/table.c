@@ -42,6 +42,11 @@ int rey_bsdf_kind_find(const char *name) {
     return -1;
 }
 
+bool rey_bsdf_bends(int kind) {
+    return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_THINDIELECTRIC || kind == BSDF_PLASTIC ||
+           kind == BSDF_MASK || kind == BSDF_NULL;
+}
+
 int32_t rey_bsdf_table_size(int kind) {
     return kind == BSDF_ROUGHPLASTIC ? COAT_TABLE_SIZE : 0;
 }

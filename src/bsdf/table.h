@@ -23,6 +23,9 @@ extern const BsdfKind rey_bsdf_kinds[];
 extern const int rey_bsdf_kind_count;
 int rey_bsdf_kind_find(const char *name); // -1 when unknown
 
+// Whether paths go on from it in a direction that follows from where they came: by themselves, not through children.
+bool rey_bsdf_bends(int kind);
+
 // Numbers in `tables` that a function of this kind derives, 0 for most.
 int32_t rey_bsdf_table_size(int kind);
 rey_result rey_bsdf_update(rey_scene *scene, int32_t bsdf);

@@ -36,10 +36,13 @@ KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall 
                          VertexAdj *d, Sink *sink) {
     bool moves = sink->any_places || sink->any_motion;
     Spec both = spec_mul(weight, s->light_weight);
+    Vec2 *at = sink->at;
+    sink->at = NULL; // light samples are attached
     if (t->job->live_lights) {
         lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
                    spec_zero_unless(s->connected, spec_mul(both, s->f_light)), moves ? &d->light : NULL, sink);
     }
+    sink->at = at;
     if (live & LIVE_SCATTERING) {
         Vec3 dwl = v3_zero();
         Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
@@ -60,6 +63,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     BsdfCall call = s->call;
     call.dsurface = call.surface && (sink->any_normals || sink->any_motion) ? &d.surface : NULL;
     bool uv_moves = vertex_uv_moves(s, sink);
+    sink->at = uv_moves ? &d.at : NULL;
     if ((live & LIVE_EMISSION) || (uv_moves && s->emitter)) {
         // L += w_e Le
         LightMove seen = light_move_zero();
@@ -77,6 +81,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
         bsdf_adj(&call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &d.wi, &dwo, vertex_uv_adj(s, &d, sink));
         frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &d.frame, &d.wo);
     }
+    sink->at = NULL;
     if (sink->any_motion) {
         d.onward = f_zero_unless(s->scattered, spec_dot(spec_mul(weight, s->suffix), spec_load(t->ws.records.weight, s->at)));
         vertex_move_adj(t, s, &d, live, channel, sink);

@@ -19,7 +19,7 @@ typedef struct VertexAdj {
     LightMove light;
     Frame frame;
     BsdfSurface surface;
-    Vec2 uv;
+    Vec2 uv, at;
     Float lit, onward;
 } VertexAdj;
 
@@ -175,6 +175,7 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
         d.dp_dv = v3_madd(v3_scale(s->si.sh.s, v->surface.vx), v->surface.vy, s->si.sh.t);
     }
     d.uv = v->uv;
+    d.at = v->at;
     d.p = v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink));
     Vec3 back = frame_to_world(&s->si.sh, v->wi);
     if (s->first) {

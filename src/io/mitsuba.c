@@ -1,4 +1,5 @@
 // mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
+#include "bsdf/table.h"
 #include "io/build.h"
 #include "io/lenient.h"
 #include "io/load.h"
@@ -132,6 +133,19 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     }
 }
 
+// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own.
+static void name_chains(Builder *b) {
+    rey_scene *scene = b->scene;
+    bool bends = false;
+    for (size_t i = 0; i < scene->build.bsdfs.count; i++) {
+        bends |= rey_bsdf_bends(ARRAY_AT(scene->build.bsdfs, BsdfNode, i).kind);
+    }
+    for (size_t i = 0; i < scene->params.count && bends; i++) {
+        Param *p = &ARRAY_AT(scene->params, Param, i);
+        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? REY_TERM_SPECULAR : 0;
+    }
+}
+
 // A scene whose integrator could not be read is rendered by the usual one.
 static rey_result build_default_integrator(Builder *b, const rey_xml_node *root) {
     bool ignored = false;
@@ -185,6 +199,7 @@ static rey_result build_scene(Builder *b) {
     TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
     find_drops(b);
+    name_chains(b);
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);

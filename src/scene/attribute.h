@@ -56,6 +56,18 @@ KFN Spec attribute_values(const SceneView *scene, const AttributeFootprint *f) {
     return spec_zero_unless(f->present, s);
 }
 
+// d . item of each corner.
+KFN void attribute_corners(const SceneView *scene, const AttributeFootprint *f, Spec d, Float worth[3]) {
+    Int begin = i_max(i_gather(scene->attributes, f->entry), i_set(0));
+    for (int k = 0; k < 3; k++) {
+        worth[k] = f_set(0);
+        for (int c = 0; c < SPEC_N; c++) {
+            Int at = i_select(f->present, begin + attribute_offset(f, k, c), i_set(0));
+            worth[k] = worth[k] + d.c[c] * theta_at(scene, at);
+        }
+    }
+}
+
 KFN Spec attribute_eval(const SceneView *scene, const TextureNode *t, const Hit *hit) {
     if (!hit) {
         return spec_zero();
@@ -75,13 +87,20 @@ KFN void attribute_adj(const SceneView *scene, int32_t id, const Hit *hit, Spec 
     if (scale_at >= 0) {
         sink_add_uniform(sink, scale_at, spec_dot(d, attribute_values(scene, &f)), m);
     }
+    Float scale = f_set(scene->theta[scene->textures[t->child[0]].theta]);
+    if (sink->at && !t->per_face) {
+        Float worth[3];
+        attribute_corners(scene, &f, d, worth);
+        scale = f_zero_unless(m & f.present, scale);
+        sink->at->x = sink->at->x + scale * (worth[1] - worth[0]);
+        sink->at->y = sink->at->y + scale * (worth[2] - worth[0]);
+    }
     if (!sink->any_attributes) {
         return;
     }
     Int begin = i_gather(sink->attribute_at, f.entry);
     m = m & f.present & mi_lt(i_set(-1), begin);
     begin = i_max(begin, i_set(0));
-    Float scale = f_set(scene->theta[scene->textures[t->child[0]].theta]);
     for (int k = 0; k < f.count; k++) {
         for (int c = 0; c < SPEC_N; c++) {
             Int at = i_select(m, begin + attribute_offset(&f, k, c), i_set(0));

@@ -23,6 +23,7 @@ typedef struct Sink {
     const int32_t *camera_at;   // CAMERA_ numbers
     bool any_normals, any_attributes, any_places;
     bool any_motion, any_camera; // surfaces or the sensor move; the sensor does
+    Vec2 *at;          // gathers the adjoint of the barycentrics at which attributes are read; null = not asked for
     bool watch_turned; // see PathJob
     int32_t faces;     // FACES_ bits
     Float derivative;          // forward: accumulates
