@@ -113,6 +113,7 @@ static NOINLINE void lights_move_adj(const SceneView *scene, Int light, Mask m, 
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         Light l = lights_next(scene, light, left, &mine);
         LightMove one = *move;
+        one.ref = v3_zero();
         emitter_move_adj_as(scene, &l, ref, d, distance, &one, sink, mine);
         move->ref = v3_select(mine, one.ref, move->ref);
     }

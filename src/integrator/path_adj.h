@@ -49,7 +49,9 @@ KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall 
         bsdf_adj(call, s->wi, s->wl, i_set(LOBE_SMOOTH), df, sink, s->connected, &d->wi, &dwl, vertex_uv_adj(s, d, sink));
         // wl = to_local(d)
         frame_to_local_adj(&s->si.sh, s->light_d, dwl, &d->frame, &d->light.d);
-        d->lit = spec_dot(df, s->f_light);
+        if (sink->any_motion) {
+            d->lit = spec_dot(df, s->f_light);
+        }
     }
     if (moves) {
         lights_move_adj(t->scene, s->light, s->connected, s->si.p, s->light_d, s->light_distance, &d->light, sink);
@@ -59,7 +61,8 @@ KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall 
 // Adjoint of the vertex's outgoing radiance for one delta, by what of the vertex is live.
 KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec delta, int channel, Sink *sink) {
     Spec weight = spec_mul(delta, s->beta);
-    VertexAdj d = vertex_adj_zero();
+    VertexAdj d;
+    vertex_adj_clear(&d, sink->any_motion);
     BsdfCall call = s->call;
     call.dsurface = call.surface && (sink->any_normals || sink->any_motion) ? &d.surface : NULL;
     bool uv_moves = vertex_uv_moves(s, sink);

@@ -23,10 +23,17 @@ typedef struct VertexAdj {
     Float lit, onward;
 } VertexAdj;
 
-KFN VertexAdj vertex_adj_zero(void) {
-    VertexAdj d;
-    memset(&d, 0, sizeof d);
-    return d;
+// Where nothing moves, only what lights and normals ask for is set: the rest is never read.
+KFN void vertex_adj_clear(VertexAdj *d, bool motion) {
+    if (motion) {
+        memset(d, 0, sizeof *d);
+        return;
+    }
+    d->wi = d->wo = v3_zero();
+    d->frame = (Frame){v3_zero(), v3_zero(), v3_zero()};
+    d->surface = (BsdfSurface){f_set(0), f_set(0), f_set(0), v3_zero()};
+    d->light.d = v3_zero();
+    d->light.distance = d->light.uv.x = d->light.uv.y = f_set(0);
 }
 
 // Texture coordinates of attached points stay; those of spheres do as long as their pose remains a similarity.
