@@ -1,4 +1,4 @@
-// path_move.h: the interior term of what moves, in material form [zhang2020]: the film position is fixed, so that the first
+// path_move.h: the interior term of what moves, in material form: the film position is fixed, so that the first
 // vertex is where the camera's ray meets its surface; all later vertices, and the points of light samples, are attached to
 // their surfaces. A segment r = q - p of a path contributes with
 //   f(p, r) ... |N_q . r| / |r|^3,   N_q the attached area vector at q,

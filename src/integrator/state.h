@@ -87,15 +87,6 @@ typedef struct Workspace {
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
 
-// Lays the workspace out in a block; with block null only measures. Returns the bytes needed.
-static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
-    size_t at = 0;
-    bool derivative = mode_records(mode);
-    ws->chunk = CHUNK;
-    size_t n = (size_t)ws->chunk + 2 * LANES;
-    ws->record_capacity = derivative ? CHUNK * RECORDS_PER_PATH : 0;
-    ws->batch_capacity = derivative ? ws->record_capacity / 8 : 0;
-    size_t m = (size_t)ws->record_capacity + 2 * LANES;
 #define CARVE(pointer, count)                                                                                          \
     {                                                                                                                  \
         (pointer) = block ? (void *)(block + at) : NULL;                                                               \
@@ -105,6 +96,27 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     for (int c = 0; c < SPEC_N; c++) {                                                                                 \
         CARVE((rows)[c], count)                                                                                        \
     }
+#define CARVE_SAMPLE(name) CARVE(ws->name, n)
+
+// What the sweep keeps per slot of what moves, from `at` on; returns where it ends.
+static inline size_t workspace_layout_moves(Workspace *ws, char *block, size_t at, size_t n) {
+    CARVE(ws->next, n)
+    MOVE_FLOATS(CARVE_SAMPLE)
+    CARVE_SPEC(ws->back_x, n)
+    CARVE_SPEC(ws->back_y, n)
+    CARVE_SPEC(ws->back_z, n)
+    return at;
+}
+
+// Lays the workspace out in a block; with block null only measures. Returns the bytes needed.
+static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) {
+    size_t at = 0;
+    bool derivative = mode_records(mode);
+    ws->chunk = CHUNK;
+    size_t n = (size_t)ws->chunk + 2 * LANES;
+    ws->record_capacity = derivative ? CHUNK * RECORDS_PER_PATH : 0;
+    ws->batch_capacity = derivative ? ws->record_capacity / 8 : 0;
+    size_t m = (size_t)ws->record_capacity + 2 * LANES;
 #define CARVE_PATH(name) CARVE(ws->paths[i].name, n)
 #define CARVE_PATH_SPEC(name) CARVE_SPEC(ws->paths[i].name, n)
     for (int i = 0; i < 2; i++) {
@@ -138,17 +150,10 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE_SPEC(ws->radiance, n)
     CARVE_SPEC(ws->adjoint, n)
     CARVE_SPEC(ws->suffix, n)
-#define CARVE_SAMPLE(name) CARVE(ws->name, n)
     SAMPLE_FLOATS(CARVE_SAMPLE)
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
-    if (derivative) {
-        CARVE(ws->next, n)
-        MOVE_FLOATS(CARVE_SAMPLE)
-        CARVE_SPEC(ws->back_x, n)
-        CARVE_SPEC(ws->back_y, n)
-        CARVE_SPEC(ws->back_z, n)
-    }
+    at = derivative ? workspace_layout_moves(ws, block, at, n) : at;
     for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {
         CARVE(ws->channel[c], n)
     }
