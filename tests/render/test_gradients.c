@@ -97,6 +97,33 @@ static void test_incomplete_is_refused(void **state) {
     room_close(room);
 }
 
+// What moves is refused whole, and given in part; where no part of it is known, it is refused too, and no 0 made up.
+static void test_motion_is_partial(void **state) {
+    UNUSED(state);
+    static float image[NUMBERS], tangent[256];
+    static const struct {
+        const char *room, *name;
+        bool known;
+    } cases[] = {{"moving_ball.xml", "moving_camera.to_world", true}, {"moving_ball.xml", "moving_wall.to_world", true},
+                 {"moving_box.xml", "moving_box.to_world", true},     {"shapes.xml", "vine.control_points", true},
+                 {"shapes.xml", "twig.control_points", false},        {"shapes.xml", "camera.to_world", false}};
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        Room room = room_open(cases[i].room, 1, 0);
+        int param = rey_param_find(room.scene, cases[i].name);
+        assert_true(param >= 0);
+        rey_render_def def = def_make(1, 0, 1);
+        def.terms = 0;
+        rey_selection one = {&param, 1};
+        assert_int_equal(rey_jvp(room.scene, &def, one, tangent, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+        assert_non_null(strstr(rey_error(room.ctx), cases[i].known ? "primary" : cases[i].name));
+        def.terms = REY_TERM_INTERIOR;
+        rey_result partly = rey_jvp(room.scene, &def, one, tangent, image, NULL, NULL);
+        assert_int_equal(partly, cases[i].known ? REY_OK : REY_ERROR_INCOMPLETE);
+        assert_true(cases[i].known || strstr(rey_error(room.ctx), "no term of the gradient") != NULL);
+        room_close(room);
+    }
+}
+
 static void test_threads_change_nothing(void **state) {
     static float image[3][NUMBERS];
     static double gradient[3][4096];
@@ -230,13 +257,13 @@ static void test_difference_noise(void **state) {
     ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml"), ONE_ROOM(test, "principled.xml"),                 \
         ONE_ROOM(test, "layers.xml"), ONE_ROOM(test, "lights.xml"), ONE_ROOM(test, "tiles.xml"), \
         ONE_ROOM(test, "edges.xml"), ONE_ROOM(test, "moving_ball.xml"), ONE_ROOM(test, "moving_box.xml"), \
-        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml")
+        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml"), ONE_ROOM(test, "moving_hose.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_closed_sphere),        cmocka_unit_test(test_disc_irradiance),
         cmocka_unit_test(test_attached_variance),    cmocka_unit_test(test_difference_noise),
-        cmocka_unit_test(test_incomplete_is_refused), EVERY_ROOM(test_saved_renders_the_same),
+        cmocka_unit_test(test_incomplete_is_refused), cmocka_unit_test(test_motion_is_partial), EVERY_ROOM(test_saved_renders_the_same),
         EVERY_ROOM(test_threads_change_nothing),
         EVERY_ROOM(test_widths),                     EVERY_ROOM(test_reverse_is_forward)};
     return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
