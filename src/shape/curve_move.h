@@ -5,15 +5,28 @@
 #include "shape/curve.h"
 #include "shape/motion.h"
 
-// Accumulates the adjoints ds, dt of the axes of frame_from_normal(n) into dn.
-KFN void frame_from_normal_adj(Vec3 n, Vec3 ds, Vec3 dt, Vec3 *dn) {
-    // s = (1 + sign x^2 a, sign b, -sign x), t = (b, sign + y^2 a, -y), a = -1 / (sign + z), b = x y a
-    Float sign = f_sign(n.z), a = -1.0f / (sign + n.z);
-    Float da = sign * n.x * n.x * ds.x + n.y * n.y * dt.y, db = sign * ds.y + dt.x;
-    da = da + db * n.x * n.y;
-    dn->x = dn->x + sign * (2.0f * n.x * a * ds.x - ds.z) + db * n.y * a;
-    dn->y = dn->y + 2.0f * n.y * a * dt.y - dt.z + db * n.x * a;
-    dn->z = dn->z + da * a * a;
+// The axes that curve_angle counts from: s along z x tangent, t = tangent x s.
+KFN Vec3 curve_level(Vec3 tangent) { return v3(-tangent.y, tangent.x, f_set(0)); }
+
+KFN Frame curve_frame(Vec3 tangent) {
+    Frame f;
+    Mask upright = m_lt(tangent.x * tangent.x + tangent.y * tangent.y, f_set(1e-10f));
+    f.s = v3_select(upright, v3(f_sign(tangent.z), f_set(0), f_set(0)), v3_normalize(curve_level(tangent)));
+    f.n = tangent;
+    f.t = v3_cross(tangent, f.s);
+    return f;
+}
+
+// Accumulates the adjoints ds, dt of its axes into the tangent's.
+KFN void curve_frame_adj(Vec3 tangent, Vec3 ds, Vec3 dt, Vec3 *dtangent) {
+    Frame f = curve_frame(tangent);
+    Vec3 dlevel = v3_zero();
+    v3_cross_adj(tangent, f.s, dt, dtangent, &ds);
+    // s = normalize(-tangent.y, tangent.x, 0)
+    Mask upright = m_lt(tangent.x * tangent.x + tangent.y * tangent.y, f_set(1e-10f));
+    v3_normalize_adj(v3_select(upright, f.s, curve_level(tangent)), v3_select(upright, v3_zero(), ds), &dlevel);
+    dtangent->x = dtangent->x + dlevel.y;
+    dtangent->y = dtangent->y - dlevel.x;
 }
 
 // Weights of the control points in value, first, second and third derivative.
@@ -46,7 +59,7 @@ KFN CurveAxes curve_axes(CurvePoint p, Vec3 point) {
     Vec3 away = v3_sub(point, p.c);
     c.e = v3_normalize(v3_madd(away, -v3_dot(away, c.tangent), c.tangent));
     c.around = v3_cross(c.tangent, c.e);
-    Frame f = frame_from_normal(c.tangent);
+    Frame f = curve_frame(c.tangent);
     c.x = v3_dot(c.e, f.s);
     c.y = v3_dot(c.e, f.t);
     return c;
@@ -73,7 +86,7 @@ KFN void curve_around_adj(const CurveAxes *c, Vec3 d, CurveAdj *out) {
 KFN void curve_finish_adj(const SceneView *scene, const Hit *hit, const CurveAxes *c, const CurveWeights *w, int points,
                           CurveAdj *d, Sink *sink, Mask m) {
     // e = x s + y t
-    frame_from_normal_adj(c->tangent, v3_scale(d->e, c->x), v3_scale(d->e, c->y), &d->tangent);
+    curve_frame_adj(c->tangent, v3_scale(d->e, c->x), v3_scale(d->e, c->y), &d->tangent);
     // tangent = c1 / speed
     v3_normalize_adj(c->p.c1, d->tangent, &d->c1);
     d->c1 = v3_madd(d->c1, d->speed, c->tangent);
@@ -134,9 +147,9 @@ KFN void bspline_move_adj(const SceneView *scene, int32_t flags, const Hit *hit,
 
 // Turns of the frame about the tangent, as that moves by dtangent, about itself: texture coordinates begin there.
 KFN Float curve_twist(const CurveAxes *c, Vec3 dtangent) {
-    Frame f = frame_from_normal(c->tangent);
+    Frame f = curve_frame(c->tangent);
     Vec3 by = v3_zero(), none = v3_zero();
-    frame_from_normal_adj(c->tangent, f.t, none, &by); // t . ds
+    curve_frame_adj(c->tangent, f.t, none, &by); // t . ds
     return v3_dot(by, dtangent);
 }
 

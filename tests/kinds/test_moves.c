@@ -169,7 +169,7 @@ static Vec3 curve_point(const World *w, double v, double x, double y) {
         c1 = v3_madd(c1, b.b1[k], v3(p[0], p[1], p[2]));
         r += b.b[k] * p[3];
     }
-    Frame f = frame_from_normal(v3_normalize(c1));
+    Frame f = curve_frame(v3_normalize(c1));
     return v3_madd(c, r, v3_normalize(v3_madd(v3_scale(f.s, x), y, f.t)));
 }
 
