@@ -268,8 +268,7 @@ typedef struct RoomCase {
 static const RoomCase rooms[] = {{"tiles.xml", true},      {"edges.xml", true},       {"materials.xml", false},
                                  {"shapes.xml", false},    {"principled.xml", false}, {"layers.xml", false},
                                  {"lights.xml", false},    {"moving_ball.xml", false},  {"moving_box.xml", false},
-                                 {"moving_dome.xml", true}, {"moving_disk.xml", true},  {"moving_tube.xml", true},
-                                 {"moving_hose.xml", true}};
+                                 {"moving_dome.xml", true}, {"moving_disk.xml", true},  {"moving_tube.xml", true}};
 
 static void test_differences(void **state) {
     const RoomCase *r = *state;

@@ -258,7 +258,7 @@ static void test_difference_noise(void **state) {
     ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml"), ONE_ROOM(test, "principled.xml"),                 \
         ONE_ROOM(test, "layers.xml"), ONE_ROOM(test, "lights.xml"), ONE_ROOM(test, "tiles.xml"), \
         ONE_ROOM(test, "edges.xml"), ONE_ROOM(test, "moving_ball.xml"), ONE_ROOM(test, "moving_box.xml"), \
-        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml"), ONE_ROOM(test, "moving_hose.xml")
+        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
