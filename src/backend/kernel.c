@@ -1,42 +1,8 @@
 // kernel.c: all kernels of one SIMD width, compiled once per width. Runs one unit of work: the samples of a tile.
 #include "integrator/aov.h"
+#include "integrator/film.h"
 #include "integrator/path_adj.h"
 #include "integrator/path_replay.h"
-#include "sensor/filter.h"
-
-enum { MAX_FOOTPRINT = 2 * MOST_FILTER_RADIUS + 2 }; // pixels that a filter may cover along one axis
-
-enum { FILTER_STEPS = 1024 }; // entries of the tabulated filter over its radius
-
-// The filter, tabulated over its radius: linear interpolation is exact to 1e-6 of its peak.
-typedef struct FilterTable {
-    float value[FILTER_STEPS + 2];
-    float scale; // steps per pixel
-} FilterTable;
-
-static void filter_tabulate(const SensorRecord *s, FilterTable *table) {
-    table->scale = (float)FILTER_STEPS / s->filter_radius;
-    for (int32_t i = 0; i < FILTER_STEPS + 2; i++) {
-        table->value[i] = i < FILTER_STEPS ? filter_eval(s, (float)i / table->scale) : 0;
-    }
-}
-
-// Weights of the pixels around x along one axis; returns their number.
-static int32_t film_weights(const SensorRecord *s, const FilterTable *table, float x, int32_t low, int32_t high,
-                            int32_t *first, float *weights) {
-    int32_t begin, end;
-    filter_range(s, x, &begin, &end);
-    begin = begin < low ? low : begin;
-    end = end > high ? high : end;
-    int32_t n = end - begin < 0 ? 0 : end - begin > MAX_FOOTPRINT ? MAX_FOOTPRINT : end - begin;
-    for (int32_t i = 0; i < n; i++) {
-        float at = fabsf((float)(begin + i) + 0.5f - x) * table->scale;
-        int32_t k = at < FILTER_STEPS ? (int32_t)at : FILTER_STEPS;
-        weights[i] = table->value[k] + (at - (float)k) * (table->value[k + 1] - table->value[k]);
-    }
-    *first = begin;
-    return n;
-}
 
 // Adds one sample of n channels to the film of the tile.
 KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const double *l, int32_t n, double *film) {
@@ -127,25 +93,11 @@ static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count)
 
 // The adjoint of film_splat: what each slot's radiance is worth.
 static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) {
-    const SensorRecord *s = t->sensor;
-    int32_t right = s->crop_x + s->crop_width, bottom = s->crop_y + s->crop_height;
-    const int32_t margin = filter_margin(s), stride = s->width + 2 * margin;
+    const int32_t margin = filter_margin(t->sensor), stride = t->sensor->width + 2 * margin;
     for (int32_t i = 0; i < count; i++) {
-        float wx[MAX_FOOTPRINT], wy[MAX_FOOTPRINT], delta[SPEC_N] = {0};
-        wx[0] = wy[0] = 1;
-        int32_t first_x = t->ws.pixel[i] % stride - margin, first_y = t->ws.pixel[i] / stride - margin;
-        int32_t nx = first_x >= s->crop_x && first_x < right, ny = first_y >= s->crop_y && first_y < bottom;
-        if (s->filter != FILM_BOX) {
-            nx = film_weights(s, filter, (float)t->ws.film_x[i], s->crop_x, right, &first_x, wx);
-            ny = film_weights(s, filter, (float)t->ws.film_y[i], s->crop_y, bottom, &first_y, wy);
-        }
-        for (int32_t j = 0; j < ny; j++) {
-            const float *row = t->job->adjoint +
-                               ((int64_t)(first_y + j - s->crop_y) * s->crop_width + first_x - s->crop_x) * SPEC_N;
-            for (int32_t k = 0; k < nx * SPEC_N; k++) {
-                delta[k % SPEC_N] += wx[k / SPEC_N] * wy[j] * row[k];
-            }
-        }
+        float delta[SPEC_N];
+        film_worth(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i],
+                   t->ws.pixel[i] % stride - margin, t->ws.pixel[i] / stride - margin, delta);
         for (int c = 0; c < SPEC_N; c++) {
             t->ws.adjoint[c][i] = delta[c];
         }

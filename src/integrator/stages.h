@@ -56,10 +56,36 @@ KFN SampleKey slot_key(const Tracer *t, Int slot) {
 
 // ---- camera ------------------------------------------------------------------------------------------------------
 
+// The state of LANES new paths, at position i.
+KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight) {
+    Paths *p = &t->ws.paths[0];
+    f_store(p->ox + i, ray->o.x);
+    f_store(p->oy + i, ray->o.y);
+    f_store(p->oz + i, ray->o.z);
+    f_store(p->dx + i, ray->d.x);
+    f_store(p->dy + i, ray->d.y);
+    f_store(p->dz + i, ray->d.z);
+    f_store(p->px + i, ray->o.x);
+    f_store(p->py + i, ray->o.y);
+    f_store(p->pz + i, ray->o.z);
+    f_store(p->tmax + i, ray->tmax);
+    spec_store(p->beta, i, spec_set(weight));
+    f_store(p->eta2 + i, f_set(1));
+    f_store(p->roulette + i, f_set(1));
+    f_store(p->pdf + i, f_set(PDF_VIEWED));
+    i_store(p->slot + i, slot);
+    i_store(p->medium + i, i_set(t->sensor->medium));
+    i_store(p->depth + i, i_set(0));
+    spec_store(t->ws.radiance, i, spec_zero());
+    spec_store(t->ws.suffix, i, spec_zero());
+    if (t->job->any_motion) {
+        i_store(t->ws.next + i, i_set(-1));
+    }
+}
+
 // Starts `count` paths: samples `first`... of the tile, pixel by pixel, so that packets are coherent.
 static void camera_stage(Tracer *t, int64_t first, int32_t count) {
     PathJob *job = t->job;
-    Paths *p = &t->ws.paths[0];
     const int32_t margin = filter_margin(t->sensor);
     for (int32_t i = 0; i < count; i++) {
         int64_t at = first + i;
@@ -85,29 +111,7 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
             lens = rng_2d(&key, DIMENSION_LENS);
         }
         SensorRay sample = sensor_ray(t->scene, t->sensor, film_x, film_y, lens);
-        Ray ray = sample.ray;
-        f_store(p->ox + i, ray.o.x);
-        f_store(p->oy + i, ray.o.y);
-        f_store(p->oz + i, ray.o.z);
-        f_store(p->dx + i, ray.d.x);
-        f_store(p->dy + i, ray.d.y);
-        f_store(p->dz + i, ray.d.z);
-        f_store(p->px + i, ray.o.x);
-        f_store(p->py + i, ray.o.y);
-        f_store(p->pz + i, ray.o.z);
-        f_store(p->tmax + i, ray.tmax);
-        spec_store(p->beta, i, spec_set(sample.weight));
-        f_store(p->eta2 + i, f_set(1));
-        f_store(p->roulette + i, f_set(1));
-        f_store(p->pdf + i, f_set(PDF_VIEWED));
-        i_store(p->slot + i, slot);
-        i_store(p->medium + i, i_set(t->sensor->medium));
-        i_store(p->depth + i, i_set(0));
-        spec_store(t->ws.radiance, i, spec_zero());
-        spec_store(t->ws.suffix, i, spec_zero());
-        if (job->any_motion) {
-            i_store(t->ws.next + i, i_set(-1));
-        }
+        path_begin(t, i, slot, &sample.ray, sample.weight);
     }
     t->active = count;
     t->current = 0;

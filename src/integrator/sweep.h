@@ -89,3 +89,25 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
     return s;
 }
+
+// The door through which the derivatives of a job leave.
+static Sink sink_of(const PathJob *job) {
+    return (Sink){.gradient = job->gradient,
+                  .tangent = job->tangent,
+                  .texture_at = job->texture_at,
+                  .to_uv_at = job->to_uv_at,
+                  .normals_at = job->normals_at,
+                  .attribute_at = job->attribute_at,
+                  .place_at = job->place_at,
+                  .any_normals = job->any_normals,
+                  .any_attributes = job->any_attributes,
+                  .any_places = job->any_places,
+                  .points_at = job->points_at,
+                  .pose_at = job->pose_at,
+                  .instance_at = job->instance_at,
+                  .camera_at = job->camera_at,
+                  .any_motion = job->any_motion,
+                  .any_camera = job->any_camera,
+                  .watch_turned = job->watch_turned,
+                  .derivative = f_set(0)};
+}

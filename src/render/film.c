@@ -25,6 +25,12 @@ FilmPlan rey_film_plan(const SensorRecord *s, int32_t channels) {
     return plan;
 }
 
+void rey_film_plan_whole(FilmPlan *plan) {
+    plan->tile = plan->width > plan->height ? plan->width : plan->height;
+    plan->columns = plan->rows = 1;
+    plan->tile_floats = (int64_t)(plan->width + 2 * plan->border) * (plan->height + 2 * plan->border) * plan->channels;
+}
+
 Tile rey_film_tile(const FilmPlan *plan, int32_t index) {
     int32_t column = index % plan->columns, row = index / plan->columns;
     Tile t = {plan->x + column * plan->tile, plan->y + row * plan->tile, plan->tile, plan->tile};

@@ -51,13 +51,6 @@ static rey_result check_sensor(rey_scene *scene, const rey_render_def *def) {
     return result == REY_OK && s->kind != SENSOR_BATCH ? check_one(scene->ctx, s) : result;
 }
 
-// One tile that covers the whole picture.
-static void plan_whole(FilmPlan *plan) {
-    plan->tile = plan->width > plan->height ? plan->width : plan->height;
-    plan->columns = plan->rows = 1;
-    plan->tile_floats = (int64_t)(plan->width + 2 * plan->border) * (plan->height + 2 * plan->border) * plan->channels;
-}
-
 static void particle_unit(void *argument, int64_t shard, int worker) {
     const Particles *particles = argument;
     Render *r = particles->r;
@@ -74,7 +67,7 @@ static void particle_unit(void *argument, int64_t shard, int worker) {
     p.job.film = particles->films ? particles->films + shard * particles->plan.tile_floats : NULL;
     p.job.gradient = r->gradients ? r->gradients + shard * r->gradient_size : NULL;
     if (p.count > 0) {
-        rey_render_run(r, &p.job, &p, worker);
+        rey_render_run(r, &p.job, (UnitOfWork){.particles = &p}, worker);
     }
 }
 
@@ -108,7 +101,7 @@ rey_result rey_particles_run(Render *r, double *picture) {
     rey_context *ctx = r->scene->ctx;
     Particles particles = {.r = r, .plan = r->plan, .scramble = rng_mix(r->job.scramble, PARTICLES)};
     int32_t shards = r->gradients ? r->shards : rey_particle_shards(r);
-    plan_whole(&particles.plan);
+    rey_film_plan_whole(&particles.plan);
     particles.total = (int64_t)r->plan.width * r->plan.height * r->job.spp;
     particles.per_shard = (particles.total + shards - 1) / shards;
     if (!have_workspaces(r, shards)) {

@@ -2,6 +2,7 @@
 // that do not depend on the number of threads, and merge the units' results in a fixed order.
 #include "base/parallel.h"
 #include "math/rng.h"
+#include "render/boundary.h"
 #include "render/live.h"
 #include "render/motion.h"
 #include "render/particles.h"
@@ -24,6 +25,9 @@ static void render_free(Render *r) {
         rey_free(ctx, r->workspaces[i]);
     }
     rey_free(ctx, r->workspaces);
+    for (int i = 0; i < BOUNDARY_TERMS; i++) {
+        rey_boundary_free(r, r->boundary + i);
+    }
     rey_free(ctx, r->films);
     rey_free(ctx, r->squares);
     rey_free(ctx, r->coverage);
@@ -102,8 +106,9 @@ rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *d
         return REY_ERROR_MEMORY;
     }
     rey_film_norms(&r->plan, r->columns, r->rows);
-    r->job.workspace_bytes =
-        r->backend->workspace_bytes(mode) + ((size_t)scene->view.groups_count + 3) * sizeof(int32_t);
+    size_t bytes = r->backend->workspace_bytes(mode), others = r->backend->boundary_bytes();
+    bytes = mode == MODE_PRIMAL || bytes > others ? bytes : others;
+    r->job.workspace_bytes = bytes + ((size_t)scene->view.groups_count + 3) * sizeof(int32_t);
     for (int i = 0; i < ctx->def.threads && i < r->tiles; i++) {
         r->workspaces[i] = rey_alloc(ctx, r->job.workspace_bytes);
         if (!r->workspaces[i]) {
@@ -129,7 +134,7 @@ static bool go_on(void *user) {
     return !r->cancelled;
 }
 
-bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker) {
+bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     if (!go_on(r)) {
         return false;
     }
@@ -140,8 +145,10 @@ bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker)
     job->trace_seconds = 0;
     job->faces = 0;
     double start = rey_thread_seconds();
-    if (particles) {
-        r->backend->run_particles(particles);
+    if (unit.particles) {
+        r->backend->run_particles(unit.particles);
+    } else if (unit.boundary) {
+        r->backend->run_boundary(unit.boundary);
     } else {
         r->backend->run(job);
     }
@@ -165,7 +172,7 @@ static bool run_tile(Render *r, PathJob *job, int32_t tile, int worker) {
     job->y = t.y;
     job->width = t.width;
     job->height = t.height;
-    return rey_render_run(r, job, NULL, worker);
+    return rey_render_run(r, job, (UnitOfWork){NULL, NULL}, worker);
 }
 
 void rey_render_film_unit(void *argument, int64_t item, int worker) {
@@ -217,8 +224,8 @@ static bool has_interior(const rey_scene *scene, const rey_render_def *def, cons
     return rey_motion_known(scene, scene->view.sensors + def->sensor, p) || p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0 || p->emitter >= 0;
 }
 
-// Refuses parameters whose derivative would lack a term.
-static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
+// Refuses parameters whose derivative would lack a term; collects the terms that they need.
+static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
     const int available = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
     if (scene->view.drops) {
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
@@ -234,8 +241,8 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
         if (!info.terms) {
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
-        int missing = info.terms & ~available;
         bool interior = has_interior(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
+        int missing = info.terms & ~(available | (interior ? REY_TERM_PRIMARY : 0));
         if (missing && !def->terms) {
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
@@ -246,9 +253,10 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
+        *needed |= info.terms;
     }
-    if (def->terms & ~REY_TERM_INTERIOR) {
-        int bit = def->terms & ~REY_TERM_INTERIOR;
+    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY)) {
+        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY);
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;
@@ -319,9 +327,9 @@ static int32_t set_spp(const Render *r) {
     return (r->def.spp / split + r->def.sets - 1) / r->def.sets * split;
 }
 
-static uint32_t set_scramble(const Render *r, int set) {
+static uint32_t set_scramble(const Render *r, int set, uint32_t term) {
     uint32_t number = r->def.sets == 1 ? r->def.set : r->def.set * 0x10001u + (uint32_t)set + 1;
-    return rng_scramble(r->def.seed, number, (uint32_t)r->def.sensor, r->def.sets == 1 ? 0 : 1);
+    return rng_scramble(r->def.seed, number, (uint32_t)r->def.sensor, term);
 }
 
 static bool selection_given(rey_selection selection) {
@@ -335,13 +343,35 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
                           "the integrator '%s' has no derivatives, 'path' has", scene->integrator);
     }
+    int needed = 0;
     if (result == REY_OK) {
-        result = check_terms(scene, def, selection);
+        result = check_terms(scene, def, selection, &needed);
     }
     if (result == REY_OK && rey_traces_particles(scene)) {
         result = rey_particles_begin(r, selection);
     }
-    return result == REY_OK ? map_selection(r, selection) : result;
+    if (result == REY_OK) {
+        result = map_selection(r, selection);
+    }
+    r->job.spp = set_spp(r);
+    r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
+    for (int i = 0; i < BOUNDARY_TERMS && result == REY_OK; i++) {
+        int term = REY_TERM_PRIMARY << i;
+        if (r->terms & term) {
+            result = rey_boundary_check(scene, term);
+            result = result == REY_OK ? rey_boundary_begin(r, term, r->boundary + i) : result;
+        }
+    }
+    return result;
+}
+
+// The boundary terms of one set.
+static void run_boundaries(Render *r, int set, double *picture) {
+    for (int i = 0; i < BOUNDARY_TERMS; i++) {
+        if (r->terms & (REY_TERM_PRIMARY << i)) {
+            rey_boundary_run(r, r->boundary + i, set_scramble(r, set, 3 + (uint32_t)i), picture);
+        }
+    }
 }
 
 // Refuses a gradient whose paths met a jump that no term covers.
@@ -421,13 +451,15 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
     }
     if (result == REY_OK) {
         r.total = (r.tiles + (r.particles ? r.shards : 0.0)) * def->sets;
-        r.job.spp = set_spp(&r);
         memset(gradient, 0, (size_t)r.selection_size * sizeof *gradient);
         for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(r.gradients, 0, (size_t)r.gradient_size * (size_t)r.shards * sizeof *r.gradients);
-            r.job.scramble = set_scramble(&r, set);
-            rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
-            result = r.particles ? rey_particles_run(&r, NULL) : REY_OK;
+            r.job.scramble = set_scramble(&r, set, def->sets > 1);
+            if (r.terms & REY_TERM_INTERIOR) {
+                rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
+                result = r.particles ? rey_particles_run(&r, NULL) : REY_OK;
+            }
+            run_boundaries(&r, set, NULL);
             result = result == REY_OK ? sum_shards(&r) : result;
             for (int64_t i = 0; i < r.selection_size && result == REY_OK; i++) {
                 gradient[i] += r.gradients[i] / def->sets;
@@ -460,14 +492,16 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
     if (result == REY_OK) {
         double *sum = pictures, *one = pictures + n;
         r.total = (r.tiles + (r.particles ? (double)rey_particle_shards(&r) : 0)) * def->sets;
-        r.job.spp = set_spp(&r);
         for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(one, 0, (size_t)n * sizeof *one);
             memset(r.films, 0, (size_t)r.tiles * (size_t)r.plan.tile_floats * sizeof *r.films);
-            r.job.scramble = set_scramble(&r, set);
-            rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
+            r.job.scramble = set_scramble(&r, set, def->sets > 1);
+            if (r.terms & REY_TERM_INTERIOR) {
+                rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
+            }
             collect_films(&r, r.job.spp, one);
-            result = r.particles ? rey_particles_run(&r, one) : REY_OK;
+            result = r.particles && (r.terms & REY_TERM_INTERIOR) ? rey_particles_run(&r, one) : result;
+            run_boundaries(&r, set, one);
             double mean = 0;
             for (int64_t i = 0; i < n; i++) {
                 sum[i] += one[i] / def->sets;

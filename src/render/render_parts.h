@@ -7,6 +7,19 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+enum { BOUNDARY_TERMS = 2 }; // primary, indirect
+
+// What a boundary term samples (boundary.c).
+typedef struct BoundaryPlan {
+    BoundaryJob job;         // what all units share
+    EdgeRecord *edges;
+    float *cdf;
+    FilmPlan film;           // one tile that covers the picture
+    double *films;           // forward: one per shard
+    int64_t samples;         // of one set
+    int32_t shards;
+} BoundaryPlan;
+
 // Everything about one call.
 typedef struct Render {
     rey_scene *scene;
@@ -27,6 +40,8 @@ typedef struct Render {
     double *columns, *rows;
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
     float *adjoint;
+    int terms;             // REY_TERM_ bits that are computed
+    BoundaryPlan boundary[BOUNDARY_TERMS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;
     double done, total;    // progress
@@ -38,8 +53,14 @@ typedef struct Render {
 // Checks, brings the scene up to date and prepares what every mode needs. rey_render_end follows in any case.
 rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels);
 rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats);
-// Runs a unit of work and books its counts; false when the caller cancelled. particles: of which job is the part, or null.
-bool rey_render_run(Render *r, PathJob *job, ParticleJob *particles, int worker);
+// What the job is part of; all null: it is one of paths.
+typedef struct UnitOfWork {
+    ParticleJob *particles;
+    BoundaryJob *boundary;
+} UnitOfWork;
+
+// Runs a unit of work and books its counts; false when the caller cancelled.
+bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker);
 // A picture of `channels` channels: R G B and what the integrator adds. alpha: two numbers per pixel, whose ratio it is;
 // or null.
 rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image, double *alpha,

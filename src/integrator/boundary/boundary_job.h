@@ -1,0 +1,26 @@
+// boundary_job.h: one unit of work of a boundary term: a range of its samples.
+#pragma once
+
+#include "integrator/job.h"
+#include "shape/edges.h"
+
+typedef struct BoundaryJob {
+    PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
+    int32_t term;             // REY_TERM_
+    const EdgeRecord *edges;
+    const float *cdf;         // cumulative probabilities of the edges
+    int32_t edge_count;
+    float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
+    int64_t first, count;     // of the samples, in their numbering
+} BoundaryJob;
+
+// Samples of one number of a `pixel` of their random numbers.
+enum { BOUNDARY_PER_SET = 1 << 24 };
+
+// The kernels of every width.
+#define BOUNDARY_ENTRY(lanes)                                                                                          \
+    void rey_kernel_boundary_w##lanes(BoundaryJob *job);                                                               \
+    size_t rey_kernel_boundary_bytes_w##lanes(void);
+BOUNDARY_ENTRY(1)
+BOUNDARY_ENTRY(8)
+BOUNDARY_ENTRY(16)

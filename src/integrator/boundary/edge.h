@@ -1,0 +1,158 @@
+// edge.h: points of the curves along which pictures jump, one curve per lane.
+#pragma once
+
+#include "integrator/boundary/boundary_job.h"
+#include "shape/shape.h"
+
+// A point x(t) of an edge, attached to its surface.
+typedef struct EdgePoint {
+    Hit hit;
+    Vec3 p, tangent;    // tangent: dx/dt
+    Vec3 side[2];       // meshes: from the edge into its triangles
+    Mask open, crease;
+    Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
+} EdgePoint;
+
+#define EDGE_FIELD(job, i, field)                                                                                      \
+    i_gather((const int32_t *)(job)->edges,                                                                            \
+             (i) * (int32_t)(sizeof(EdgeRecord) / 4) + (int32_t)(offsetof(EdgeRecord, field) / 4))
+#define EDGE_FLOAT(job, i, field)                                                                                      \
+    f_gather((const float *)(job)->edges,                                                                              \
+             (i) * (int32_t)(sizeof(EdgeRecord) / 4) + (int32_t)(offsetof(EdgeRecord, field) / 4))
+
+KFN Int edge_choose(const BoundaryJob *b, Float u, Float *probability) {
+    Int low = i_set(0), high = i_set(b->edge_count - 1);
+    for (int32_t left = b->edge_count; left > 1; left = (left + 1) / 2) {
+        Int middle = (low + high) >> 1;
+        Mask right = m_le(f_gather(b->cdf, middle), u) & mi_lt(low, high);
+        low = i_select(right, middle + 1, low);
+        high = i_select(right, high, i_max(middle, low));
+    }
+    Float before = f_select(mi_lt(i_set(0), low), f_gather(b->cdf, i_max(low - 1, i_set(0))), f_set(0));
+    *probability = f_gather(b->cdf, low) - before;
+    return low;
+}
+
+// Vectors of a shapegroup's space in the world.
+KFN Vec3 edge_to_world(const SceneView *scene, const Hit *hit, Vec3 v) {
+    Int at = instance_table(scene, hit);
+    return v3(v3_dot(table_v3(scene, at), v), v3_dot(table_v3(scene, at + 4), v), v3_dot(table_v3(scene, at + 8), v));
+}
+
+static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
+    Int corner = i_select(m, EDGE_FIELD(b, e, corner), i_set(0));
+    Hit hit = out->hit;
+    hit.prim = i_select(m, EDGE_FIELD(b, e, prim), i_set(0));
+    hit.shape = i_select(m, hit.shape, i_set(i_lane(hit.shape, m_first(m))));
+    Corners c = mesh_corners(scene, hit.shape, hit.prim);
+    Mask second = mi_eq(corner, i_set(1)), third = mi_eq(corner, i_set(2));
+    Int from = i_select(second, c.i[1], i_select(third, c.i[2], c.i[0]));
+    Int to = i_select(second, c.i[2], i_select(third, c.i[0], c.i[1]));
+    Int apex = i_select(second, c.i[0], i_select(third, c.i[1], c.i[2]));
+    Int opposite = EDGE_FIELD(b, e, opposite), positions = SHAPE_FIELD(scene, hit.shape, positions);
+    Vec3 a = theta_v3(scene, positions + from * 3);
+    Vec3 v[4] = {a, v3_sub(theta_v3(scene, positions + to * 3), a), v3_sub(theta_v3(scene, positions + apex * 3), a),
+                 v3_sub(theta_v3(scene, positions + i_select(m, i_max(opposite, i_set(0)), i_set(0)) * 3), a)};
+    Vec3 p = v3_madd(a, t, v[1]);
+    Mask inside = m & mi_lt(i_set(-1), SHAPE_FIELD(scene, hit.shape, collection));
+    if (m_any(inside)) {
+        hit.instance = i_select(inside, hit.instance, i_set(0));
+        p = v3_select(inside, pose_to_world(scene, instance_table(scene, &hit), p), p);
+        for (int k = 1; k < 4; k++) {
+            v[k] = v3_select(inside, edge_to_world(scene, &hit, v[k]), v[k]);
+        }
+    }
+    out->hit.prim = i_select(m, hit.prim, out->hit.prim);
+    out->hit.u = f_select(m, f_select(second, 1.0f - t, f_select(third, f_set(0), t)), out->hit.u);
+    out->hit.v = f_select(m, f_select(second, t, f_select(third, 1.0f - t, f_set(0))), out->hit.v);
+    out->p = v3_select(m, p, out->p);
+    out->tangent = v3_select(m, v[1], out->tangent);
+    out->side[0] = v[2];
+    out->side[1] = v[3];
+    out->open = out->open & ~(m & mi_lt(i_set(-1), opposite));
+}
+
+// The end of a cylinder, or the rim of a disk: the unit circle at z = end through the pose.
+static void edge_of_rim(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
+    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
+    Int at = SHAPE_FIELD(scene, shape, table);
+    Float sine, cosine, end = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(0));
+    f_sincos(TWO_PI * t, &sine, &cosine);
+    Vec3 x = pose_column(scene, at, 0), y = pose_column(scene, at, 1);
+    Vec3 p = pose_to_world(scene, at, v3(cosine, sine, end));
+    Vec3 tangent = v3_scale(v3_madd(v3_scale(x, -sine), cosine, y), f_set(TWO_PI));
+    out->p = v3_select(m, p, out->p);
+    out->tangent = v3_select(m, tangent, out->tangent);
+}
+
+// The outline of a sphere, seen from `eye`, or along the direction `eye` where the view is parallel.
+static void edge_of_outline(const SceneView *scene, Float t, Vec3 eye, bool parallel, Mask m, EdgePoint *out) {
+    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
+    Int at = SHAPE_FIELD(scene, shape, table);
+    Vec3 centre = table_v3(scene, at), away = parallel ? v3_neg(eye) : v3_sub(eye, centre);
+    Float radius = table_at(scene, at + 3), distance = v3_length(away), sine, cosine;
+    Frame frame = frame_from_normal(v3_scale(away, f_safe_rcp(distance)));
+    Float near = parallel ? f_set(0) : radius * f_safe_rcp(distance); // cosine of the angle of the cone to the axis
+    Float wide = radius * f_safe_sqrt(1.0f - near * near);
+    f_sincos(TWO_PI * t, &sine, &cosine);
+    Vec3 local = v3(wide * cosine, wide * sine, radius * near);
+    Vec3 tangent = frame_to_world(&frame, v3(wide * sine * -TWO_PI, wide * cosine * TWO_PI, f_set(0)));
+    m = m & m_lt(near, f_set(1));
+    out->p = v3_select(m, v3_add(centre, frame_to_world(&frame, local)), out->p);
+    out->tangent = v3_select(m, tangent, out->tangent);
+}
+
+// A side of a cylinder, seen from `eye` or along it: the line at the angle at which the view touches the unit circle.
+static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Vec3 eye, bool parallel, Mask m,
+                         EdgePoint *out) {
+    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
+    Int at = SHAPE_FIELD(scene, shape, table);
+    Vec3 rows[2] = {table_v3(scene, at + 12), table_v3(scene, at + 16)};
+    Float x = v3_dot(rows[0], eye), y = v3_dot(rows[1], eye), near = f_set(0);
+    if (!parallel) {
+        x = x + table_at(scene, at + 15);
+        y = y + table_at(scene, at + 19);
+        near = f_safe_rcp(f_sqrt(x * x + y * y));
+    }
+    m = m & m_lt(near, f_set(1));
+    // The point turned from the direction (x, y) by +- acos(near).
+    Float r = f_safe_rcp(f_sqrt(x * x + y * y)), wide = f_safe_sqrt(1.0f - near * near);
+    wide = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), wide, -wide);
+    Float cx = (x * near - y * wide) * r, cy = (y * near + x * wide) * r;
+    out->p = v3_select(m, pose_to_world(scene, at, v3(cx, cy, t)), out->p);
+    out->tangent = v3_select(m, pose_column(scene, at, 2), out->tangent);
+}
+
+// A point of a random edge; u in the unit square.
+static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob *b, Vec2 u, Vec3 eye, bool parallel) {
+    EdgePoint out;
+    Int e = edge_choose(b, u.x, &out.probability), kind = EDGE_FIELD(b, e, kind);
+    Float first = EDGE_FLOAT(b, e, first), range = EDGE_FLOAT(b, e, last) - first, t = first + range * u.y;
+    out.hit = (Hit){EDGE_FIELD(b, e, shape), i_set(0), f_set(0), f_set(0), v3_zero(), EDGE_FIELD(b, e, instance)};
+    out.probability = out.probability * f_safe_rcp(range);
+    out.p = out.tangent = out.side[0] = out.side[1] = v3_zero();
+    out.open = m_set(true);
+    out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
+    Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE));
+    Mask side = mi_eq(kind, i_set(EDGE_SIDE));
+    if (m_any(mesh)) {
+        edge_of_mesh(scene, b, e, t, mesh, &out);
+    }
+    if (m_any(rim)) {
+        edge_of_rim(scene, b, e, t, rim, &out);
+    }
+    if (m_any(outline)) {
+        edge_of_outline(scene, t, eye, parallel, outline, &out);
+    }
+    if (m_any(side)) {
+        edge_of_side(scene, b, e, t, eye, parallel, side, &out);
+    }
+    out.hit.p = out.p;
+    return out;
+}
+
+// Whether both sides of an edge lie on one side of the plane with normal n through it: a silhouette for rays in that
+// plane. Elsewhere such rays pass from one of its faces to the other.
+KFN Mask edge_is_silhouette(const EdgePoint *e, Vec3 n) {
+    return e->open | m_gt(v3_dot(e->side[0], n) * v3_dot(e->side[1], n), f_set(0));
+}

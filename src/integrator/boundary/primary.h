@@ -1,0 +1,149 @@
+// primary.h: the boundary term of what the camera sees. A picture is an integral over the film; where the radiance jumps
+// by dL along a curve that moves over the film with normal velocity v, its derivative has the line integral of f dL v
+// [li2018, equation 5], f the reconstruction filter. A sample is a point of an edge, seen by two paths on both sides of it
+// that share their random numbers.
+// NOT differentiated: jumps that are no edges (texels, checkerboards, masks), and what is seen behind mirrors and glass.
+#pragma once
+
+#include "integrator/boundary/edge.h"
+#include "integrator/boundary/view.h"
+#include "integrator/film.h"
+#include "integrator/path_move.h"
+
+// Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
+#define PRIMARY_STEP 2e-3f
+
+// Dimensions of its own random numbers; the two paths draw theirs like those of the camera.
+#define DIMENSION_EDGE 0x80000001u
+
+// A sample, a pure function of its number.
+typedef struct PrimarySample {
+    EdgePoint edge;
+    View view;
+    Seen seen;
+    Vec3 n;         // normal of the plane of edge and view: what moves along it moves the edge on the film
+    Float nx, ny;   // the side of the edge that n points to, on the film, unit
+    Float weight;   // of dL times the velocity along n, over the density
+    Mask m;
+} PrimarySample;
+
+static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
+    SampleKey key = slot_key(t, slot);
+    Vec2 lens = {f_set(0), f_set(0)};
+    if (sensor_has_lens(t->sensor)) {
+        lens = rng_2d(&key, DIMENSION_LENS);
+    }
+    out->view = view_make(t->scene, pinhole, t->sensor, lens);
+    EdgePoint e = edge_sample(t->scene, b, rng_2d(&key, DIMENSION_EDGE), out->view.eye, pinhole->parallel);
+    Seen s = view_see(&out->view, e.p);
+    Vec3 n = v3_normalize(v3_cross(s.d, e.tangent));
+    Vec2 along = view_push(&out->view, &s, e.tangent), across = view_push(&out->view, &s, n);
+    // The side of n: across, less its part along the edge.
+    Float length2 = along.x * along.x + along.y * along.y, r = f_safe_rcp(length2);
+    Float turn = along.x * across.y - along.y * across.x, rcp = f_safe_rcp(f_sqrt(length2));
+    out->nx = f_copysign(rcp, turn) * -along.y;
+    out->ny = f_copysign(rcp, turn) * along.x;
+    out->weight = f_abs(turn) * f_safe_rcp(e.probability);
+    out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
+             m_gt(out->weight, f_set(0)) & (edge_is_silhouette(&e, n) | e.crease);
+    const SensorRecord *sensor = t->sensor;
+    real reach = sensor->filter == FILM_BOX ? 0 : sensor->filter_radius;
+    out->m = out->m & m_gt(s.x, f_set((real)sensor->crop_x - reach)) & m_gt(s.y, f_set((real)sensor->crop_y - reach)) &
+             m_lt(s.x, f_set((real)(sensor->crop_x + sensor->crop_width) + reach)) &
+             m_lt(s.y, f_set((real)(sensor->crop_y + sensor->crop_height) + reach));
+    out->edge = e;
+    out->seen = s;
+    out->n = n;
+}
+
+// The ray of one of the two paths of a sample, on the side of the edge that `step` says [pixels].
+KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real step) {
+    return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
+}
+
+// Lanes of m whose edge nothing hides: rays on one of its sides get there. (On the other, round shapes hide their own
+// outline.)
+KFN Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
+    Mask hidden = m;
+    for (int side = 0; side < 2 && m_any(hidden); side++) {
+        Ray ray = primary_ray(t, s, side ? PRIMARY_STEP : -PRIMARY_STEP).ray;
+        ray.tmax = v3_dot(v3_sub(s->edge.p, ray.o), ray.d) * (1.0f - 1e-4f);
+        t->job->rays += m_count(hidden);
+        hidden = hidden & ~m_gt(spec_max(trace_transmittance(t->scene, &ray, hidden)), f_set(0));
+    }
+    return m & ~hidden;
+}
+
+// Finds which of `count` samples from number `first` on can contribute; writes their numbers behind `kept`.
+static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int64_t first, int32_t count,
+                            int32_t *kept, int32_t kept_count) {
+    for (int32_t i = 0; i < count; i += LANES) {
+        Mask m = m_first_n(count - i);
+        Int slot = i_iota() + i;
+        for (int32_t k = i; k < i + LANES; k++) {
+            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
+            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
+        }
+        PrimarySample s;
+        primary_sample(t, b, pinhole, slot, m, &s);
+        Mask visible = m_any(s.m) ? primary_visible(t, &s, s.m) : s.m;
+        i_compress(kept + kept_count, slot, visible);
+        kept_count += m_count(visible);
+    }
+    return kept_count;
+}
+
+// Starts the two paths of every sample that was kept: slots k and half + k.
+static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int64_t first, const int32_t *kept,
+                          int32_t count, int32_t half) {
+    for (int32_t k = 0; k < half; k++) {
+        int64_t number = first + kept[k < count ? k : 0];
+        t->ws.pixel[k] = t->ws.pixel[half + k] = (int32_t)(number / BOUNDARY_PER_SET);
+        t->ws.sample[k] = t->ws.sample[half + k] = (int32_t)(number % BOUNDARY_PER_SET);
+    }
+    for (int32_t k = 0; k < half; k += LANES) {
+        Int slot = i_iota() + k;
+        PrimarySample s;
+        primary_sample(t, b, pinhole, slot, m_set(true), &s);
+        f_store(t->ws.film_x + k, s.seen.x);
+        f_store(t->ws.film_y + k, s.seen.y);
+        for (int side = 0; side < 2; side++) {
+            SensorRay r = primary_ray(t, &s, side ? PRIMARY_STEP : -PRIMARY_STEP);
+            // Lanes beyond the count carry rays that end at once.
+            r.ray.tmax = f_zero_unless(m_first_n(count - k), r.ray.tmax);
+            path_begin(t, side * half + k, slot + side * half, &r.ray, r.weight);
+        }
+    }
+    t->active = 2 * half;
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    t->job->paths += 2 * count;
+}
+
+// Books what the paths found: slots k and half + k. Reverse: film_adj has left the film's adjoint in ws.adjoint.
+static void primary_finish(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Sink *sink, int32_t count,
+                           int32_t half) {
+    for (int32_t k = 0; k < count; k += LANES) {
+        Int slot = i_iota() + k;
+        PrimarySample s;
+        primary_sample(t, b, pinhole, slot, m_first_n(count - k), &s);
+        // The edge takes from the side that n points to, and gives to the other.
+        Spec jump = spec_sub(spec_load(t->ws.radiance, k), spec_load(t->ws.radiance, half + k));
+        Float worth = s.weight;
+        if (b->job.mode == MODE_REVERSE) {
+            worth = worth * spec_dot(jump, spec_load(t->ws.adjoint, k));
+        }
+        s.m = s.m & m_finite(worth) & m_finite(spec_sum(jump));
+        Vec3 dp = v3_scale(s.n, f_zero_unless(s.m, worth));
+        points_move_adj(t, &s.edge.hit, dp, v3_zero(), sink, s.m);
+        if (sink->any_camera) {
+            RayAdj ray = {s.edge.p, v3_neg(dp), v3_zero()};
+            sensor_ray_adj(t->scene, t->sensor, s.seen.x, s.seen.y, s.view.lens, &ray, sink, s.m);
+        }
+        if (b->job.mode == MODE_FORWARD) {
+            spec_store(t->ws.radiance, k, spec_zero_unless(s.m, spec_scale(jump, sink->derivative)));
+            sink->derivative = f_set(0);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+// boundary.c: the passes over the samples of boundary terms.
+#include "render/boundary.h"
+
+#include "base/parallel.h"
+#include "render/boundary_edges.h"
+
+#include <string.h>
+
+enum { BOUNDARY_SHARDS = 8 };
+
+// Jumps of what the camera sees that no edge explains.
+rey_result rey_boundary_check(rey_scene *scene, int term) {
+    const SceneView *view = &scene->view;
+    for (int64_t i = 0; i < view->textures_count && term == REY_TERM_PRIMARY; i++) {
+        const TextureNode *texture = view->textures + i;
+        bool steps = texture->kind == TEXTURE_CHECKERBOARD || (texture->kind == TEXTURE_ATTRIBUTE && texture->per_face) ||
+                     (texture->kind == TEXTURE_BITMAP && texture->filter == FILTER_NEAREST);
+        if (steps) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "the term 'primary' does not know the jumps of checkerboards, of textures with "
+                            "filter_type=\"nearest\" and of face attributes yet, and the scene has one. "
+                            "--terms interior gives the part without");
+        }
+    }
+    return REY_OK;
+}
+
+void rey_boundary_free(Render *r, BoundaryPlan *plan) {
+    rey_context *ctx = r->scene->ctx;
+    rey_free(ctx, plan->edges);
+    rey_free(ctx, plan->cdf);
+    rey_free(ctx, plan->films);
+    *plan = (BoundaryPlan){.shards = 0};
+}
+
+static rey_result reserve_workspaces(Render *r) {
+    for (int i = 0; i < r->scene->ctx->def.threads && i < BOUNDARY_SHARDS; i++) {
+        r->workspaces[i] = r->workspaces[i] ? r->workspaces[i] : rey_alloc(r->scene->ctx, r->job.workspace_bytes);
+        if (!r->workspaces[i]) {
+            return REY_ERROR_MEMORY;
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
+    rey_context *ctx = r->scene->ctx;
+    *plan = (BoundaryPlan){.film = r->plan};
+    rey_film_plan_whole(&plan->film);
+    rey_result result = reserve_workspaces(r);
+    if (result == REY_OK) {
+        result = rey_boundary_edges(r, plan);
+    }
+    if (result == REY_OK && r->job.mode == MODE_FORWARD) {
+        plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
+        result = plan->films ? REY_OK : REY_ERROR_MEMORY;
+    }
+    int32_t edge_count = plan->job.edge_count;
+    plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp;
+    plan->job = (BoundaryJob){.job = r->job, .term = term, .edges = plan->edges, .cdf = plan->cdf,
+                              .edge_count = edge_count,
+                              .scale = (float)((double)r->job.spp / (double)plan->samples)};
+    plan->job.job.x = r->plan.x;
+    plan->job.job.y = r->plan.y;
+    plan->job.job.width = r->plan.width;
+    plan->job.job.height = r->plan.height;
+    return result;
+}
+
+typedef struct BoundaryPass {
+    Render *r;
+    BoundaryPlan *plan;
+} BoundaryPass;
+
+static void boundary_unit(void *argument, int64_t shard, int worker) {
+    const BoundaryPass *pass = argument;
+    const BoundaryPlan *plan = pass->plan;
+    BoundaryJob b = plan->job;
+    b.job.adjoint = pass->r->job.adjoint;
+    b.job.tangent = pass->r->job.tangent;
+    int64_t per_shard = (plan->samples + plan->shards - 1) / plan->shards;
+    b.first = shard * per_shard;
+    b.count = plan->samples - b.first < per_shard ? plan->samples - b.first : per_shard;
+    if (b.job.mode == MODE_REVERSE) {
+        b.job.gradient = pass->r->gradients + shard * pass->r->gradient_size;
+    } else {
+        b.job.film = plan->films + shard * plan->film.tile_floats;
+    }
+    if (b.count > 0) {
+        rey_render_run(pass->r, &b.job, (UnitOfWork){.boundary = &b}, worker);
+    }
+}
+
+void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture) {
+    if (plan->job.edge_count == 0) {
+        return;
+    }
+    BoundaryPass pass = {r, plan};
+    plan->shards = plan->films ? BOUNDARY_SHARDS : r->shards;
+    plan->job.job.scramble = scramble;
+    if (plan->films) {
+        memset(plan->films, 0, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS * sizeof(double));
+    }
+    rey_parallel_for(r->scene->ctx->def.threads, plan->shards, boundary_unit, &pass);
+    for (int32_t i = 0; i < plan->shards && plan->films; i++) {
+        rey_film_merge(&plan->film, plan->films + i * plan->film.tile_floats, r->columns, r->rows,
+                       1.0 / (double)plan->samples, picture);
+    }
+}

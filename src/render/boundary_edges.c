@@ -1,0 +1,231 @@
+// boundary_edges.c: of the scene's edges, those that can move for the sensor, cut to what the film sees and weighted by
+// their length there. Where this is a guess (lenses, round shapes), it decides the noise only.
+#include "render/boundary_edges.h"
+
+#include "sensor/kinds.h"
+#include "shape/affine.h"
+#include "shape/shape.h"
+
+typedef struct Projection {
+    double inverse[12];     // of the sensor's pose
+    double scale_x, scale_y, shift_x, shift_y; // pixels per slope, and the centre
+    double low_x, low_y, high_x, high_y;       // what of the film counts [pixels]
+    double near;
+    bool parallel, pinhole;
+} Projection;
+
+static Projection projection_of(const SceneView *view, const SensorRecord *s) {
+    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
+                    .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
+    rey_affine_inverse(view->theta + s->to_world, p.inverse);
+    double tangent = p.parallel ? 1 : tan(0.5 * 3.14159265358979323846 / 180 * (double)view->theta[s->fov]);
+    p.scale_x = -0.5 * s->width / tangent;
+    p.scale_y = -0.5 * s->width / tangent; // pixels are square
+    p.shift_x = s->width * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal]));
+    p.shift_y = s->height * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal + 1]));
+    double reach = s->filter == FILM_BOX ? 0 : (double)s->filter_radius;
+    p.low_x = s->crop_x - reach;
+    p.low_y = s->crop_y - reach;
+    p.high_x = s->crop_x + s->crop_width + reach;
+    p.high_y = s->crop_y + s->crop_height + reach;
+    return p;
+}
+
+static void to_sensor(const Projection *p, const double *world, double *out) {
+    for (int k = 0; k < 3; k++) {
+        const double *row = p->inverse + 4 * k;
+        out[k] = row[0] * world[0] + row[1] * world[1] + row[2] * world[2] + row[3];
+    }
+}
+
+static void to_film(const Projection *p, const double *local, double *film) {
+    double z = p->parallel ? 1 : local[2];
+    film[0] = p->shift_x + p->scale_x * local[0] / z;
+    film[1] = p->shift_y + p->scale_y * local[1] / z;
+}
+
+// Cuts the range [*s0, *s1] of a line from a to b to low <= coordinate <= high.
+static void clip(double a, double b, double low, double high, double *s0, double *s1) {
+    double d = b - a;
+    if (d == 0) {
+        *s1 = a < low || a > high ? -1 : *s1;
+        return;
+    }
+    double enter = ((d > 0 ? low : high) - a) / d, leave = ((d > 0 ? high : low) - a) / d;
+    *s0 = fmax(*s0, enter);
+    *s1 = fmin(*s1, leave);
+}
+
+// Cuts a straight edge to what the film sees; returns its length there [pixels].
+static double see_line(const Projection *p, const double from[3], const double to[3], EdgeRecord *e) {
+    double a[3], b[3], fa[2], fb[2];
+    to_sensor(p, from, a);
+    to_sensor(p, to, b);
+    double t0 = 0, t1 = 1;
+    clip(a[2], b[2], p->near, INFINITY, &t0, &t1);
+    if (t0 >= t1) {
+        return 0;
+    }
+    double q[2][3];
+    for (int k = 0; k < 3; k++) {
+        q[0][k] = a[k] + t0 * (b[k] - a[k]);
+        q[1][k] = a[k] + t1 * (b[k] - a[k]);
+    }
+    to_film(p, q[0], fa);
+    to_film(p, q[1], fb);
+    double length = hypot(fb[0] - fa[0], fb[1] - fa[1]), s0 = 0, s1 = 1;
+    if (!p->pinhole) {
+        return fmin(length, 4 * (p->high_x - p->low_x)) + 1;
+    }
+    clip(fa[0], fb[0], p->low_x, p->high_x, &s0, &s1);
+    clip(fa[1], fb[1], p->low_y, p->high_y, &s0, &s1);
+    if (s0 >= s1) {
+        return 0;
+    }
+    // Back from the film to the line, which perspective does not divide evenly.
+    double z0 = p->parallel ? 1 : q[0][2], z1 = p->parallel ? 1 : q[1][2], ends[2] = {s0, s1};
+    for (int i = 0; i < 2; i++) {
+        double s = ends[i], t = s * z0 / ((1 - s) * z1 + s * z0);
+        ends[i] = t0 + t * (t1 - t0);
+    }
+    e->first = (float)ends[0];
+    e->last = (float)ends[1];
+    return length * (s1 - s0);
+}
+
+static void instance_point(const SceneView *view, const EdgeRecord *e, double p[3]) {
+    const float *m = view->theta + view->instances[e->instance].to_world;
+    double q[3] = {p[0], p[1], p[2]};
+    for (int k = 0; k < 3; k++) {
+        p[k] = m[4 * k] * q[0] + m[4 * k + 1] * q[1] + m[4 * k + 2] * q[2] + m[4 * k + 3];
+    }
+}
+
+static void mesh_point(const SceneView *view, const EdgeRecord *e, int32_t vertex, double p[3]) {
+    const ShapeRecord *shape = view->shapes + e->shape;
+    for (int k = 0; k < 3; k++) {
+        p[k] = (double)view->theta[shape->positions + 3 * (int64_t)vertex + k];
+    }
+    if (shape->collection >= 0) {
+        instance_point(view, e, p);
+    }
+}
+
+// Whether rays from the eye pass both triangles of a mesh's edge on one side, or the picture jumps there anyway.
+static bool can_jump(const SceneView *view, const double eye[4], const EdgeRecord *e, const double a[3], const double b[3],
+                     const int32_t *corners) {
+    if (e->crease || e->opposite < 0) {
+        return true;
+    }
+    double side[2][3], n[3], d[3];
+    mesh_point(view, e, corners[(e->corner + 2) % 3], side[0]);
+    mesh_point(view, e, e->opposite, side[1]);
+    for (int k = 0; k < 3; k++) {
+        d[k] = eye[k] - eye[3] * a[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        n[k] = d[i] * (b[j] - a[j]) - d[j] * (b[i] - a[i]);
+    }
+    double s[2] = {0, 0}, size = 0;
+    for (int k = 0; k < 3; k++) {
+        s[0] += n[k] * (side[0][k] - a[k]);
+        s[1] += n[k] * (side[1][k] - a[k]);
+        size += fabs(n[k] * (side[0][k] - a[k])) + fabs(n[k] * (side[1][k] - a[k]));
+    }
+    // Near the change of sign the kernel decides.
+    return s[0] * s[1] > -1e-9 * size * size;
+}
+
+static double see_mesh_edge(const SceneView *view, const Projection *p, const double eye[4], EdgeRecord *e) {
+    const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
+    double a[3], b[3];
+    mesh_point(view, e, corners[e->corner], a);
+    mesh_point(view, e, corners[(e->corner + 1) % 3], b);
+    if (p->pinhole && !can_jump(view, eye, e, a, b, corners)) {
+        return 0;
+    }
+    return see_line(p, a, b, e);
+}
+
+// A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
+static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
+    const float *m = view->theta + view->shapes[e->shape].to_world;
+    double centre[3] = {m[3], m[7], m[11]}, local[3], size = 0;
+    for (int k = 0; k < 11; k++) {
+        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
+    }
+    to_sensor(p, centre, local);
+    if (local[2] + 2 * size < p->near) {
+        return 0;
+    }
+    double distance = p->parallel ? 1 : fmax(local[2], size);
+    return fabs(p->scale_x) * 6 * size / distance * (double)(e->last - e->first) + 0.01;
+}
+
+// Whether the selection moves what an edge looks like.
+static bool edge_moves(const Render *r, const EdgeRecord *e) {
+    const PathJob *job = &r->job;
+    const ShapeRecord *shape = r->scene->view.shapes + e->shape;
+    return job->any_camera || job->points_at[e->shape] >= 0 || job->pose_at[e->shape] >= 0 ||
+           (shape->collection >= 0 && job->instance_at[e->instance] >= 0);
+}
+
+static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
+    int64_t n = (int64_t)kept->count;
+    plan->edges = kept->data;
+    plan->cdf = weights->data;
+    kept->data = weights->data = NULL;
+    double sum = 0, total = 0;
+    if (n > 1 << 28) {
+        return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^28 edges move");
+    }
+    for (int64_t i = 0; i < n; i++) {
+        total += (double)plan->cdf[i];
+    }
+    for (int64_t i = 0; i < n; i++) {
+        sum += (double)plan->cdf[i];
+        plan->cdf[i] = i == n - 1 ? 1 : (float)(sum / total);
+    }
+    plan->job.edge_count = (int32_t)n;
+    return REY_OK;
+}
+
+rey_result rey_boundary_edges(Render *r, BoundaryPlan *plan) {
+    rey_context *ctx = r->scene->ctx;
+    const SceneView *view = &r->scene->view;
+    const SensorRecord *s = r->plan.sensor;
+    Projection p = projection_of(view, s);
+    const float *m = view->theta + s->to_world;
+    double eye[4] = {m[3], m[7], m[11], 1};
+    if (p.parallel) {
+        eye[0] = m[2], eye[1] = m[6], eye[2] = m[10], eye[3] = 0;
+    }
+    Array all = {0}, kept = {0}, weights = {0};
+    rey_result result = rey_edges_find(r->scene, &all);
+    for (size_t i = 0; i < all.count && result == REY_OK; i++) {
+        EdgeRecord e = ARRAY_AT(all, EdgeRecord, i);
+        if (!edge_moves(r, &e)) {
+            continue;
+        }
+        double length = e.kind == EDGE_MESH ? see_mesh_edge(view, &p, eye, &e) : see_round(view, &p, &e);
+        if (!(length > 0)) {
+            continue;
+        }
+        EdgeRecord *edge = rey_array_push(ctx, &kept, sizeof e, 1);
+        float *weight = rey_array_push(ctx, &weights, sizeof *weight, 1);
+        if (!edge || !weight) {
+            result = REY_ERROR_MEMORY;
+            break;
+        }
+        *edge = e;
+        *weight = (float)length;
+    }
+    if (result == REY_OK) {
+        result = accumulate(r, plan, &kept, &weights);
+    }
+    rey_array_free(ctx, &all);
+    rey_array_free(ctx, &kept);
+    rey_array_free(ctx, &weights);
+    return result;
+}

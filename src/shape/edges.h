@@ -1,0 +1,21 @@
+// edges.h: the curves of surfaces along which visibility or shading can jump: edges of meshes, rims of disks and
+// cylinders, outlines of spheres. Found once per scene, since they depend on the topology alone.
+#pragma once
+
+#include "scene/scene.h"
+
+// EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer.
+enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE };
+enum { EDGE_OPEN = -1, EDGE_MANY = -2 };
+
+typedef struct EdgeRecord {
+    int32_t kind, shape;
+    int32_t instance;    // of shapes with SHAPE_INSTANCED, else 0
+    int32_t prim, corner; // meshes: it runs from this corner of this triangle to the next one; rims and sides: which, 0 or 1
+    int32_t opposite;    // meshes: vertex of the other triangle that is not on it, EDGE_OPEN, or EDGE_MANY triangles
+    int32_t crease;      // shading jumps across it
+    float first, last;   // the part of it that counts, within [0, 1]
+} EdgeRecord;
+
+// Appends the edges of all surfaces to `edges`, an Array of EdgeRecord. Grids of distances and curves have none yet.
+rey_result rey_edges_find(rey_scene *scene, Array *edges);
