@@ -1,10 +1,21 @@
 // kernel_boundary.c: the kernels of the boundary terms of one SIMD width, compiled once per width.
+#include "integrator/boundary/indirect.h"
 #include "integrator/boundary/primary.h"
 
 // Behind the workspace proper: the groups' offsets, and which samples of a chunk are kept.
 size_t KNAME(rey_kernel_boundary_bytes)(void) {
     Workspace ws;
-    return workspace_layout(&ws, NULL, MODE_PRIMAL) + (CHUNK + 2 * LANES) * sizeof(int32_t);
+    Segments segments;
+    return workspace_layout(&ws, NULL, MODE_PRIMAL) + (CHUNK + 2 * LANES) * sizeof(int32_t) + segments_layout(&segments, NULL);
+}
+
+static void run_indirect(Indirect *in, Sink *sink, int32_t *begin) {
+    const Tracer *t = in->t;
+    const int32_t most = t->ws.chunk;
+    for (int64_t at = 0; at < in->b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
+        int64_t left = in->b->count - at;
+        indirect_chunk(in, in->b->first + at, left < most ? (int32_t)left : most, sink, begin);
+    }
 }
 
 static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, const FilterTable *filter, Sink *sink,
@@ -43,12 +54,20 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     job.any_motion = false;
     Tracer t = {.job = &job, .scene = job.scene, .sensor = job.scene->sensors + job.sensor};
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
+    Indirect in = {.t = &t, .b = b};
+    bytes += segments_layout(&in.q, (char *)job.workspace + bytes);
     int32_t *kept = (int32_t *)((char *)job.workspace + bytes), *begin = kept + CHUNK + 2 * LANES;
     FilterTable filter;
     filter_tabulate(t.sensor, &filter);
     Pinhole pinhole = pinhole_make(t.scene, t.sensor);
     Sink sink = sink_of(&b->job);
-    run_primary(&t, b, &pinhole, &filter, &sink, kept, begin);
+    in.pinhole = &pinhole;
+    in.filter = &filter;
+    if (b->primary) {
+        run_primary(&t, b, &pinhole, &filter, &sink, kept, begin);
+    } else {
+        run_indirect(&in, &sink, begin);
+    }
     b->job.paths = job.paths;
     b->job.rays = job.rays;
     b->job.nonfinite = job.nonfinite;

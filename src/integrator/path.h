@@ -436,6 +436,14 @@ static void shadow_stage(Tracer *t) {
     t->job->trace_seconds += stage_seconds() - start;
 }
 
+// Keeps what paths of up to rung + 1 segments have brought.
+static void rung_store(Tracer *t, int32_t rung) {
+    for (int c = 0; c < SPEC_N && rung < t->rung_count; c++) {
+        memcpy(t->rungs[rung * SPEC_N + c], t->ws.radiance[c], CHUNK * sizeof(real));
+        t->rungs_kept = rung + 1;
+    }
+}
+
 // Runs the chunk's paths to their ends. begin: scratch of group count + 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
@@ -443,7 +451,7 @@ static void path_forward(Tracer *t, int32_t *begin) {
         t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters;
     }
     int32_t groups = (int32_t)scene->groups_count + 1;
-    for (int32_t bounce = 0; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
+    for (int32_t bounce = t->first_bounce; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
@@ -461,6 +469,9 @@ static void path_forward(Tracer *t, int32_t *begin) {
                                                next_count);
                 }
             }
+        }
+        if (t->rungs) {
+            rung_store(t, bounce - t->first_bounce);
         }
         shadow_stage(t);
         t->current = 1 - t->current;

@@ -34,6 +34,9 @@ typedef struct Tracer {
     int32_t active, current; // paths alive, and which of ws.paths holds them
     int32_t shadow_count;
     int32_t record_count, batch_count;
+    int32_t first_bounce;    // 0, but for paths that do not begin at the camera
+    real **rungs;            // radiance by number of segments: rows of a colour per number; or null
+    int32_t rung_count, rungs_kept;
     bool overflow;           // the chunk's vertices did not fit the records
 } Tracer;
 

@@ -73,7 +73,7 @@ static rey_result add_numbers(Builder *b, const char *path, const SensorNumber *
         char name[MAX_PATH_NAME];
         ARRAY_AT(b->scene->build.theta, float, *out + k) = (float)numbers[k].value;
         build_join(name, path, numbers[k].name);
-        Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY, .why = why_moving};
+        Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT, .why = why_moving};
         p.theta = *out + k;
         p.count = 1;
         p.unit = numbers[k].unit;
@@ -162,7 +162,7 @@ static rey_result sensor_pose(Builder *b, rey_xml_node *node, const char *path, 
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
                             "to_world of a %s may turn and move it, but not scale or shear it", node->type);
     }
-    Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY, .why = why_moving};
+    Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT, .why = why_moving};
     p.camera = s->kind == SENSOR_DISTANT ? -1 : CAMERA_POSE;
     return build_pose(b, pose, path, p, &s->to_world);
 }

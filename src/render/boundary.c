@@ -49,7 +49,7 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
     if (result == REY_OK) {
-        result = rey_boundary_edges(r, plan);
+        result = term == REY_TERM_PRIMARY ? rey_boundary_edges(r, plan) : rey_boundary_all_edges(r, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
         plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
@@ -57,7 +57,7 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     }
     int32_t edge_count = plan->job.edge_count;
     plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp;
-    plan->job = (BoundaryJob){.job = r->job, .term = term, .edges = plan->edges, .cdf = plan->cdf,
+    plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges, .cdf = plan->cdf,
                               .edge_count = edge_count,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
@@ -78,7 +78,8 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
     BoundaryJob b = plan->job;
     b.job.adjoint = pass->r->job.adjoint;
     b.job.tangent = pass->r->job.tangent;
-    int64_t per_shard = (plan->samples + plan->shards - 1) / plan->shards;
+    // Of whole blocks of segments.
+    int64_t per_shard = ((plan->samples + plan->shards - 1) / plan->shards + 15) / 16 * 16;
     b.first = shard * per_shard;
     b.count = plan->samples - b.first < per_shard ? plan->samples - b.first : per_shard;
     if (b.job.mode == MODE_REVERSE) {

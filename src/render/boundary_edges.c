@@ -14,7 +14,8 @@ typedef struct Projection {
     bool parallel, pinhole;
 } Projection;
 
-static Projection projection_of(const SceneView *view, const SensorRecord *s) {
+static Projection projection_of(const SceneView *view, const FilmPlan *plan) {
+    const SensorRecord *s = plan->sensor;
     Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
                     .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
     rey_affine_inverse(view->theta + s->to_world, p.inverse);
@@ -23,11 +24,10 @@ static Projection projection_of(const SceneView *view, const SensorRecord *s) {
     p.scale_y = -0.5 * s->width / tangent; // pixels are square
     p.shift_x = s->width * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal]));
     p.shift_y = s->height * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal + 1]));
-    double reach = s->filter == FILM_BOX ? 0 : (double)s->filter_radius;
-    p.low_x = s->crop_x - reach;
-    p.low_y = s->crop_y - reach;
-    p.high_x = s->crop_x + s->crop_width + reach;
-    p.high_y = s->crop_y + s->crop_height + reach;
+    p.low_x = plan->x;
+    p.low_y = plan->y;
+    p.high_x = plan->x + plan->width;
+    p.high_y = plan->y + plan->height;
     return p;
 }
 
@@ -191,11 +191,77 @@ static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *
     return REY_OK;
 }
 
+static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, Array *kept, Array *weights) {
+    if (!(weight > 0)) {
+        return REY_OK;
+    }
+    EdgeRecord *edge = rey_array_push(r->scene->ctx, kept, sizeof *edge, 1);
+    float *number = rey_array_push(r->scene->ctx, weights, sizeof *number, 1);
+    if (!edge || !number) {
+        return REY_ERROR_MEMORY;
+    }
+    *edge = *e;
+    *number = (float)weight;
+    return REY_OK;
+}
+
+// World length of a mesh's edge times the angle between the planes of its triangles; pi where it is open.
+static double mesh_edge_weight(const SceneView *view, const EdgeRecord *e) {
+    const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
+    double a[3], p[3][3], n[2][3], length = 0, dot = 0, sizes[2] = {0, 0};
+    mesh_point(view, e, corners[e->corner], a);
+    mesh_point(view, e, corners[(e->corner + 1) % 3], p[0]);
+    mesh_point(view, e, corners[(e->corner + 2) % 3], p[1]);
+    mesh_point(view, e, e->opposite >= 0 ? e->opposite : corners[e->corner], p[2]);
+    for (int k = 0; k < 9; k++) {
+        p[k / 3][k % 3] -= a[k % 3];
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        length += p[0][k] * p[0][k];
+        n[0][k] = p[0][i] * p[1][j] - p[0][j] * p[1][i];
+        n[1][k] = p[2][i] * p[0][j] - p[2][j] * p[0][i];
+        dot += n[0][k] * n[1][k];
+        sizes[0] += n[0][k] * n[0][k];
+        sizes[1] += n[1][k] * n[1][k];
+    }
+    double cosine = dot / sqrt(sizes[0] * sizes[1]), angle = acos(fmax(-1, fmin(1, cosine)));
+    return sqrt(length) * (e->opposite < 0 || !isfinite(angle) ? 3.14159265358979323846 : angle);
+}
+
+static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
+    const float *m = view->theta + view->shapes[e->shape].to_world;
+    double size = 0;
+    for (int k = 0; k < 11; k++) {
+        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
+    }
+    return 20 * size * (double)(e->last - e->first);
+}
+
+// Edges of what stands still may pass light between what moves; they are rarer.
+rey_result rey_boundary_all_edges(Render *r, BoundaryPlan *plan) {
+    const SceneView *view = &r->scene->view;
+    const double still = r->job.any_camera ? 1 : 0.25;
+    Array all = {0}, kept = {0}, weights = {0};
+    rey_result result = rey_edges_find(r->scene, &all);
+    for (size_t i = 0; i < all.count && result == REY_OK; i++) {
+        const EdgeRecord *e = &ARRAY_AT(all, EdgeRecord, i);
+        double weight = e->kind == EDGE_MESH ? mesh_edge_weight(view, e) : round_edge_weight(view, e);
+        result = keep_edge(r, e, weight * (edge_moves(r, e) ? 1 : still), &kept, &weights);
+    }
+    if (result == REY_OK) {
+        result = accumulate(r, plan, &kept, &weights);
+    }
+    rey_array_free(r->scene->ctx, &all);
+    rey_array_free(r->scene->ctx, &kept);
+    rey_array_free(r->scene->ctx, &weights);
+    return result;
+}
+
 rey_result rey_boundary_edges(Render *r, BoundaryPlan *plan) {
-    rey_context *ctx = r->scene->ctx;
     const SceneView *view = &r->scene->view;
     const SensorRecord *s = r->plan.sensor;
-    Projection p = projection_of(view, s);
+    Projection p = projection_of(view, &r->plan);
     const float *m = view->theta + s->to_world;
     double eye[4] = {m[3], m[7], m[11], 1};
     if (p.parallel) {
@@ -209,23 +275,13 @@ rey_result rey_boundary_edges(Render *r, BoundaryPlan *plan) {
             continue;
         }
         double length = e.kind == EDGE_MESH ? see_mesh_edge(view, &p, eye, &e) : see_round(view, &p, &e);
-        if (!(length > 0)) {
-            continue;
-        }
-        EdgeRecord *edge = rey_array_push(ctx, &kept, sizeof e, 1);
-        float *weight = rey_array_push(ctx, &weights, sizeof *weight, 1);
-        if (!edge || !weight) {
-            result = REY_ERROR_MEMORY;
-            break;
-        }
-        *edge = e;
-        *weight = (float)length;
+        result = keep_edge(r, &e, length, &kept, &weights);
     }
     if (result == REY_OK) {
         result = accumulate(r, plan, &kept, &weights);
     }
-    rey_array_free(ctx, &all);
-    rey_array_free(ctx, &kept);
-    rey_array_free(ctx, &weights);
+    rey_array_free(r->scene->ctx, &all);
+    rey_array_free(r->scene->ctx, &kept);
+    rey_array_free(r->scene->ctx, &weights);
     return result;
 }

@@ -242,7 +242,7 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         bool interior = has_interior(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
-        int missing = info.terms & ~(available | (interior ? REY_TERM_PRIMARY : 0));
+        int missing = info.terms & ~(available | (interior ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0));
         if (missing && !def->terms) {
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
@@ -255,8 +255,8 @@ static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_s
         }
         *needed |= info.terms;
     }
-    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY)) {
-        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY);
+    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
+        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;

@@ -6,7 +6,7 @@
 
 typedef struct BoundaryJob {
     PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
-    int32_t term;             // REY_TERM_
+    bool primary;             // what the camera sees; else what other vertices see
     const EdgeRecord *edges;
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;

@@ -8,8 +8,9 @@
 typedef struct EdgePoint {
     Hit hit;
     Vec3 p, tangent;    // tangent: dx/dt
-    Vec3 side[2];       // meshes: from the edge into its triangles
+    Vec3 side[2];       // from the edge into its surfaces; the second one only where it is not open
     Mask open, crease;
+    Mask round;         // which points it has depends on the eye
     Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
 } EdgePoint;
 
@@ -67,8 +68,8 @@ static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->hit.v = f_select(m, f_select(second, t, f_select(third, 1.0f - t, f_set(0))), out->hit.v);
     out->p = v3_select(m, p, out->p);
     out->tangent = v3_select(m, v[1], out->tangent);
-    out->side[0] = v[2];
-    out->side[1] = v[3];
+    out->side[0] = v3_select(m, v[2], out->side[0]);
+    out->side[1] = v3_select(m, v[3], out->side[1]);
     out->open = out->open & ~(m & mi_lt(i_set(-1), opposite));
 }
 
@@ -83,6 +84,11 @@ static void edge_of_rim(const SceneView *scene, const BoundaryJob *b, Int e, Flo
     Vec3 tangent = v3_scale(v3_madd(v3_scale(x, -sine), cosine, y), f_set(TWO_PI));
     out->p = v3_select(m, p, out->p);
     out->tangent = v3_select(m, tangent, out->tangent);
+    // Into the surface: a disk's centre, along a cylinder.
+    Vec3 inwards = v3_neg(v3_madd(v3_scale(x, cosine), sine, y)), axis = pose_column(scene, at, 2);
+    Mask disk = mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_DISK));
+    inwards = v3_select(disk, inwards, v3_scale(axis, f_select(m_gt(end, f_set(0)), f_set(-1), f_set(1))));
+    out->side[0] = v3_select(m, inwards, out->side[0]);
 }
 
 // The outline of a sphere, seen from `eye`, or along the direction `eye` where the view is parallel.
@@ -98,8 +104,10 @@ static void edge_of_outline(const SceneView *scene, Float t, Vec3 eye, bool para
     Vec3 local = v3(wide * cosine, wide * sine, radius * near);
     Vec3 tangent = frame_to_world(&frame, v3(wide * sine * -TWO_PI, wide * cosine * TWO_PI, f_set(0)));
     m = m & m_lt(near, f_set(1));
-    out->p = v3_select(m, v3_add(centre, frame_to_world(&frame, local)), out->p);
+    Vec3 outwards = frame_to_world(&frame, local);
+    out->p = v3_select(m, v3_add(centre, outwards), out->p);
     out->tangent = v3_select(m, tangent, out->tangent);
+    out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
 }
 
 // A side of a cylinder, seen from `eye` or along it: the line at the angle at which the view touches the unit circle.
@@ -121,6 +129,8 @@ static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     Float cx = (x * near - y * wide) * r, cy = (y * near + x * wide) * r;
     out->p = v3_select(m, pose_to_world(scene, at, v3(cx, cy, t)), out->p);
     out->tangent = v3_select(m, pose_column(scene, at, 2), out->tangent);
+    Vec3 outwards = v3_madd(v3_scale(pose_column(scene, at, 0), cx), cy, pose_column(scene, at, 1));
+    out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
 }
 
 // A point of a random edge; u in the unit square.
@@ -147,8 +157,21 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     if (m_any(side)) {
         edge_of_side(scene, b, e, t, eye, parallel, side, &out);
     }
+    out.round = outline | side;
     out.hit.p = out.p;
     return out;
+}
+
+// The middle of the surfaces of round edges, and the point itself of others.
+KFN Vec3 edge_reference(const SceneView *scene, const EdgePoint *e) {
+    if (!m_any(e->round)) {
+        return e->p;
+    }
+    Int shape = i_select(e->round, e->hit.shape, i_set(i_lane(e->hit.shape, m_first(e->round))));
+    Int at = SHAPE_FIELD(scene, shape, table);
+    Mask sphere = mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_SPHERE));
+    Vec3 middle = v3_select(sphere, table_v3(scene, at), pose_to_world(scene, at, v3(f_set(0), f_set(0), f_set(0.5f))));
+    return v3_select(e->round, middle, e->p);
 }
 
 // Whether both sides of an edge lie on one side of the plane with normal n through it: a silhouette for rays in that

@@ -46,11 +46,10 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->weight = f_abs(turn) * f_safe_rcp(e.probability);
     out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
              m_gt(out->weight, f_set(0)) & (edge_is_silhouette(&e, n) | e.crease);
-    const SensorRecord *sensor = t->sensor;
-    real reach = sensor->filter == FILM_BOX ? 0 : sensor->filter_radius;
-    out->m = out->m & m_gt(s.x, f_set((real)sensor->crop_x - reach)) & m_gt(s.y, f_set((real)sensor->crop_y - reach)) &
-             m_lt(s.x, f_set((real)(sensor->crop_x + sensor->crop_width) + reach)) &
-             m_lt(s.y, f_set((real)(sensor->crop_y + sensor->crop_height) + reach));
+    // The film ends where no samples are taken.
+    const PathJob *job = t->job;
+    out->m = out->m & m_ge(s.x, f_set((real)job->x)) & m_lt(s.x, f_set((real)(job->x + job->width))) &
+             m_ge(s.y, f_set((real)job->y)) & m_lt(s.y, f_set((real)(job->y + job->height)));
     out->edge = e;
     out->seen = s;
     out->n = n;

@@ -1,0 +1,284 @@
+// indirect.h: the boundary term of silhouettes that other vertices of a path see: shadows and everything that light
+// passes on its way. Boundary segments (segments.h) are continued at both ends: a path on the far side says how much light
+// comes, by its number of segments; a particle on the near side carries it to the sensor. In reverse mode the particle
+// gathers what the film's adjoint makes of it, at its first vertex and at the others: the first one slides over its
+// surface, because the film position is fixed.
+// NOT differentiated: what moves behind smooth mirrors and glass, and edges of surfaces that let light pass.
+#pragma once
+
+#include "integrator/boundary/segments.h"
+#include "integrator/film.h"
+
+typedef struct Indirect {
+    Tracer *t;
+    const BoundaryJob *b;
+    const Pinhole *pinhole;
+    const FilterTable *filter;
+    Segments q;
+} Indirect;
+
+static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
+    for (int32_t k = 0; k < q->count; k++) {
+        t->ws.pixel[k] = (int32_t)((first + q->number[k]) / BOUNDARY_PER_SET);
+        t->ws.sample[k] = (int32_t)((first + q->number[k]) % BOUNDARY_PER_SET);
+    }
+}
+
+// ---- the far side ------------------------------------------------------------------------------------------------
+
+// Fills the rungs: radiance that arrives along the segments, but for what their far points emit themselves.
+static void far_paths(Indirect *in, int32_t *begin) {
+    Tracer *t = in->t;
+    Segments *q = &in->q;
+    int32_t *slots = t->ws.order, n = 0;
+    for (int32_t k = 0; k < q->count; k++) {
+        slots[n] = k;
+        n += !q->lit[k];
+    }
+    for (int32_t k = 0; k < n; k += LANES) {
+        Mask m = m_first_n(n - k);
+        Int slot = i_select(m, i_load(slots + k), i_set(slots[k]));
+        Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
+        path_begin(t, k, slot, &ray, f_set(1));
+    }
+    for (int c = 0; c < SPEC_N; c++) {
+        memset(t->ws.radiance[c], 0, CHUNK * sizeof(real));
+    }
+    t->active = n;
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    t->first_bounce = 1;
+    t->rungs = q->rungs;
+    int32_t depth = t->scene->max_depth;
+    t->rungs_kept = 0;
+    t->rung_count = depth > 0 && depth <= MOST_RUNGS ? depth - 1 : 1;
+    for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
+        memset(q->rungs[i], 0, (size_t)q->count * sizeof(real));
+    }
+    t->job->paths += n;
+    path_forward(t, begin);
+    t->first_bounce = 0;
+    t->rungs = NULL;
+}
+
+// Radiance along the segments of particles that reach the sensor after `bounce` further vertices.
+KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
+    const Tracer *t = in->t;
+    const Segments *q = &in->q;
+    Mask lit = mi_lt(i_set(0), i_gather(q->lit, slot));
+    Spec l = spec_gather(q->light, slot);
+    int32_t depth = t->scene->max_depth, rung = depth - 2 - bounce;
+    Spec reflected = spec_gather(t->ws.radiance, slot);
+    if (depth > 0 && depth <= MOST_RUNGS && rung < t->rungs_kept) { // paths that have ended bring no more
+        reflected = spec_gather(q->rungs + rung * SPEC_N, slot);
+    }
+    reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
+    return spec_select(lit, l, reflected);
+}
+
+// ---- the near side -----------------------------------------------------------------------------------------------
+
+static Landing near_landing(Tracer *t, const Group *group, const int32_t *order, int32_t count, int32_t bounce) {
+    const SceneView *scene = t->scene;
+    Landing at;
+    at.v = vertex_load(t, order, count, bounce);
+    at.si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at.v.hit);
+    at.wl = frame_to_local(&at.si.sh, v3_neg(at.v.d));
+    at.cosine = f_abs(v3_dot(at.si.ng, at.v.d));
+    at.call = (BsdfCall){scene, group->bsdf, texcoord(at.si.uv, &at.v.hit), 0, NULL, NULL};
+    if (scene->bsdfs[group->bsdf].surface) {
+        find_surface(scene, group, &at.v.hit, &at.surface, &at.dp_dv);
+        at.call.surface = &at.surface;
+    }
+    return at;
+}
+
+// What a vertex that is seen at x, y brings to the derivative: to the picture, or times the film's adjoint to the segment.
+static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_t bounce, Mask m) {
+    Tracer *t = in->t;
+    real *rows = bounce == 0 ? in->q.seen : in->q.unseen;
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        int32_t k = i_lane(slot, lane);
+        double x = (double)f_lane(sight->x, lane), y = (double)f_lane(sight->y, lane), rgb[SPEC_N];
+        float delta[SPEC_N];
+        if (in->b->job.mode == MODE_FORWARD) {
+            for (int c = 0; c < SPEC_N; c++) {
+                rgb[c] = (double)f_lane(l.c[c], lane) * (double)rows[k];
+            }
+            particle_splat(t, x, y, rgb);
+            continue;
+        }
+        film_worth(t->sensor, in->filter, in->b->job.adjoint, (float)x, (float)y, (int32_t)floor(x), (int32_t)floor(y),
+                   delta);
+        for (int c = 0; c < SPEC_N; c++) {
+            rows[k] += delta[c] * in->b->scale * f_lane(l.c[c], lane);
+        }
+    }
+}
+
+// Connects vertices to the sensor, as light tracing does (particle.h).
+static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
+    Tracer *t = in->t;
+    const SensorRecord *s = t->sensor;
+    Sight sight = pinhole_look(in->pinhole, s, at->si.p);
+    const PathJob *job = t->job;
+    Mask m = at->v.m & sight.valid & m_gt(at->cosine, f_set(0)) & m_ge(sight.x, f_set((real)job->x)) &
+             m_lt(sight.x, f_set((real)(job->x + job->width))) & m_ge(sight.y, f_set((real)job->y)) &
+             m_lt(sight.y, f_set((real)(job->y + job->height)));
+    if (!m_any(m)) {
+        return;
+    }
+    Vec3 d = v3_select(m, sight.d, v3_neg(at->v.d));
+    Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
+    Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * sight.density;
+    Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
+    m = m & m_gt(spec_max(l), f_set(0)) & m_finite(spec_sum(l));
+    Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
+    m = m_any(m) ? particle_open(t, &ray, m) : m;
+    near_book(in, &sight, l, at->v.slot, bounce, m);
+}
+
+static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order, int32_t count, int32_t bounce,
+                          int32_t next_count) {
+    const SceneView *scene = in->t->scene;
+    Landing at = near_landing(in->t, group, order, count, bounce);
+    if (!scene->hide_emitters || group->emitter < 0) {
+        near_connect(in, &at, bounce);
+    }
+    if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth) {
+        return next_count;
+    }
+    return particle_scatter(in->t, &at, bounce, next_count);
+}
+
+static void near_particles(Indirect *in, int32_t *begin) {
+    Tracer *t = in->t;
+    const Segments *q = &in->q;
+    uint32_t scramble = t->job->scramble;
+    t->job->scramble = rng_mix(scramble, 1); // independent of the far side
+    for (int32_t k = 0; k < q->count; k += LANES) {
+        Int slot = i_min(i_iota() + k, i_set(q->count - 1));
+        Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), v3_neg(LOAD_V3(*q, dx, dy, dz, slot)), f_set(INFINITY)};
+        Spec kept = spec_load(t->ws.radiance, k);
+        path_begin(t, k, slot, &ray, f_set(1));
+        spec_store(t->ws.radiance, k, kept);
+    }
+    t->active = q->count;
+    t->current = 0;
+    int32_t groups = (int32_t)t->scene->groups_count + 1;
+    for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
+        trace_stage(t, 1);
+        sort_stage(t, begin, groups);
+        int32_t next_count = 0;
+        for (int32_t g = 1; g < groups; g++) {
+            for (int32_t k = begin[g]; k < begin[g + 1]; k += LANES) {
+                int32_t count = begin[g + 1] - k < LANES ? begin[g + 1] - k : LANES;
+                next_count = near_batch(in, t->scene->groups + g - 1, t->ws.order + k, count, bounce, next_count);
+            }
+        }
+        t->current = 1 - t->current;
+        t->active = next_count;
+    }
+    t->job->scramble = scramble;
+}
+
+// ---- what moves --------------------------------------------------------------------------------------------------
+
+// Adds the adjoint of points that slide over their surfaces because the sensor sees them at fixed film positions.
+static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Sink *sink, Mask m) {
+    const Tracer *t = in->t;
+    const SceneView *scene = t->scene;
+    View view = view_make(scene, in->pinhole, t->sensor, (Vec2){f_set(0.5f), f_set(0.5f)});
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+        const Group *group = scene->groups + id;
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
+        bool moves = t->job->live[id] & LIVE_MOTION;
+        if (!moves && !sink->any_camera) {
+            continue;
+        }
+        Hit h = *hit;
+        h.shape = i_select(mine, hit->shape, i_set(first));
+        h.prim = i_select(mine, hit->prim, i_set(0));
+        h.instance = i_select(mine, hit->instance, i_set(0));
+        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
+        Seen seen = view_see(&view, si.p);
+        Slide slide[2];
+        SurfaceAdj d = surface_adj_zero();
+        shape_slide(scene, group->shape_kind, group->shape_flags, &h, &si, slide);
+        d.p = dp;
+        Vec3 position = slide_adj(slide, seen.d, &d);
+        if (moves) {
+            d.p = v3_sub(d.p, position);
+            shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, &d, sink, mine);
+        }
+        if (sink->any_camera) {
+            RayAdj ray = {si.p, position, v3_zero()};
+            sensor_ray_adj(scene, t->sensor, seen.x, seen.y, view.lens, &ray, sink, mine);
+        }
+    }
+}
+
+KFN Float sink_taken(Sink *sink) {
+    Float d = sink->derivative;
+    sink->derivative = f_set(0);
+    return d;
+}
+
+// The motion of the segments k..., worth `seen` where the sensor sees the near points, and `unseen` elsewhere: adds it to the
+// gradient, or in forward mode leaves in both what it is.
+static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    Mask m = m_first_n(q->count - k);
+    bool forward = in->b->job.mode == MODE_FORWARD;
+    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
+    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+    m = m & m_finite(seen + unseen);
+    Hit near = LOAD_HIT(q, k, near), edge = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
+    Float along = f_load(q->along + k), both = seen + unseen;
+    Mask attached = m & mi_lt(i_set(-1), far.shape);
+    // n . (edge - lerp(near, far, along))
+    points_move_adj(in->t, &edge, v3_scale(n, both), v3_zero(), sink, m);
+    if (m_any(attached)) {
+        points_move_adj(in->t, &far, v3_scale(n, -both * along), v3_zero(), sink, attached);
+    }
+    Int light = i_load(q->source + k);
+    Mask delta = m & mi_lt(i_set(-1), light);
+    if (sink->any_places && m_any(delta)) {
+        // The direction from the near point turns the line past the edge.
+        LightMove move = light_move_zero();
+        Float behind = f_load(q->behind + k), total = f_select(m_gt(along, f_set(0)), behind * f_safe_rcp(along), f_set(1));
+        move.d = v3_scale(n, -both * behind);
+        lights_move_adj(in->t->scene, i_select(delta, light, i_set(0)), delta, near.p, record_v3(q->dx, q->dy, q->dz, k),
+                        total, &move, sink);
+    }
+    Vec3 dnear = v3_scale(n, along - 1.0f);
+    if (!forward) {
+        points_slide_adj(in, &near, v3_scale(dnear, seen), sink, m);
+        points_move_adj(in->t, &near, v3_scale(dnear, unseen), v3_zero(), sink, m);
+        return;
+    }
+    Float common = sink_taken(sink);
+    points_slide_adj(in, &near, dnear, sink, m);
+    f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
+    points_move_adj(in->t, &near, dnear, v3_zero(), sink, m);
+    f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
+}
+
+// Samples first... of a chunk.
+static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sink, int32_t *begin) {
+    Tracer *t = in->t;
+    Segments *q = &in->q;
+    segments_find(t, in->b, first, count, q);
+    slot_numbers(t, q, first);
+    for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_FORWARD; k += LANES) {
+        segments_move_adj(in, k, sink);
+    }
+    far_paths(in, begin);
+    near_particles(in, begin);
+    for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_REVERSE; k += LANES) {
+        segments_move_adj(in, k, sink);
+    }
+}

@@ -1,0 +1,227 @@
+// segments.h: boundary segments: straight pieces of light paths that touch an edge. A segment runs from the near point,
+// towards the sensor, past a point of the edge to the far point, towards the light. When the three points move with
+// velocities a, e and b, light of the far point moves over the near side's surfaces as far as the edge leaves the line of
+// the other two: by n . (e - lerp(a, b)), n the normal of the plane of edge and segment, and the flux through a piece dl
+// of the edge within the solid angle dw is L sin(dl, w) dl dw times that [zhang2020, equation 44; its derivation in this
+// form stands in docs/derivations/boundary.md]. Far points are attached to their surfaces, and so is what lies behind
+// them; the near side of the edge adds nothing, because its own light moves along with it.
+#pragma once
+
+#include "integrator/boundary/edge.h"
+#include "integrator/boundary/view.h"
+#include "integrator/path_move.h"
+
+// Beside the numbers of edges: the light, and where on it or which direction.
+#define DIMENSION_EDGE_SEGMENT 0x80000002u
+#define DIMENSION_SEGMENT_LIGHT 0x80000003u
+#define DIMENSION_SEGMENT_END 0x80000004u
+
+// Blocks of samples that end on lights take turns with blocks that leave into a random direction.
+enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64 };
+
+// Lights of which every point sees the same direction, or all.
+enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 << EMITTER_DIRECTIONAL };
+
+#define SEGMENT_POINT(F, x) F(x##_u) F(x##_v) F(x##_x) F(x##_y) F(x##_z)
+#define SEGMENT_HIT(I, x) I(x##_shape) I(x##_prim) I(x##_instance)
+// Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
+// ends; what the
+// near point's share of the derivative is worth where it is seen by the camera, and elsewhere.
+#define SEGMENT_FLOATS(F)                                                                                              \
+    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) SEGMENT_POINT(F, near)            \
+        SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
+#define SEGMENT_INTS(I) I(number) I(lit) I(source) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
+#define SEGMENT_SPECS(S) S(light)
+
+typedef struct Segments {
+    SEGMENT_FLOATS(DECLARE_FLOAT) SEGMENT_INTS(DECLARE_INT) SEGMENT_SPECS(DECLARE_SPEC)
+    real *rungs[MOST_RUNGS * SPEC_N];
+    int32_t count;
+} Segments;
+
+// As workspace_layout.
+static inline size_t segments_layout(Segments *q, char *block) {
+    size_t at = 0, n = CHUNK + 2 * LANES;
+#define CARVE_SEGMENT(name) CARVE(q->name, n)
+#define CARVE_SEGMENT_SPEC(name) CARVE_SPEC(q->name, n)
+    SEGMENT_FLOATS(CARVE_SEGMENT)
+    SEGMENT_INTS(CARVE_SEGMENT)
+    SEGMENT_SPECS(CARVE_SEGMENT_SPEC)
+    for (int i = 0; i < MOST_RUNGS * SPEC_N; i++) {
+        CARVE(q->rungs[i], n)
+    }
+    q->count = 0;
+    return at;
+}
+
+// A batch of segments as it is sampled.
+typedef struct Segment {
+    EdgePoint edge;
+    Vec3 d, n;       // towards the light; away from what hides it
+    Float weight, distance; // of the light, or infinite
+    Spec light;      // what comes along d over its density; random directions: 1 over theirs
+    Hit far;
+    Int source;      // the delta light that it ends on, -1 = none
+    Mask m, attached; // attached: the far point lies on a surface
+} Segment;
+
+KFN Vec3 segment_far_eye(const SceneView *scene, Vec3 reference, Vec3 d) {
+    return v3_madd(reference, f_set(1e4f * (real)scene->bounds_radius), d);
+}
+
+// Towards a point of a light, as the edge sees it.
+static void segment_to_light(const Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 u, Segment *s) {
+    const SceneView *scene = t->scene;
+    Float choice;
+    Vec2 at = rng_2d(key, DIMENSION_SEGMENT_END);
+    Vec3 reference = edge_reference(scene, &s->edge);
+    Int light = emitter_choose(scene, rng_1d(key, DIMENSION_SEGMENT_LIGHT), &choice);
+    LightSample l = lights_sample(scene, light, s->m, reference, at, &s->light);
+    Int shape = EMITTER_FIELD(scene, light, shape), kind = EMITTER_FIELD(scene, light, kind);
+    Mask round = s->m & s->edge.round, endless = mi_eq((i_set(EMITTER_INFINITE_KINDS) >> kind) & 1, i_set(1));
+    Vec3 end = v3_madd(reference, l.distance, l.d), normal = v3_zero();
+    s->attached = s->m & l.valid & mi_lt(i_set(-1), shape);
+    s->far = light_hit(scene, i_select(s->attached, shape, i_set(-1)), i_select(s->attached, l.prim, i_set(0)), end, &normal);
+    Float factor = f_set(1);
+    if (m_any(round)) {
+        Vec3 eye = v3_select(endless, segment_far_eye(scene, reference, l.d), end);
+        s->edge = edge_sample(scene, b, u, eye, false);
+        Vec3 to_end = v3_sub(end, s->edge.p);
+        Float distance = v3_length(to_end);
+        Vec3 d = v3_scale(to_end, f_safe_rcp(distance));
+        Mask near = round & ~endless & light_is_delta(scene, light);
+        if (m_any(near)) {
+            Spec again;
+            lights_sample(scene, light, near, s->edge.p, at, &again);
+            s->light = spec_select(near, again, s->light);
+        }
+        // Of points of surfaces: their solid angle from the edge over that from the reference.
+        Float turned = f_max(-v3_dot(d, normal), f_set(0)) * f_safe_rcp(f_abs(v3_dot(l.d, normal)));
+        Float ratio = l.distance * l.distance * f_safe_rcp(distance * distance) * turned;
+        factor = f_select(round & s->attached, ratio, factor);
+        Mask moved = round & ~endless;
+        l.d = v3_select(moved, d, l.d);
+        l.distance = f_select(moved, distance, l.distance);
+    }
+    s->source = i_select(light_is_delta(scene, light), light, i_set(-1));
+    s->d = l.d;
+    s->distance = f_select(endless, f_set(INFINITY), l.distance);
+    s->light = spec_scale(s->light, factor * f_safe_rcp(l.pdf * choice));
+    s->m = s->m & l.valid & m_gt(l.pdf, f_set(0)) & m_gt(spec_max(s->light), f_set(0));
+}
+
+static void segment_to_anywhere(const Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 u, Segment *s) {
+    s->d = warp_uniform_sphere(rng_2d(key, DIMENSION_SEGMENT_END));
+    if (m_any(s->edge.round)) {
+        s->edge = edge_sample(t->scene, b, u, segment_far_eye(t->scene, edge_reference(t->scene, &s->edge), s->d), false);
+    }
+    s->light = spec_set(f_set(4 * PI));
+    s->distance = f_set(INFINITY);
+}
+
+// Samples a batch of segments without tracing them. lit: they end on lights.
+static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, bool lit, Float share, Mask m, Segment *s) {
+    SampleKey key = slot_key(t, slot);
+    Vec2 u = rng_2d(&key, DIMENSION_EDGE_SEGMENT);
+    s->edge = edge_sample(t->scene, b, u, v3_zero(), false);
+    s->m = m;
+    s->attached = m_set(false);
+    s->source = i_set(-1);
+    if (lit) {
+        segment_to_light(t, b, &key, u, s);
+    } else {
+        segment_to_anywhere(t, b, &key, u, s);
+    }
+    Vec3 across = v3_cross(s->d, s->edge.tangent);
+    Float length = v3_length(across);
+    Vec3 n = v3_scale(across, f_safe_rcp(length));
+    Float into = v3_dot(s->edge.side[0], n);
+    s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
+    s->weight = length * share * f_safe_rcp(s->edge.probability);
+    s->m = s->m & edge_is_silhouette(&s->edge, n) & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) &
+           m_finite(s->weight) & m_gt(s->edge.probability, f_set(0));
+}
+
+KFN void hit_compress(real *u, real *v, real *x, real *y, real *z, int32_t *shape, int32_t *prim, int32_t *instance,
+                      const Hit *hit, Vec3 p, Mask m) {
+    f_compress(u, hit->u, m);
+    f_compress(v, hit->v, m);
+    v3_compress(x, y, z, p, m);
+    i_compress(shape, hit->shape, m);
+    i_compress(prim, hit->prim, m);
+    i_compress(instance, hit->instance, m);
+}
+
+#define KEEP_HIT(q, at, name, hit, p, m)                                                                               \
+    hit_compress((q)->name##_u + (at), (q)->name##_v + (at), (q)->name##_x + (at), (q)->name##_y + (at),               \
+                 (q)->name##_z + (at), (q)->name##_shape + (at), (q)->name##_prim + (at), (q)->name##_instance + (at), \
+                 hit, p, m)
+#define LOAD_HIT(q, k, name)                                                                                           \
+    ((Hit){i_load((q)->name##_shape + (k)), i_load((q)->name##_prim + (k)), f_load((q)->name##_u + (k)),               \
+           f_load((q)->name##_v + (k)), record_v3((q)->name##_x, (q)->name##_y, (q)->name##_z, (k)),                   \
+           i_load((q)->name##_instance + (k))})
+
+// Traces both halves and keeps the segments that have ends.
+static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
+    Vec3 p = s->edge.p;
+    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
+    Vec3 o = v3_madd(p, step, s->n);
+    Ray ahead = {o, s->d, s->distance * (1.0f - 9e-4f)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
+    Mask m = s->m;
+    t->job->rays += m_count(m);
+    if (lit) {
+        m = m & m_gt(spec_max(trace_transmittance(t->scene, &ahead, m)), f_set(0));
+    } else {
+        s->far = trace_closest(t->scene, &ahead, m, false);
+        s->attached = m & mi_lt(i_set(-1), s->far.shape);
+        m = s->attached;
+    }
+    if (!m_any(m)) {
+        return;
+    }
+    t->job->rays += m_count(m);
+    Hit near = trace_closest(t->scene, &back, m, false);
+    m = m & mi_lt(i_set(-1), near.shape);
+    Float behind = v3_length(v3_sub(near.p, p)), before = v3_length(v3_sub(s->far.p, p));
+    Float along = f_select(s->attached | m_lt(s->distance, f_set(INFINITY)), behind * f_safe_rcp(behind + before), f_set(0));
+    int32_t at = q->count;
+    s->far.shape = i_select(s->attached, s->far.shape, i_set(-1));
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
+    // What the edge gains on the side of n, the light loses.
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
+    f_compress(q->behind + at, behind, m);
+    f_compress(q->along + at, along, m);
+    f_compress(q->seen + at, f_set(0), m);
+    f_compress(q->unseen + at, f_set(0), m);
+    spec_compress(q->light, at, s->light, m);
+    i_compress(q->lit + at, i_set(lit), m);
+    i_compress(q->source + at, s->source, m);
+    i_compress(q->number + at, number, m);
+    KEEP_HIT(q, at, near, &near, near.p, m);
+    KEEP_HIT(q, at, edge, &s->edge.hit, p, m);
+    KEEP_HIT(q, at, far, &s->far, s->far.p, m);
+    q->count += m_count(m);
+}
+
+// Samples numbers first... of a chunk and keeps the segments among them.
+static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
+    const SceneView *scene = t->scene;
+    bool indirect = scene->max_depth < 0 || scene->max_depth > 2, direct = scene->emitters_count > 0;
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        bool lit = direct && (!indirect || (first + i) / SEGMENT_BLOCK % 2 == 0);
+        if (!lit && !indirect) {
+            return;
+        }
+        for (int32_t k = i; k < i + LANES; k++) {
+            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
+            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
+        }
+        Segment s;
+        segment_sample(t, b, i_iota() + i, lit, f_set(direct && indirect ? 2 : 1), m_first_n(count - i), &s);
+        if (m_any(s.m)) {
+            segment_trace(t, &s, lit, i_iota() + i, q);
+        }
+    }
+}
