@@ -200,6 +200,19 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
                            w.roulette, at->v.slot, m);
 }
 
+// Fills what follows from the vertex.
+KFN void landing_look(const Tracer *t, const Group *group, Landing *at) {
+    const SceneView *scene = t->scene;
+    at->si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at->v.hit);
+    at->wl = frame_to_local(&at->si.sh, v3_neg(at->v.d));
+    at->cosine = f_abs(v3_dot(at->si.ng, at->v.d));
+    at->call = (BsdfCall){scene, group->bsdf, texcoord(at->si.uv, &at->v.hit), t->floor, NULL, NULL};
+    if (scene->bsdfs[group->bsdf].surface) {
+        find_surface(scene, group, &at->v.hit, &at->surface, &at->dp_dv);
+        at->call.surface = &at->surface;
+    }
+}
+
 static int32_t particle_batch(Tracer *t, const Pinhole *pinhole, int32_t group_id, const int32_t *order, int32_t count,
                               int32_t bounce, int32_t next_count) {
     const SceneView *scene = t->scene;
@@ -215,14 +228,7 @@ static int32_t particle_batch(Tracer *t, const Pinhole *pinhole, int32_t group_i
         }
         record_vertex(t, record, &at.v, f_set(0), spec_zero());
     }
-    at.si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at.v.hit);
-    at.wl = frame_to_local(&at.si.sh, v3_neg(at.v.d));
-    at.cosine = f_abs(v3_dot(at.si.ng, at.v.d));
-    at.call = (BsdfCall){scene, group->bsdf, texcoord(at.si.uv, &at.v.hit), t->floor, NULL, NULL};
-    if (scene->bsdfs[group->bsdf].surface) {
-        find_surface(scene, group, &at.v.hit, &at.surface, &at.dp_dv);
-        at.call.surface = &at.surface;
-    }
+    landing_look(t, group, &at);
     if (!scene->hide_emitters || group->emitter < 0) {
         particle_connect(t, pinhole, &at, bounce, record);
     }

@@ -2,24 +2,53 @@
 #include "render/boundary.h"
 
 #include "base/parallel.h"
+#include "emitter/emitter.h"
 #include "render/boundary_edges.h"
+#include "sensor/kinds.h"
+#include "shape/shape.h"
 
 #include <string.h>
 
 enum { BOUNDARY_SHARDS = 8 };
 
+static rey_result refuse(rey_scene *scene, int term, const char *what) {
+    return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                    "the term '%s' does not know %s yet. --terms interior gives the part without", rey_term_name(term), what);
+}
+
 // Jumps of what the camera sees that no edge explains.
-rey_result rey_boundary_check(rey_scene *scene, int term) {
-    const SceneView *view = &scene->view;
-    for (int64_t i = 0; i < view->textures_count && term == REY_TERM_PRIMARY; i++) {
+static bool has_steps(const SceneView *view) {
+    for (int64_t i = 0; i < view->textures_count; i++) {
         const TextureNode *texture = view->textures + i;
-        bool steps = texture->kind == TEXTURE_CHECKERBOARD || (texture->kind == TEXTURE_ATTRIBUTE && texture->per_face) ||
-                     (texture->kind == TEXTURE_BITMAP && texture->filter == FILTER_NEAREST);
-        if (steps) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "the term 'primary' does not know the jumps of checkerboards, of textures with "
-                            "filter_type=\"nearest\" and of face attributes yet, and the scene has one. "
-                            "--terms interior gives the part without");
+        if (texture->kind == TEXTURE_CHECKERBOARD || (texture->kind == TEXTURE_ATTRIBUTE && texture->per_face) ||
+            (texture->kind == TEXTURE_BITMAP && texture->filter == FILTER_NEAREST)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int term) {
+    const SceneView *view = &scene->view;
+    if (sensor->kind != SENSOR_PERSPECTIVE && sensor->kind != SENSOR_THINLENS && sensor->kind != SENSOR_ORTHOGRAPHIC) {
+        return refuse(scene, term, "sensors other than perspective, thinlens and orthographic");
+    }
+    if (term == REY_TERM_PRIMARY && has_steps(view)) {
+        return refuse(scene, term, "the jumps of checkerboards, of textures with filter_type=\"nearest\" and of face "
+                                   "attributes, and the scene has one");
+    }
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        const ShapeRecord *shape = view->shapes + i;
+        if (shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_BSPLINE || shape->kind == SHAPE_LINEAR) {
+            return refuse(scene, term, "the outlines of curves and grids of distances, and the scene has one");
+        }
+        if (shape->collection >= 0 && shape->kind != SHAPE_MESH) {
+            return refuse(scene, term, "the outlines of spheres, disks and cylinders in shapegroups, and the scene has one");
+        }
+    }
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        if (view->emitters[i].kind == EMITTER_DIRECTIONALAREA) {
+            return refuse(scene, term, "the emitter 'directionalarea', and the scene has one");
         }
     }
     return REY_OK;

@@ -4,7 +4,7 @@
 #include "render/render_parts.h"
 
 // Whether a term of a selection can be computed; records why not.
-rey_result rey_boundary_check(rey_scene *scene, int term);
+rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int term);
 // Prepares a term after the selection is mapped; rey_boundary_free follows in any case.
 rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan);
 void rey_boundary_free(Render *r, BoundaryPlan *plan);

@@ -358,7 +358,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     for (int i = 0; i < BOUNDARY_TERMS && result == REY_OK; i++) {
         int term = REY_TERM_PRIMARY << i;
         if (r->terms & term) {
-            result = rey_boundary_check(scene, term);
+            result = rey_boundary_check(scene, r->plan.sensor, term);
             result = result == REY_OK ? rey_boundary_begin(r, term, r->boundary + i) : result;
         }
     }

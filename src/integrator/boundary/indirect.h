@@ -79,19 +79,12 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
 
 // ---- the near side -----------------------------------------------------------------------------------------------
 
-static Landing near_landing(Tracer *t, const Group *group, const int32_t *order, int32_t count, int32_t bounce) {
-    const SceneView *scene = t->scene;
-    Landing at;
-    at.v = vertex_load(t, order, count, bounce);
-    at.si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at.v.hit);
-    at.wl = frame_to_local(&at.si.sh, v3_neg(at.v.d));
-    at.cosine = f_abs(v3_dot(at.si.ng, at.v.d));
-    at.call = (BsdfCall){scene, group->bsdf, texcoord(at.si.uv, &at.v.hit), 0, NULL, NULL};
-    if (scene->bsdfs[group->bsdf].surface) {
-        find_surface(scene, group, &at.v.hit, &at.surface, &at.dp_dv);
-        at.call.surface = &at.surface;
-    }
-    return at;
+// Where on its lens the sensor sees the near points of segments from.
+KFN Vec2 near_lens(const Indirect *in, Int slot) {
+    SampleKey key = slot_key(in->t, slot);
+    key.scramble = in->b->job.scramble;
+    Vec2 centre = {f_set(0.5f), f_set(0.5f)};
+    return sensor_has_lens(in->t->sensor) ? rng_2d(&key, DIMENSION_LENS) : centre;
 }
 
 // What a vertex that is seen at x, y brings to the derivative: to the picture, or times the film's adjoint to the segment.
@@ -121,8 +114,7 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
 // Connects vertices to the sensor, as light tracing does (particle.h).
 static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Tracer *t = in->t;
-    const SensorRecord *s = t->sensor;
-    Sight sight = pinhole_look(in->pinhole, s, at->si.p);
+    Sight sight = camera_look(in->pinhole, t->scene, t->sensor, at->si.p, near_lens(in, at->v.slot));
     const PathJob *job = t->job;
     Mask m = at->v.m & sight.valid & m_gt(at->cosine, f_set(0)) & m_ge(sight.x, f_set((real)job->x)) &
              m_lt(sight.x, f_set((real)(job->x + job->width))) & m_ge(sight.y, f_set((real)job->y)) &
@@ -143,14 +135,16 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
 static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order, int32_t count, int32_t bounce,
                           int32_t next_count) {
     const SceneView *scene = in->t->scene;
-    Landing at = near_landing(in->t, group, order, count, bounce);
+    Landing at;
+    at.v = vertex_load(in->t, order, count, bounce);
+    landing_look(in->t, group, &at);
     if (!scene->hide_emitters || group->emitter < 0) {
         near_connect(in, &at, bounce);
     }
     if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth) {
         return next_count;
     }
-    return particle_scatter(in->t, &at, bounce, next_count);
+    return particle_scatter(in->t, &at, bounce, -1, next_count);
 }
 
 static void near_particles(Indirect *in, int32_t *begin) {
@@ -187,10 +181,10 @@ static void near_particles(Indirect *in, int32_t *begin) {
 // ---- what moves --------------------------------------------------------------------------------------------------
 
 // Adds the adjoint of points that slide over their surfaces because the sensor sees them at fixed film positions.
-static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Sink *sink, Mask m) {
+static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Vec2 lens, Sink *sink, Mask m) {
     const Tracer *t = in->t;
     const SceneView *scene = t->scene;
-    View view = view_make(scene, in->pinhole, t->sensor, (Vec2){f_set(0.5f), f_set(0.5f)});
+    View view = view_make(scene, in->pinhole, t->sensor, lens);
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
         const Group *group = scene->groups + id;
@@ -255,13 +249,14 @@ static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
                         total, &move, sink);
     }
     Vec3 dnear = v3_scale(n, along - 1.0f);
+    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
     if (!forward) {
-        points_slide_adj(in, &near, v3_scale(dnear, seen), sink, m);
+        points_slide_adj(in, &near, v3_scale(dnear, seen), lens, sink, m);
         points_move_adj(in->t, &near, v3_scale(dnear, unseen), v3_zero(), sink, m);
         return;
     }
     Float common = sink_taken(sink);
-    points_slide_adj(in, &near, dnear, sink, m);
+    points_slide_adj(in, &near, dnear, lens, sink, m);
     f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
     points_move_adj(in->t, &near, dnear, v3_zero(), sink, m);
     f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
