@@ -1,6 +1,6 @@
 // primary.h: the boundary term of what the camera sees. A picture is an integral over the film; where the radiance jumps
 // by dL along a curve that moves over the film with normal velocity v, its derivative has the line integral of f dL v
-// [li2018, equation 5], f the reconstruction filter. A sample is a point of an edge, seen by two paths on both sides of it
+// [li2018], docs/derivations/boundary.md, f the reconstruction filter. A sample is a point of an edge, seen by two paths on both sides of it
 // that share their random numbers.
 // NOT differentiated: jumps that are no edges (texels, checkerboards, masks), and what is seen behind mirrors and glass.
 #pragma once

@@ -2,8 +2,8 @@
 // towards the sensor, past a point of the edge to the far point, towards the light. When the three points move with
 // velocities a, e and b, light of the far point moves over the near side's surfaces as far as the edge leaves the line of
 // the other two: by n . (e - lerp(a, b)), n the normal of the plane of edge and segment, and the flux through a piece dl
-// of the edge within the solid angle dw is L sin(dl, w) dl dw times that [zhang2020, equation 44; its derivation in this
-// form stands in docs/derivations/boundary.md]. Far points are attached to their surfaces, and so is what lies behind
+// of the edge within the solid angle dw is L sin(dl, w) dl dw times that [zhang2020]; derived in
+// docs/derivations/boundary.md. Far points are attached to their surfaces, and so is what lies behind
 // them; the near side of the edge adds nothing, because its own light moves along with it.
 #pragma once
 

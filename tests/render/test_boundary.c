@@ -1,0 +1,234 @@
+// Complete gradients of what moves: interior and both boundary terms together, forward mode per image block, against central
+// differences; reverse mode against forward mode on the same samples; and that each boundary term is needed.
+#include "rooms.h"
+
+#include <stdlib.h>
+
+enum { ACROSS = 3, BLOCKS = 9, SEEDS = 10, SPP = 256, DIFFERENCE_SPP = 1024, MOST = 128 };
+
+// A motion of a parameter: of a pose, a turn (degrees) or shift of what it places; of others, the same step for all numbers,
+// or of vertices a shift along x that grows with z.
+typedef struct Motion {
+    const char *room, *param;
+    enum { SHIFT, TURN, GROW, ADD, SHEAR } sort;
+    float axis[3];
+    double h;
+    int effort; // times the usual samples
+} Motion;
+
+static const Motion motions[] = {
+    {"boundary_lamp.xml", "card.to_world", SHIFT, {1, 0, 0}, 0.03, 2},
+    {"boundary_lamp.xml", "card.to_world", TURN, {0, 0.3f, 1}, 1, 3},
+    {"boundary_lamp.xml", "ball.to_world", GROW, {1.2f, -0.3f, 0.9f}, 0.01, 1},
+    {"boundary_lamp.xml", "tube.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
+    {"boundary_lamp.xml", "coin.to_world", SHIFT, {0, 1, 0}, 0.03, 1},
+    {"boundary_lamp.xml", "lamp.to_world", SHIFT, {1, 0.5f, 0}, 0.03, 1},
+    {"boundary_lamp.xml", "floor.to_world", SHIFT, {0.2f, 0, 1}, 0.02, 1},
+    {"boundary_lamp.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
+    {"boundary_lamp.xml", "camera.x_fov", ADD, {0, 0, 0}, 0.2, 1},
+    {"boundary_bulb.xml", "crate.to_world", SHIFT, {0.3f, 0, 1}, 0.02, 1},
+    {"boundary_bulb.xml", "gem.positions", SHEAR, {0, 0, 0}, 0.02, 1},
+    {"boundary_bulb.xml", "bulb.position", ADD, {0, 0, 0}, 0.03, 1},
+    {"boundary_bulb.xml", "camera.to_world", SHIFT, {0, 0.5f, 1}, 0.02, 1},
+    {"boundary_sky.xml", "ball.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 4},
+    {"boundary_sky.xml", "camera.to_world", SHIFT, {1, 0, 0}, 0.02, 1},
+    {"boundary_bounce.xml", "card.to_world", SHIFT, {1, 0, 0}, 0.06, 24},
+};
+
+static void blocks_of(const float *image, double *blocks) {
+    enum { WIDTH = SIZE / ACROSS };
+    memset(blocks, 0, BLOCKS * sizeof *blocks);
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        for (int c = 0; c < 3; c++) {
+            blocks[i / SIZE / WIDTH * ACROSS + i % SIZE / WIDTH] += (double)image[3 * i + c] / (3.0 * WIDTH * WIDTH);
+        }
+    }
+}
+
+// The rate of change of the parameter's numbers.
+static int tangent_of(Room room, const Motion *m, int param, float *start, float *tangent) {
+    rey_param_info info;
+    ok(room, rey_param_get_info(room.scene, param, &info));
+    int n = (int)info.count;
+    assert_true(n <= MOST);
+    memcpy(start, rey_param_values(room.scene, param), (size_t)n * sizeof *start);
+    const float radian = 3.14159265f / 180;
+    for (int i = 0; i < n; i++) {
+        int row = i / 4, column = i % 4;
+        switch (m->sort) {
+        case SHIFT:
+            tangent[i] = column == 3 && row < 3 ? m->axis[row] : 0;
+            break;
+        case TURN: { // w x column; points turn about where the pose puts the origin
+            float x[3] = {start[column], start[4 + column], start[8 + column]};
+            int a = (row + 1) % 3, b = (row + 2) % 3;
+            tangent[i] = column < 3 && row < 3 ? radian * (m->axis[a] * x[b] - m->axis[b] * x[a]) : 0;
+            break;
+        }
+        case GROW:
+            tangent[i] = row < 3 ? start[i] - (column == 3 ? m->axis[row] : 0) : 0;
+            break;
+        case ADD:
+            tangent[i] = 1 - 0.4f * (float)i;
+            break;
+        case SHEAR:
+            tangent[i] = i % 3 == 0 ? start[i + 2] : 0.2f;
+            break;
+        }
+    }
+    return n;
+}
+
+static void quotient(Room room, const Motion *m, int param, const float *start, const float *tangent, int n, uint32_t seed,
+                     double *blocks) {
+    static float image[NUMBERS];
+    memset(blocks, 0, BLOCKS * sizeof *blocks);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        float values[MOST];
+        double one[BLOCKS];
+        for (int i = 0; i < n; i++) {
+            values[i] = start[i] + (float)(sign * m->h) * tangent[i];
+        }
+        rey_render_def def = def_make(DIFFERENCE_SPP * m->effort, seed, 1);
+        ok(room, rey_param_set(room.scene, param, values, n));
+        ok(room, rey_render(room.scene, &def, image, NULL));
+        blocks_of(image, one);
+        for (int i = 0; i < BLOCKS; i++) {
+            blocks[i] += sign * one[i] / (2 * m->h);
+        }
+    }
+    ok(room, rey_param_set(room.scene, param, start, n));
+}
+
+static void derivative(Room room, const Motion *m, int param, const float *tangent, uint32_t seed, double *blocks) {
+    static float image[NUMBERS];
+    rey_render_def def = def_make(SPP * m->effort, seed, 1);
+    def.terms = 0; // all that it needs
+    ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL));
+    blocks_of(image, blocks);
+}
+
+// Mean over seeds of what is in a column, and its squared standard error.
+static double mean_of(double rows[SEEDS][BLOCKS], int block, double *error2) {
+    double mean = 0, square = 0;
+    for (int s = 0; s < SEEDS; s++) {
+        mean += rows[s][block] / SEEDS;
+    }
+    for (int s = 0; s < SEEDS; s++) {
+        square += (rows[s][block] - mean) * (rows[s][block] - mean);
+    }
+    *error2 = square / (SEEDS - 1) / SEEDS;
+    return mean;
+}
+
+// [wallace1959]
+static double normal_of_t(double t, double degrees) {
+    double z = sqrt(degrees * log1p(t * t / degrees)) * (8 * degrees + 1) / (8 * degrees + 3);
+    return t < 0 ? -z : z;
+}
+
+static void test_motion(void **state) {
+    const Motion *m = *state;
+    Room room = room_open(m->room, 1, 0);
+    int param = rey_param_find(room.scene, m->param);
+    assert_true(param >= 0);
+    float start[MOST], tangent[MOST];
+    int n = tangent_of(room, m, param, start, tangent);
+    double off[SEEDS][BLOCKS], whole[SEEDS][BLOCKS], error2, rms = 0, worst = 0, sum = 0, noise = 0;
+    for (int s = 0; s < SEEDS; s++) {
+        double differences[BLOCKS];
+        derivative(room, m, param, tangent, (uint32_t)s + 1, whole[s]);
+        quotient(room, m, param, start, tangent, n, (uint32_t)s + 101, differences);
+        for (int i = 0; i < BLOCKS; i++) {
+            off[s][i] = whole[s][i] - differences[i];
+        }
+    }
+    for (int i = 0; i < BLOCKS; i++) {
+        double mean = mean_of(whole, i, &error2);
+        rms += mean * mean / BLOCKS;
+    }
+    rms = sqrt(rms);
+    for (int i = 0; i < BLOCKS; i++) {
+        const double truncation = 0.01 * rms; // of the differences
+        double mean = mean_of(off, i, &error2), z = normal_of_t(mean / sqrt(error2 + truncation * truncation), SEEDS - 1);
+        worst = fmax(worst, fabs(z));
+        sum += z;
+        noise += error2 / BLOCKS;
+    }
+    print_message("%-20s %-22s RMS %9.3g, standard error %5.2f %%, worst z %5.2f, sum / sqrt(n) %5.2f\n", m->room, m->param,
+                  rms, 100 * sqrt(noise) / rms, worst, sum / sqrt(BLOCKS));
+    room_close(room);
+    assert_true(rms > 0);
+    assert_true(sqrt(noise) <= 0.02 * rms);
+    // At 1 % for all motions together [Sidak].
+    assert_true(erfc(worst / sqrt(2)) > -expm1(log1p(-0.01) / (BLOCKS * COUNT_OF(motions))));
+    assert_true(fabs(sum) / sqrt(BLOCKS) < 3);
+}
+
+// Sum over the picture of a ramp times the derivative, in both modes, and what each term contributes.
+static void test_modes(void **state) {
+    const Motion *m = *state;
+    static float image[NUMBERS], ramp[NUMBERS];
+    Room room = room_open(m->room, 2, 0);
+    int param = rey_param_find(room.scene, m->param);
+    float start[MOST], tangent[MOST];
+    double gradient[MOST], sizes[2] = {0, 0};
+    int n = tangent_of(room, m, param, start, tangent);
+    for (int i = 0; i < NUMBERS; i++) {
+        ramp[i] = (float)(i / 3 % SIZE) / SIZE - 0.3f * (float)(i % 3);
+    }
+    for (int term = REY_TERM_INTERIOR; term <= REY_TERM_INDIRECT; term *= 2) {
+        rey_render_def def = def_make(64, 5, 2);
+        def.terms = term;
+        double forward = 0, reverse = 0, size = 0;
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL));
+        ok(room, rey_vjp(room.scene, &def, (rey_selection){&param, 1}, ramp, gradient, NULL, NULL));
+        for (int i = 0; i < NUMBERS; i++) {
+            forward += (double)image[i] * (double)ramp[i];
+            size += fabs((double)image[i] * (double)ramp[i]);
+        }
+        for (int i = 0; i < n; i++) {
+            reverse += gradient[i] * (double)tangent[i];
+        }
+        if (!(fabs(forward - reverse) <= 2e-5 * size)) {
+            fail_msg("%s of %s: forward %.9g, reverse %.9g", rey_term_name(term), m->param, forward, reverse);
+        }
+        sizes[0] = term == REY_TERM_INTERIOR ? size : sizes[0];
+        sizes[1] = term == REY_TERM_INTERIOR ? 0 : sizes[1] + size;
+    }
+    room_close(room);
+    assert_true(sizes[1] > 0.1 * sizes[0]);
+}
+
+// Threads and runs do not change a bit.
+static void test_bits(void **state) {
+    UNUSED(state);
+    static float images[2][NUMBERS];
+    const Motion *m = motions;
+    double gradients[2][MOST];
+    for (int k = 0; k < 2; k++) {
+        Room room = room_open(m->room, k ? 3 : 1, 0);
+        int param = rey_param_find(room.scene, m->param);
+        float start[MOST], tangent[MOST];
+        tangent_of(room, m, param, start, tangent);
+        rey_render_def def = def_make(32, 9, 2);
+        def.terms = 0;
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, images[k], NULL, NULL));
+        ok(room, rey_vjp(room.scene, &def, (rey_selection){&param, 1}, images[0], gradients[k], NULL, NULL));
+        room_close(room);
+    }
+    assert_memory_equal(images[0], images[1], sizeof images[0]);
+    assert_memory_equal(gradients[0], gradients[1], 16 * sizeof gradients[0][0]);
+}
+
+int main(void) {
+    struct CMUnitTest tests[2 * COUNT_OF(motions) + 1];
+    int count = 0;
+    for (int i = 0; i < COUNT_OF(motions); i++) {
+        void *motion = (void *)(uintptr_t)(motions + i);
+        tests[count++] = (struct CMUnitTest){motions[i].param, test_motion, NULL, NULL, motion};
+        tests[count++] = (struct CMUnitTest){motions[i].param, test_modes, NULL, NULL, motion};
+    }
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_bits);
+    return _cmocka_run_group_tests("boundary", tests, (size_t)count, write_pictures, remove_pictures);
+}
