@@ -14,7 +14,7 @@
 NAMES(rey_loss_name, "l1", "l2", "relative_l2", "log_l2")
 NAMES(rey_optimizer_name, "adam", "sgd")
 NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
-NAMES(rey_parameterisation_name, "identity", "log", "logit")
+NAMES(rey_parameterisation_name, "identity", "log", "logit", "rigid")
 NAMES(rey_moment_name, "per_entry", "shared")
 
 // Letters, digits and underscores, the first no digit.

@@ -16,6 +16,7 @@ typedef enum Parameterisation {
     PARAMETERISATION_IDENTITY,
     PARAMETERISATION_LOG,
     PARAMETERISATION_LOGIT,
+    PARAMETERISATION_RIGID, // of poses: a rotation vector and a shift from the start
     PARAMETERISATION_COUNT
 } Parameterisation;
 typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_COUNT } MomentKind;

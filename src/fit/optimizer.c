@@ -1,6 +1,8 @@
 // optimizer.c: Adam [kingma2015 algorithm 1] and gradient descent with momentum, in double precision.
 #include "fit/optimizer.h"
 
+#include "fit/rigid.h"
+
 #include <math.h>
 
 static const double PI_VALUE = 3.14159265358979323846;
@@ -60,6 +62,11 @@ void rey_unknowns_begin(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
         for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            if (p->parameterisation == PARAMETERISATION_RIGID) {
+                u->variable[i] = 0;
+                u->value[i] = u->start[i];
+                continue;
+            }
             u->variable[i] = to_variable(p, fmin(fmax((double)u->start[i], p->low), p->high));
             u->start[i] = u->value[i] = round_inside(p, to_value(p, u->variable[i]));
         }
@@ -107,8 +114,41 @@ static void sgd_step(const JobOptimizer *o, const Unknown *p, double *variable, 
 // Polynomial-decay averaging [shamir2013 section 4]: needs no horizon, and forgets the start.
 static void average_values(const JobOptimizer *o, Unknowns *u, int iteration) {
     double weight = (o->average + 1) / (iteration + 1 + o->average);
-    for (int64_t i = 0; i < u->count; i++) {
-        u->average[i] += weight * ((double)u->value[i] - u->average[i]);
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        bool rigid = p->parameterisation == PARAMETERISATION_RIGID; // means of rotations are none
+        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            u->average[i] += weight * ((rigid ? u->variable[i] : (double)u->value[i]) - u->average[i]);
+        }
+    }
+}
+
+// Replaces the gradient in the values by that in the variables; returns the square of its length.
+static double to_variable_gradient(const Unknowns *u, const Unknown *p, double *g) {
+    double square = 0;
+    if (p->parameterisation == PARAMETERISATION_RIGID) {
+        rey_rigid_gradient(u->start + p->offset, u->variable + p->offset, g);
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        g[i] *= value_derivative(p, u->variable[p->offset + i]);
+        square += g[i] * g[i];
+    }
+    return square;
+}
+
+// The values of one parameter after its variables moved; variables stay where their values are within the bounds.
+static void follow_variables(Unknowns *u, const Unknown *p) {
+    double *variable = u->variable + p->offset;
+    if (p->parameterisation == PARAMETERISATION_RIGID) {
+        rey_rigid_pose(u->start + p->offset, variable, u->value + p->offset);
+        return;
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        double x = fmin(fmax(to_value(p, variable[i]), p->low), p->high);
+        if (x <= p->low || x >= p->high) {
+            variable[i] = to_variable(p, x);
+        }
+        u->value[p->offset + i] = round_inside(p, x);
     }
 }
 
@@ -118,22 +158,13 @@ double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
         double *variable = u->variable + p->offset, *g = u->gradient + p->offset;
         double rate = (p->learning_rate > 0 ? p->learning_rate : o->learning_rate) * factor;
-        for (int64_t i = 0; i < p->count; i++) {
-            g[i] *= value_derivative(p, variable[i]);
-            norm += g[i] * g[i];
-        }
+        norm += to_variable_gradient(u, p, g);
         if (o->kind == OPTIMIZER_ADAM) {
             adam_step(o, p, variable, u->first + p->offset, u->second + p->offset, g, rate, iteration);
         } else {
             sgd_step(o, p, variable, u->first + p->offset, g, rate);
         }
-        for (int64_t i = 0; i < p->count; i++) {
-            double x = fmin(fmax(to_value(p, variable[i]), p->low), p->high);
-            if (x <= p->low || x >= p->high) {
-                variable[i] = to_variable(p, x);
-            }
-            u->value[p->offset + i] = round_inside(p, x);
-        }
+        follow_variables(u, p);
     }
     average_values(o, u, iteration);
     return sqrt(norm);
@@ -142,6 +173,10 @@ double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
 void rey_unknowns_take_average(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        if (p->parameterisation == PARAMETERISATION_RIGID) {
+            rey_rigid_pose(u->start + p->offset, u->average + p->offset, u->value + p->offset);
+            continue;
+        }
         for (int64_t i = p->offset; i < p->offset + p->count; i++) {
             u->value[i] = round_inside(p, u->average[i]);
         }

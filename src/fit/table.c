@@ -59,8 +59,21 @@ static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t cou
     return result;
 }
 
+// Largest error of an entry over the largest entry: of poses, whose entries belong together.
+static double pose_error(const FitRow *row) {
+    double worst = 0, largest = 0;
+    for (int64_t i = 0; i < row->count; i++) {
+        worst = fmax(worst, fabs((double)row->found[i] - (double)row->truth[i]));
+        largest = fmax(largest, fabs((double)row->truth[i]));
+    }
+    return worst / largest;
+}
+
 static double worst_error(const FitRow *row) {
     double worst = 0;
+    if (row->dims == 2 && row->shape[0] == 4 && row->shape[1] == 4) {
+        return pose_error(row);
+    }
     for (int64_t i = 0; i < row->count; i++) {
         double truth = (double)row->truth[i], off = fabs((double)row->found[i] - truth);
         worst = fmax(worst, truth != 0 ? off / fabs(truth) : off); // an entry of truth 0 counts absolutely

@@ -1,5 +1,6 @@
 // unknowns.c: the job's parameters found in the scene, with their bounds and start values.
 #include "fit/optimizer.h"
+#include "fit/rigid.h"
 #include "io/image.h"
 
 #include <math.h>
@@ -137,8 +138,12 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (result) {
         return result;
     }
-    if ((info.terms & ~REY_TERM_TERMINATOR) != REY_TERM_INTERIOR) { // jumps are refused when a path meets one
+    const int known = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+    if (!info.terms || (info.terms & ~REY_TERM_TERMINATOR & ~known)) { // jumps are refused when a path meets one
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
+    }
+    if (p->parameterisation == PARAMETERISATION_RIGID && info.count != RIGID_VALUES) {
+        return fail_at(job, p, info.name, "parameterisation rigid is for poses, such as NAME.to_world");
     }
     for (size_t i = 0; i < u->items.count; i++) {
         if (ARRAY_AT(u->items, Unknown, i).param == param) {
