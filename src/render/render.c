@@ -353,6 +353,9 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     if (result == REY_OK) {
         result = map_selection(r, selection);
     }
+    if (result != REY_OK) {
+        return result;
+    }
     r->job.spp = set_spp(r);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
     for (int i = 0; i < BOUNDARY_TERMS && result == REY_OK; i++) {
