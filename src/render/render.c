@@ -7,6 +7,7 @@
 #include "render/motion.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
+#include "render/terms.h"
 #include "render/update.h"
 #include "scene/sink.h"
 
@@ -219,49 +220,6 @@ static int64_t picture_floats(const Render *r) {
 
 // ---- derivatives -------------------------------------------------------------------------------------------------
 
-// Whether the kernels know the derivative of the path integrand with respect to a parameter.
-static bool has_interior(const rey_scene *scene, const rey_render_def *def, const Param *p) {
-    return rey_motion_known(scene, scene->view.sensors + def->sensor, p) || p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0 || p->emitter >= 0;
-}
-
-// Refuses parameters whose derivative would lack a term; collects the terms that they need.
-static rey_result check_terms(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
-    const int available = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
-    if (scene->view.drops) {
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                        "with hide_emitters, 'path' drops light of a surface that lets a part of it pass, and what it "
-                        "drops has no derivative: 'volpath' drops none");
-    }
-    for (int i = 0; i < selection.count; i++) {
-        rey_param_info info;
-        rey_result result = rey_param_get_info(scene, selection.params[i], &info);
-        if (result != REY_OK) {
-            return result;
-        }
-        if (!info.terms) {
-            return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
-        }
-        bool interior = has_interior(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
-        int missing = info.terms & ~(available | (interior ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0));
-        if (missing && !def->terms) {
-            int bit = missing & -missing;
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
-                            rey_term_name(bit), info.why, interior ? ". --terms interior gives the part that does" : "");
-        }
-        if (missing && !interior) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
-                            info.why);
-        }
-        *needed |= info.terms;
-    }
-    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
-        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
-    }
-    return REY_OK;
-}
-
 // Where the values of each texture, to_uv, shape's normals, mesh attribute and emitter's place begin in the compact vectors of the selection.
 static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
@@ -345,7 +303,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     }
     int needed = 0;
     if (result == REY_OK) {
-        result = check_terms(scene, def, selection, &needed);
+        result = rey_terms_check(scene, def, selection, &needed);
     }
     if (result == REY_OK && rey_traces_particles(scene)) {
         result = rey_particles_begin(r, selection);

@@ -1,0 +1,55 @@
+// terms.c: which terms a selection needs, and which exist.
+#include "render/terms.h"
+
+#include "render/motion.h"
+
+// The terms of a parameter's derivative that exist.
+static int terms_known(const rey_scene *scene, const rey_render_def *def, const Param *p) {
+    const int boundaries = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+    if (rey_motion_known(scene, scene->view.sensors + def->sensor, p)) {
+        return REY_TERM_INTERIOR | REY_TERM_TERMINATOR | boundaries; // TERMINATOR is looked for on the way
+    }
+    if (p->emitter >= 0) {
+        return REY_TERM_INTERIOR | REY_TERM_INDIRECT;
+    }
+    bool interior = p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0;
+    return interior ? REY_TERM_INTERIOR | REY_TERM_TERMINATOR : 0;
+}
+
+// Refuses parameters whose derivative would lack a term; collects the terms that they need.
+rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
+    if (scene->view.drops) {
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
+                        "with hide_emitters, 'path' drops light of a surface that lets a part of it pass, and what it "
+                        "drops has no derivative: 'volpath' drops none");
+    }
+    for (int i = 0; i < selection.count; i++) {
+        rey_param_info info;
+        rey_result result = rey_param_get_info(scene, selection.params[i], &info);
+        if (result != REY_OK) {
+            return result;
+        }
+        if (!info.terms) {
+            return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
+        }
+        int known = terms_known(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
+        int missing = info.terms & ~known;
+        bool interior = known & REY_TERM_INTERIOR;
+        if (missing && !def->terms) {
+            int bit = missing & -missing;
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
+                            rey_term_name(bit), info.why, interior ? ". --terms interior gives the part that does" : "");
+        }
+        if (missing && !interior) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
+                            info.why);
+        }
+        *needed |= info.terms;
+    }
+    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
+        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
+    }
+    return REY_OK;
+}
