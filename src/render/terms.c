@@ -5,15 +5,12 @@
 
 // The terms of a parameter's derivative that exist.
 static int terms_known(const rey_scene *scene, const rey_render_def *def, const Param *p) {
-    const int boundaries = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
-    if (rey_motion_known(scene, scene->view.sensors + def->sensor, p)) {
-        return REY_TERM_INTERIOR | REY_TERM_TERMINATOR | boundaries; // TERMINATOR is looked for on the way
+    const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
+    if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) {
+        bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
+        return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
     }
-    if (p->emitter >= 0) {
-        return REY_TERM_INTERIOR | REY_TERM_INDIRECT;
-    }
-    bool interior = p->texture >= 0 || p->to_uv >= 0 || p->normals >= 0 || p->attribute >= 0;
-    return interior ? REY_TERM_INTERIOR | REY_TERM_TERMINATOR : 0;
+    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
 }
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.

@@ -30,7 +30,7 @@ static const Motion motions[] = {
     {"boundary_bulb.xml", "gem.positions", SHEAR, {0, 0, 0}, 0.02, 1},
     {"boundary_bulb.xml", "bulb.position", ADD, {0, 0, 0}, 0.03, 1},
     {"boundary_bulb.xml", "camera.to_world", SHIFT, {0, 0.5f, 1}, 0.02, 1},
-    {"boundary_sky.xml", "card.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 2},
+    {"boundary_sky.xml", "card.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 4},
     {"boundary_sky.xml", "camera.to_world", SHIFT, {1, 0, 0}, 0.02, 1},
     {"boundary_bounce.xml", "card.to_world", SHIFT, {1, 0, 0}, 0.06, 24},
 };
