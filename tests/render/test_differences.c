@@ -253,8 +253,8 @@ static bool compare(Room room, rey_scene *copy, int param, bool strict, Score *s
         judge(room, &m, &again, rms, score);
         return true;
     }
-    // What turns normals or lights is not replayed.
-    bool may = !strict && (!replays || is_glass(room, param));
+    // What turns normals or lights is not replayed, and turned lights are not made for large steps.
+    bool may = strict ? m.count == POSE : !replays || is_glass(room, param);
     score->left_out += may;
     return may;
 }
