@@ -23,8 +23,8 @@ KFN Vec2 constant_uv(const SceneView *scene, const EmitterRecord *e, Vec3 d) {
     return (Vec2){f_set(0), f_set(0)};
 }
 
-KFN Float constant_pdf(const SceneView *scene, const EmitterRecord *e, Vec2 uv) {
-    UNUSED(scene), UNUSED(e), UNUSED(uv);
+KFN Float constant_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv) {
+    UNUSED(scene), UNUSED(e), UNUSED(d), UNUSED(uv);
     return f_set(INV_FOUR_PI);
 }
 

@@ -111,11 +111,11 @@ KFN Vec2 environment_uv(const SceneView *scene, const EmitterRecord *e, Vec3 d) 
     }
 }
 
-KFN Float environment_pdf(const SceneView *scene, const EmitterRecord *e, Vec2 uv) {
+KFN Float environment_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv) {
     switch (e->kind) {
 #define EMITTER_CASE(ENUM, prefix, ...)                                                                                \
     case EMITTER_##ENUM:                                                                                               \
-        return prefix##_pdf(scene, e, uv);
+        return prefix##_pdf(scene, e, d, uv);
     default:
 #include "emitter/kinds.inl"
 #undef EMITTER_CASE

@@ -19,44 +19,68 @@ static inline double envmap_luminance(const float *texel) {
     return fmax(0, 0.212671 * (double)texel[0] + 0.715160 * (double)texel[1] + 0.072169 * (double)texel[2]);
 }
 
-// Mass of the cell between texel columns x, x + 1 and rows y, y + 1: mean luminance times the sine of its latitude.
-static inline double envmap_cell_mass(const TextureNode *t, const float *texels, int64_t x, int64_t y) {
-    int64_t right = (x + 1) % t->width;
-    double sum = envmap_luminance(texels + 3 * (y * t->width + x)) + envmap_luminance(texels + 3 * (y * t->width + right)) +
-                 envmap_luminance(texels + 3 * ((y + 1) * t->width + x)) +
-                 envmap_luminance(texels + 3 * ((y + 1) * t->width + right));
-    return 0.25 * sum;
+// Of the latitude in the middle of a row of cells.
+static inline double envmap_row_sine(int64_t y, int64_t rows) {
+    return sin(3.14159265358979323846 * ((double)y + 0.5) / (double)rows);
+}
+
+// Luminance of a row of texels; the picture has one row more than the table, and that one is never kept.
+static inline float envmap_row_luminance(const float *texels, const float *kept, bool last, int64_t x) {
+    return last ? (float)envmap_luminance(texels + 3 * x) : kept[x];
+}
+
+// Masses of the cells, each between texel columns x, x + 1 and rows y, y + 1: their mean luminance, in place of the
+// luminance of its first texel, which `cells` holds. Returns their sum, weighted by the sine of the latitude.
+static inline double envmap_cell_masses(const float *last_row, int64_t width, int64_t rows, float *cells) {
+    double total = 0;
+    for (int64_t y = 0; y < rows; y++) {
+        float *row = cells + y * width;
+        const float *below = row + width;
+        bool last = y + 1 == rows;
+        double sum = 0, first = (double)row[0] + (double)envmap_row_luminance(last_row, below, last, 0), left = first;
+        for (int64_t x = 0; x < width; x++) {
+            double right = first;
+            if (x + 1 < width) {
+                right = (double)row[x + 1] + (double)envmap_row_luminance(last_row, below, last, x + 1);
+            }
+            row[x] = (float)(0.25 * (left + right));
+            sum += (double)row[x];
+            left = right;
+        }
+        total += sum * envmap_row_sine(y, rows);
+    }
+    return total;
 }
 
 // The distribution: luminance times sine, with a share for every direction, because the derivative with respect to a
-// black texel is not 0.
+// black texel is not 0. Every texel is looked at once.
 static inline void envmap_distribution(const SceneView *view, const EmitterRecord *e) {
     const double uniform_share = 0.02;
     const TextureNode *t = view->textures + e->slot[SLOT(Envmap, data)];
     const float *texels = view->theta + t->theta;
     int64_t width = t->width, rows = t->height - 1;
-    float *row_cdf = view->tables + e->table + ENVMAP_DISTRIBUTION, *cell_cdf = row_cdf + rows;
-    double total = 0, sines = 0;
+    float *row_cdf = view->tables + e->table + ENVMAP_DISTRIBUTION, *cells = row_cdf + rows;
+    double sines = 0, row_sum = 0;
+    for (int64_t i = 0; i < rows * width; i++) {
+        cells[i] = (float)envmap_luminance(texels + 3 * i);
+    }
+    double total = envmap_cell_masses(texels + 3 * rows * width, width, rows, cells);
     for (int64_t y = 0; y < rows; y++) {
-        double sine = sin(3.14159265358979323846 * ((double)y + 0.5) / (double)rows);
-        sines += sine * (double)width;
-        for (int64_t x = 0; x < width; x++) {
-            total += sine * envmap_cell_mass(t, texels, x, y);
-        }
+        sines += envmap_row_sine(y, rows) * (double)width;
     }
     double floor = total > 0 ? uniform_share * total / sines : 1;
-    double row_sum = 0, all = total > 0 ? total * (1 + uniform_share) : sines;
+    double all = total > 0 ? total * (1 + uniform_share) : sines;
     for (int64_t y = 0; y < rows; y++) {
-        double sine = sin(3.14159265358979323846 * ((double)y + 0.5) / (double)rows);
+        float *row = cells + y * width;
         double mass = 0, sum = 0;
         for (int64_t x = 0; x < width; x++) {
-            mass += envmap_cell_mass(t, texels, x, y) + floor;
+            mass += (double)row[x] + floor;
         }
         for (int64_t x = 0; x < width; x++) {
-            sum += envmap_cell_mass(t, texels, x, y) + floor;
-            cell_cdf[y * width + x] = x + 1 == width ? 1 : (float)(sum / mass);
+            sum += (double)row[x] + floor;
+            row[x] = x + 1 == width ? 1 : (float)(sum / mass);
         }
-        row_sum += mass * sine;
+        row_sum += mass * envmap_row_sine(y, rows);
         row_cdf[y] = y + 1 == rows ? 1 : (float)(row_sum / all);
     }
 }
@@ -74,16 +98,26 @@ static inline bool envmap_follow(const SceneView *view, const EmitterRecord *e) 
 
 // ---- kernels -----------------------------------------------------------------------------------------------------
 
-// u periodic, v from the +y pole down, of a local direction.
-KFN Vec2 envmap_local_uv(Vec3 v) {
-    Float u = f_atan2(v.x, -v.z) * INV_TWO_PI;
-    return (Vec2){u - f_floor(u), f_acos(v.y) * INV_PI};
-}
-
-// Where the picture is read along a world direction.
+// The picture is read along the line of a direction in its own space, whatever the direction's length there: poses may
+// scale and shear. (Mitsuba 3.9.1 takes acos of y without normalising, and its light samples have that length: with
+// such poses it finds other radiance than it samples. With rotations and mirrors both agree.)
+// u periodic, v from the +y pole down: u = atan2(x, -z) / 2 pi, v = atan2(|(x, z)|, y) / pi.
 KFN Vec2 envmap_uv(const SceneView *scene, const EmitterRecord *e, Vec3 d) {
     Light l = light_alone(e, i_set(0));
-    return envmap_local_uv(light_direction_to_local(scene, &l, d));
+    Vec3 y = light_direction_to_local(scene, &l, d);
+    Float u = f_atan2(y.x, -y.z) * INV_TWO_PI;
+    return (Vec2){u - f_floor(u), f_atan2(f_sqrt(y.x * y.x + y.z * y.z), y.y) * INV_PI};
+}
+
+// |det A^-1| of the pose A.
+KFN real envmap_shrinking(const SceneView *scene, const EmitterRecord *e) {
+    real b[12];
+    for (int k = 0; k < 12; k++) {
+        b[k] = (real)scene->tables[e->table + k];
+    }
+    real det = b[0] * (b[5] * b[10] - b[6] * b[9]) - b[1] * (b[4] * b[10] - b[6] * b[8]) +
+               b[2] * (b[4] * b[9] - b[5] * b[8]);
+    return det < 0 ? -det : det;
 }
 
 // Columns are texel centres and periodic, rows are nodes from pole to pole [Mitsuba's convention].
@@ -148,11 +182,13 @@ KFN void envmap_adj(const SceneView *scene, const Light *l, TexCoord uv, Float d
 KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                          Sink *sink, Mask m) {
     UNUSED(ref), UNUSED(distance);
-    // u = atan2(x, -z) / 2 pi, v = acos(y) / pi
+    // u = atan2(x, -z) / 2 pi, v = atan2(ring, y) / pi, ring = |(x, z)|
     Vec3 y = light_direction_to_local(scene, l, d);
-    Float ring = f_max(y.x * y.x + y.z * y.z, f_set(1e-12f));
-    Float du = move->uv.x * INV_TWO_PI / ring, dv = -move->uv.y * INV_PI * f_safe_rcp(f_safe_sqrt(1.0f - y.y * y.y));
-    light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, v3(-du * y.z, dv, du * y.x), sink, m);
+    Float ring2 = f_max(y.x * y.x + y.z * y.z, f_set(1e-12f)), ring = f_sqrt(ring2);
+    Float du = move->uv.x * INV_TWO_PI / ring2, dv = move->uv.y * INV_PI / (ring2 + y.y * y.y);
+    Float dring = dv * y.y / ring;
+    Vec3 dy = v3(dring * y.x - du * y.z, -dv * ring, dring * y.z + du * y.x);
+    light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, dy, sink, m);
 }
 
 KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
@@ -168,22 +204,29 @@ KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, 
     f_sincos(s.uv.y * PI, &sin_theta, &cos_theta);
     f_sincos(s.uv.x * TWO_PI, &sin_phi, &cos_phi);
     Vec3 v = v3(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
-    const float *r = scene->tables + l->e->table; // transpose of the inverse rotation
-    s.d = v3(r[0] * v.x + r[4] * v.y + r[8] * v.z, r[1] * v.x + r[5] * v.y + r[9] * v.z,
-             r[2] * v.x + r[6] * v.y + r[10] * v.z);
+    // d = A v / |A v|
+    const float *a = scene->theta + l->e->slot[SLOT(Envmap, to_world)];
+    s.d = v3(a[0] * v.x + a[1] * v.y + a[2] * v.z, a[4] * v.x + a[5] * v.y + a[6] * v.z,
+             a[8] * v.x + a[9] * v.y + a[10] * v.z);
+    Float length = v3_length(s.d);
+    s.d = v3_scale(s.d, f_safe_rcp(length));
     s.distance = f_set(2 * (real)scene->bounds_radius);
-    s.pdf = density * f_safe_rcp(2.0f * PI * PI * sin_theta);
+    // Solid angles: d omega_v = |det A^-1| |A v|^3 d omega_d.
+    Float stretch = length * length * length * envmap_shrinking(scene, l->e);
+    s.pdf = density * stretch * f_safe_rcp(2.0f * PI * PI * sin_theta);
     s.valid = m_gt(s.pdf, f_set(0));
     s.prim = i_set(0);
     return s;
 }
 
-KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec2 uv) {
+KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv) {
     const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
-    Float sin_theta, cos_theta;
-    f_sincos(uv.y * PI, &sin_theta, &cos_theta);
+    Light l = light_alone(e, i_set(0));
+    // The same with y = A^-1 d = v / |A v|: |A v|^3 / sin = 1 / (|y|^2 |(x, z)|).
+    Vec3 y = light_direction_to_local(scene, &l, d);
+    Float ring2 = y.x * y.x + y.z * y.z;
     uv.x = uv.x - 0.5f / (real)t->width;
     uv.x = uv.x - f_floor(uv.x);
-    return grid_pdf(scene, e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, uv) *
-           f_safe_rcp(2.0f * PI * PI * sin_theta);
+    return grid_pdf(scene, e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, uv) * envmap_shrinking(scene, e) *
+           f_safe_rcp(2.0f * PI * PI * f_sqrt(ring2) * (ring2 + y.y * y.y));
 }

@@ -111,7 +111,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
         v.m = v.m & m_gt(v.pdf, f_set(PDF_VIEWED));
     }
     Vec2 uv = environment_uv(scene, e, v.d);
-    Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, uv) * e->weight));
+    Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, v.d, uv) * e->weight));
     Spec l = spec_scale(emitter_eval(scene, e, texcoord(uv, NULL), f_set(1)), mis);
     if (!t->derivative) {
         slot_add(t, v.slot, spec_mul(v.beta, l), v.m);

@@ -158,6 +158,19 @@ static int32_t add_pose(KindCase *c, const double rotation[9], const double posi
     return at;
 }
 
+// A pose of what lies beyond the scene: it turns, scales, shears and sometimes mirrors.
+static int32_t add_sky_pose(KindCase *c, Random *r, const double rotation[9]) {
+    const double zero[3] = {0}, shear = between(r, -0.4, 0.4), scale[3] = {between(r, 0.4, 2.5), between(r, 0.4, 2.5),
+                                                                           uniform(r) < 0.5 ? -1.3 : 0.7};
+    double m[9];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            m[3 * i + j] = (rotation[3 * i + j] + (j == 1 ? shear * rotation[3 * i] : 0)) * scale[j];
+        }
+    }
+    return add_pose(c, m, zero);
+}
+
 static int32_t add_image(KindCase *c, Random *r, int owner) {
     int width = 3 + below(r, 6), height = 2 + below(r, 5), id = c->texture_count++;
     c->textures[id] = (TextureNode){.kind = TEXTURE_BITMAP, .width = width, .height = height, .channels = 3,
@@ -190,7 +203,7 @@ static int add_blackbody(KindCase *c, Random *r, int owner) {
 
 static void add_rows(KindCase *c, Random *r, bool textured, const double rotation[9]) {
     const EmitterKind *kind = rey_emitter_kinds + c->emitter.kind;
-    const double zero[3] = {0}, position[3] = {0.3, -0.2, 0.5};
+    const double position[3] = {0.3, -0.2, 0.5};
     for (int i = 0; i < kind->param_count; i++) {
         const EmitterParam *row = kind->params + i;
         int32_t *slot = &c->emitter.slot[i];
@@ -214,7 +227,7 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
             add_fixed(c, position, 3);
             break;
         default:
-            *slot = add_pose(c, rotation, row->type == EMITTER_PARAM_POSE ? position : zero);
+            *slot = row->type == EMITTER_PARAM_POSE ? add_pose(c, rotation, position) : add_sky_pose(c, r, rotation);
         }
         c->emitter.places |= (row->type >= EMITTER_PARAM_POSITION) << i;
     }

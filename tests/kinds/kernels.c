@@ -343,7 +343,7 @@ static void run_light_pdf(const KindCase *c, int n, LightDraw *draws) {
         LightSample s = {d, f_set(1), f_set(INV_FOUR_PI), {f_set(0), f_set(0)}, i_set(0), m_set(true)};
         if (e->shape < 0) {
             s.uv = environment_uv(&view.scene, e, d);
-            s.pdf = environment_pdf(&view.scene, e, s.uv);
+            s.pdf = environment_pdf(&view.scene, e, d, s.uv);
         } else {
             const ShapeRecord *shape = view.shapes + e->shape;
             Hit hit;
