@@ -4,7 +4,6 @@
 
 #include "base/context.h"
 #include "io/image.h"
-#include "render/load_values.h"
 
 #include <stdio.h>
 #include <string.h>

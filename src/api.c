@@ -1,7 +1,6 @@
 // api.c: the parts of the public interface that belong to no module: they check arguments and hold no logic.
 #include "io/mitsuba.h"
 #include "io/save.h"
-#include "render/load_values.h"
 #include "render/update.h"
 #include "scene/values.h"
 

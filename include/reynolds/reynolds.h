@@ -100,6 +100,13 @@ REY_API void rey_scene_destroy(rey_scene *scene);
  * beside it into a folder named after the file without its extension, plus "_data". */
 REY_API rey_result rey_scene_save(const rey_scene *scene, const char *path);
 
+/* Gives the scene's parameters the values that they have in another scene file, matched by name; mostly one that
+ * rey_scene_save wrote after this scene was changed, which then renders the same bits. It is read without defines.
+ * Parameters that the file lacks keep their values. One that the scene lacks, or that has another shape in the file, is
+ * REY_ERROR_PARAM; a file that does not load fails as rey_scene_load does. Both leave the scene as it was. No other
+ * thread may use the scene's context meanwhile. */
+REY_API rey_result rey_scene_load_values(rey_scene *scene, const char *path);
+
 REY_API int rey_scene_sensor_count(const rey_scene *scene);
 /* Size in pixels of the picture that a sensor delivers (the crop window's size). */
 REY_API rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, int *height);

@@ -4,7 +4,6 @@
 #include "base/parallel.h"
 #include "fit/report.h"
 #include "io/file.h"
-#include "render/load_values.h"
 
 #include <locale.h>
 #include <stdio.h>

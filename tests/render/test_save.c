@@ -1,6 +1,5 @@
 // test_save.c: a scene that is saved and loaded again renders the same picture, bit for bit.
 #include "io/image.h"
-#include "render/load_values.h"
 
 #include <dirent.h>
 #include <setjmp.h>
