@@ -1,11 +1,11 @@
-// Every kernel width gives the same values, densities, samples and adjoints: within 2e-5 of each other, or within what
-// rounding the inputs to float does to the exact value, measured in double, where that is more (narrow lobes,
-// cancellation).
+// Every kernel width gives the same values, densities, samples and adjoints: within 2e-5 of each other (adjoints about
+// turned normals: 8e-5), or within what rounding the inputs to float does to the exact value, measured in double, where
+// that is more (narrow lobes, cancellation).
 #include "cases.h"
 
 #include "base/parallel.h"
 
-enum { CASES = 300, N = 33, INPUTS = 8, NUMBERS = 13, NUDGES = 6 }; // N: no multiple of a width
+enum { CASES = 300, N = 33, INPUTS = 8, NUMBERS = 13, NUDGES = 6, SHIFTS = 12 }; // N: no multiple of a width
 
 static const KindKernels *const exact = &kind_kernels_double;
 static const KindKernels *const widths[] = {&kind_kernels_w1, &kind_kernels_w8, &kind_kernels_w16};
@@ -32,6 +32,37 @@ static double nudge(Random *r, double x) {
     return x * (1 + between(r, -2.4e-7, 2.4e-7)) + between(r, -6e-8, 6e-8);
 }
 
+// At the end of its range a value moves inwards: all texels of 1 are a little less than 1 once their weights are rounded.
+static double nudge_within(Random *r, double x, double low, double high) {
+    double d = x * between(r, -2e-7, 2e-7);
+    return x + d < low || x + d > high ? fmin(fmax(x - d, low), high) : x + d;
+}
+
+// Where a direction grazes a turned surface, beyond which the value jumps, derivatives are differences of terms as large
+// as f / cos in the turned frame, which is not known here: they may be anything.
+static void free_grazing(const KindCase *c, Random r, const Query *q, double (*exactly)[NUMBERS],
+                         double (*moved)[NUMBERS]) {
+    for (int k = 0; k < SHIFTS && case_turns(c); k++) {
+        Query at[N];
+        double f[N][3], pdf[N];
+        memcpy(at, q, sizeof at);
+        for (int i = 0; i < N; i++) {
+            for (int j = 0; j < 3; j++) {
+                at[i].wi[j] += between(&r, -5e-4, 5e-4);
+                at[i].wo[j] += between(&r, -5e-4, 5e-4);
+            }
+        }
+        exact->eval(c, N, at, f, pdf);
+        for (int i = 0; i < N; i++) {
+            double here = exactly[i][0] + exactly[i][1] + exactly[i][2], there = f[i][0] + f[i][1] + f[i][2];
+            bool jumps = fabs(there - here) > 0.5 * fmax(there, here);
+            for (int j = 4; j < NUMBERS && jumps; j++) {
+                moved[i][j] = INFINITY;
+            }
+        }
+    }
+}
+
 // How far the numbers move when inputs and parameters move by float roundings; infinite where a jump is near.
 static void measure_conditioning(const KindCase *c, Random *r, const Query *q, const double *tangent,
                                  double (*exactly)[NUMBERS], double (*moved)[NUMBERS]) {
@@ -41,7 +72,7 @@ static void measure_conditioning(const KindCase *c, Random *r, const Query *q, c
         KindCase near = *c;
         Query at[N];
         for (int i = 0; i < c->theta_count; i++) {
-            near.theta[i] = fmin(fmax(c->theta[i] * (1 + between(r, -2e-7, 2e-7)), c->low[i]), c->high[i]);
+            near.theta[i] = nudge_within(r, c->theta[i], c->low[i], c->high[i]);
         }
         for (int i = 0; i < N; i++) {
             at[i] = q[i];
@@ -59,6 +90,7 @@ static void measure_conditioning(const KindCase *c, Random *r, const Query *q, c
             }
         }
     }
+    free_grazing(c, *r, q, exactly, moved);
 }
 
 static double to_float(double x) {
@@ -101,21 +133,21 @@ static int check_values(const KindCase *c, Random *r, int width_count) {
     static const char *const names[NUMBERS] = {"f.r",   "f.g",   "f.b",   "pdf",   "dwi.x", "dwi.y",  "dwi.z",
                                                "dwo.x", "dwo.y", "dwo.z", "duv.x", "duv.y", "forward"};
     Query q[N];
-    double tangent[CASE_THETA], exactly[N][NUMBERS], moved[N][NUMBERS], out[3][N][NUMBERS];
+    double tangent[CASE_THETA], exactly[N][NUMBERS], moved[N][NUMBERS], out[3][N][NUMBERS], sums[N];
     random_queries(c, r, q);
     for (int i = 0; i < CASE_THETA; i++) {
         tangent[i] = to_float(between(r, -1, 1));
     }
     run(exact, c, q, tangent, exactly);
     measure_conditioning(c, r, q, tangent, exactly, moved);
-    double sums[N];
     sum_of_parts(c, q, tangent, sums);
     for (int w = 0; w < width_count; w++) {
         run(widths[w], c, q, tangent, out[w]);
     }
     int failures = 0;
     bool turns = case_turns(c);
-    double roundings = turns ? 80 : 8; // turning directions into another frame rounds them several times
+    // Turning directions into another frame rounds them several times.
+    double roundings = turns ? 80 : 8, relative = turns ? 8e-5 : 2e-5;
     for (int i = 0; i < N; i++) {
         for (int j = 0; j < NUMBERS; j++) {
             // Components of one adjoint cancel against each other: the largest sets the scale.
@@ -142,7 +174,7 @@ static int check_values(const KindCase *c, Random *r, int width_count) {
             for (int k = 4; k < 10 && first >= 10 && turns; k++) {
                 scale = fmax(scale, 8 * fabs(exactly[i][k]));
             }
-            double tolerance = 2e-5 * scale + roundings * free_play + 1e-12;
+            double tolerance = (j < 4 ? 2e-5 : relative) * scale + roundings * free_play + 1e-12;
             for (int w = 0; w < width_count; w++) {
                 if (!(fabs(out[w][i][j] - out[0][i][j]) <= tolerance) ||
                     !(fabs(out[w][i][j] - exactly[i][j]) <= tolerance)) {
