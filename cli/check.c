@@ -49,6 +49,20 @@ static double room(const Work *w, const Direction *d, double sign) {
     return fmax(most, 0);
 }
 
+// Whether parameter k of a direction is a pose that turns, scales or shears: its translation, in the scene's units,
+// whatever they are, must not set the step of the other entries.
+static bool is_turning_pose(const Work *w, const Direction *d, int k) {
+    rey_param_info info;
+    bool turns = false;
+    if (rey_param_get_info(w->session.scene, d->params[k], &info) == REY_OK) {
+        const char *dot = strrchr(info.name, '.');
+        for (int64_t i = 0; dot && strcmp(dot, ".to_world") == 0 && i < info.count; i++) {
+            turns |= i % 4 != 3 && d->tangent[d->offsets[k] + i] != 0;
+        }
+    }
+    return turns;
+}
+
 // A step that moves the entries by about 10 % of their size (root mean square; at least 0.05, so that black moves too).
 // Samples jump where a moved lobe meets an edge, a noise in the differences of variance ~ 1/h that asks for a long
 // step; the error of the extrapolated difference, h^4 f^(5) / 480, is still below 1e-4 of f' for f ~ theta^-2. Replayed
@@ -57,11 +71,14 @@ static double natural_step(const Work *w, const Check *check) {
     const Direction *d = &check->direction;
     double squares = 0, largest = 0;
     int64_t moved = 0;
-    for (int64_t i = 0; i < d->offsets[d->count]; i++) {
-        if (d->tangent[i] != 0) {
-            squares += (double)w->original[i] * (double)w->original[i];
-            largest = fmax(largest, fabs((double)d->tangent[i]));
-            moved++;
+    for (int k = 0; k < d->count; k++) {
+        bool turns = is_turning_pose(w, d, k);
+        for (int64_t i = d->offsets[k]; i < d->offsets[k + 1]; i++) {
+            if (d->tangent[i] != 0 && !(turns && (i - d->offsets[k]) % 4 == 3)) {
+                squares += (double)w->original[i] * (double)w->original[i];
+                largest = fmax(largest, fabs((double)d->tangent[i]));
+                moved++;
+            }
         }
     }
     double scale = moved ? fmax(sqrt(squares / (double)moved), 0.05) : 1;
@@ -215,20 +232,27 @@ static bool agrees(const CheckResult *r) {
     return fabs(r->worst_z) <= check_z_threshold(r->tests) && fabs(r->sum_z) < 3;
 }
 
-// A difference that crosses kinks (texels' edges, a beam's border) is off in a few blocks whatever its order. Where an
-// eighth of the step agrees and is not drowned in noise, that was it.
-static rey_result try_short_step(Work *w, Check *check, bool central) {
-    if (agrees(&check->result) || check->result.relative_error > CHECK_WEAK || w->session.options->step > 0) {
+// A difference that crosses kinks (texels' edges, a beam's border, triangles that turn away from a light) is off in a few
+// blocks whatever its order. Where an eighth of the step agrees, or an eighth of that, and is not drowned in noise, that
+// was it.
+static rey_result try_short_steps(Work *w, Check *check, bool central) {
+    CheckResult first = check->result;
+    double fresh_z = check->fresh_z, h = check->step.h;
+    bool stands = agrees(&first);
+    if (stands || first.relative_error > CHECK_WEAK || w->session.options->step > 0) {
         return REY_OK;
     }
-    CheckResult first = check->result;
-    double fresh_z = check->fresh_z;
-    double h = check->step.h / 8;
-    Step step = central ? central_step(h) : one_sided_step(h, check->step.offsets[1] > 0 ? 1 : -1);
-    rey_result result = differences(w, check, &step);
-    if (agrees(&check->result) && check->result.relative_error <= CHECK_WEAK) {
-        check->step = step;
-    } else {
+    rey_result result = REY_OK;
+    for (int i = 0; i < CHECK_SHORTENINGS && !stands && !result; i++) {
+        h /= 8;
+        Step step = central ? central_step(h) : one_sided_step(h, check->step.offsets[1] > 0 ? 1 : -1);
+        result = differences(w, check, &step);
+        stands = agrees(&check->result) && check->result.relative_error <= CHECK_WEAK;
+        if (stands) {
+            check->step = step;
+        }
+    }
+    if (!stands) {
         check->result = first;
         check->fresh_z = fresh_z;
     }
@@ -280,7 +304,7 @@ static rey_result check_direction(Work *w, Check *check) {
         result = differences(w, check, &check->step);
     }
     if (!result) {
-        result = try_short_step(w, check, central);
+        result = try_short_steps(w, check, central);
     }
     if (!result && !agrees(&check->result)) {
         result = try_one_side(w, check, central);

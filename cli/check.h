@@ -4,7 +4,7 @@
 #include "check_stats.h"
 #include "cli.h"
 
-enum { CHECK_POINTS = 4, CHECK_HALVINGS = 6 };
+enum { CHECK_POINTS = 4, CHECK_HALVINGS = 6, CHECK_SHORTENINGS = 2 };
 
 // difference = sum of weights * picture(theta + offset * direction); rough: the same of lower order, whose distance from
 // the difference says how much the step matters; plain: the simplest quotient over the whole step.

@@ -200,6 +200,8 @@ static void check_all_lists_every_parameter(void **state) {
         refused += !strcmp(verdict, "refused");
         right += !strcmp(verdict, "ok");
         assert_string_not_equal(verdict, "WRONG");
+        // how far away a camera stands says nothing about how far it may turn
+        assert_true(strcmp(json_text(row, "param", ""), "camera.to_world") || json_value(row, "step", 1) < 0.0501);
     }
     for (const JsonNode *row = json_get(params, "parameters")->first; row; row = row->next) {
         listed++;
