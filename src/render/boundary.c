@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-enum { BOUNDARY_SHARDS = 8 };
+enum { BOUNDARY_SHARDS = 8, LEAST_SAMPLES = 1024 };
 
 static rey_result refuse(rey_scene *scene, int term, const char *what) {
     return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
@@ -57,6 +57,7 @@ rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int 
 void rey_boundary_free(Render *r, BoundaryPlan *plan) {
     rey_context *ctx = r->scene->ctx;
     rey_free(ctx, plan->edges);
+    rey_free(ctx, plan->fans);
     rey_free(ctx, plan->cdf);
     rey_free(ctx, plan->films);
     *plan = (BoundaryPlan){.shards = 0};
@@ -85,8 +86,11 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
         result = plan->films ? REY_OK : REY_ERROR_MEMORY;
     }
     int32_t edge_count = plan->job.edge_count;
-    plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp;
-    plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges, .cdf = plan->cdf,
+    // A sample of the primary term is two paths, and on a large mesh a fiftieth as noisy as one of the interior.
+    plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp / (term == REY_TERM_PRIMARY ? 4 : 1);
+    plan->samples = plan->samples < LEAST_SAMPLES ? LEAST_SAMPLES : plan->samples;
+    plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges,
+                              .fans = plan->fans, .cdf = plan->cdf,
                               .edge_count = edge_count,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;

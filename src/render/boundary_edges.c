@@ -114,7 +114,7 @@ static void mesh_point(const SceneView *view, const EdgeRecord *e, int32_t verte
 // Whether rays from the eye pass both triangles of a mesh's edge on one side, or the picture jumps there anyway.
 static bool can_jump(const SceneView *view, const double eye[4], const EdgeRecord *e, const double a[3], const double b[3],
                      const int32_t *corners) {
-    if (e->crease || e->opposite < 0) {
+    if (e->crease || e->opposite < 0 || e->fan_count > 0) {
         return true;
     }
     double side[2][3], n[3], d[3];
@@ -242,8 +242,9 @@ static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
 rey_result rey_boundary_all_edges(Render *r, BoundaryPlan *plan) {
     const SceneView *view = &r->scene->view;
     const double still = r->job.any_camera ? 1 : 0.25;
-    Array all = {0}, kept = {0}, weights = {0};
-    rey_result result = rey_edges_find(r->scene, &all);
+    Array all = {0}, fans = {0}, kept = {0}, weights = {0};
+    rey_result result = rey_edges_find(r->scene, &all, &fans);
+    plan->fans = fans.data;
     for (size_t i = 0; i < all.count && result == REY_OK; i++) {
         const EdgeRecord *e = &ARRAY_AT(all, EdgeRecord, i);
         double weight = e->kind == EDGE_MESH ? mesh_edge_weight(view, e) : round_edge_weight(view, e);
@@ -267,8 +268,9 @@ rey_result rey_boundary_edges(Render *r, BoundaryPlan *plan) {
     if (p.parallel) {
         eye[0] = m[2], eye[1] = m[6], eye[2] = m[10], eye[3] = 0;
     }
-    Array all = {0}, kept = {0}, weights = {0};
-    rey_result result = rey_edges_find(r->scene, &all);
+    Array all = {0}, fans = {0}, kept = {0}, weights = {0};
+    rey_result result = rey_edges_find(r->scene, &all, &fans);
+    plan->fans = fans.data;
     for (size_t i = 0; i < all.count && result == REY_OK; i++) {
         EdgeRecord e = ARRAY_AT(all, EdgeRecord, i);
         if (!edge_moves(r, &e)) {

@@ -96,20 +96,38 @@ static MeshView mesh_of(const SceneView *view, const ShapeRecord *shape) {
                       (const uint32_t *)view->welded + shape->welded, shape->vertex_count, shape->triangle_count};
 }
 
-rey_result rey_motion_gradient(const Render *r, double *gradient) {
+// The sums that the followers' normals are made of, one mesh behind the other; they stay the same for all sets.
+static rey_result find_normal_sums(Render *r) {
     const SceneView *view = &r->scene->view;
+    size_t n = 0;
     for (int64_t i = 0; i < view->shapes_count; i++) {
-        if (!normals_follow(r, i)) {
-            continue;
-        }
-        MeshView mesh = mesh_of(view, view->shapes + i);
-        rey_result result = rey_normals_adj(r->scene->ctx, &mesh, gradient + r->job.normals_at[i],
-                                            gradient + r->job.points_at[i]);
-        if (result != REY_OK) {
-            return result;
+        n += normals_follow(r, i) ? 3 * (size_t)view->shapes[i].vertex_count : 0;
+    }
+    r->normal_sums = rey_alloc_array(r->scene->ctx, n + 1, sizeof *r->normal_sums);
+    double *at = r->normal_sums;
+    for (int64_t i = 0; i < view->shapes_count && at; i++) {
+        if (normals_follow(r, i)) {
+            MeshView mesh = mesh_of(view, view->shapes + i);
+            rey_normal_sums(&mesh, at);
+            at += 3 * mesh.vertex_count;
         }
     }
-    return REY_OK;
+    return r->normal_sums ? REY_OK : REY_ERROR_MEMORY;
+}
+
+rey_result rey_motion_gradient(Render *r, double *gradient) {
+    const SceneView *view = &r->scene->view;
+    rey_result result = r->normal_sums ? REY_OK : find_normal_sums(r);
+    const double *sums = r->normal_sums;
+    for (int64_t i = 0; i < view->shapes_count && result == REY_OK; i++) {
+        if (normals_follow(r, i)) {
+            MeshView mesh = mesh_of(view, view->shapes + i);
+            result = rey_normals_adj(r->scene->ctx, &mesh, sums, gradient + r->job.normals_at[i],
+                                     gradient + r->job.points_at[i]);
+            sums += 3 * mesh.vertex_count;
+        }
+    }
+    return result;
 }
 
 rey_result rey_motion_tangent(const Render *r, float *tangent) {

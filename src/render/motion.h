@@ -12,6 +12,6 @@ int32_t *rey_motion_slot(Render *r, const Param *p);
 // Vertex normals that follow selected vertices (SHAPE_SMOOTH_NORMALS) get room behind the selection, from *size on.
 void rey_motion_add_normals(Render *r, int64_t *size);
 // Reverse: adds what the gradient of those normals makes of the gradient of their vertices.
-rey_result rey_motion_gradient(const Render *r, double *gradient);
+rey_result rey_motion_gradient(Render *r, double *gradient);
 // Forward: the motion of those normals that the vertices' makes.
 rey_result rey_motion_tangent(const Render *r, float *tangent);

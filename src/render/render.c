@@ -33,6 +33,7 @@ static void render_free(Render *r) {
     rey_free(ctx, r->squares);
     rey_free(ctx, r->coverage);
     rey_free(ctx, r->gradients);
+    rey_free(ctx, r->normal_sums);
     rey_free(ctx, r->columns);
     rey_free(ctx, r->rows);
     rey_free(ctx, r->offsets);

@@ -13,6 +13,7 @@ enum { BOUNDARY_TERMS = 2 }; // primary, indirect
 typedef struct BoundaryPlan {
     BoundaryJob job;         // what all units share
     EdgeRecord *edges;
+    int32_t *fans;
     float *cdf;
     FilmPlan film;           // one tile that covers the picture
     double *films;           // forward: one per shard
@@ -37,6 +38,7 @@ typedef struct Render {
     double *gradients;     // reverse: one per shard
     int64_t gradient_size, selection_size; // numbers selected, and what is gathered behind them for others
     float *tangent;        // forward: those numbers' motion
+    double *normal_sums;   // of vertex normals that follow the selection (motion.c)
     double *columns, *rows;
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
     float *adjoint;

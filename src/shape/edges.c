@@ -4,6 +4,7 @@
 #include "shape/shape.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 // One side of an edge: its welded ends, and where it comes from.
 typedef struct Side {
@@ -39,42 +40,106 @@ static const float *vertex_of(const SceneView *view, const ShapeRecord *shape, i
     return view->theta + shape->positions + 3 * (int64_t)vertex;
 }
 
-// Whether two triangles lie in one plane, so that no view makes a silhouette of their edge.
-static bool is_flat(const SceneView *view, const ShapeRecord *shape, const int32_t *corners, int32_t opposite) {
-    const float *p[4] = {vertex_of(view, shape, corners[0]), vertex_of(view, shape, corners[1]),
-                         vertex_of(view, shape, corners[2]), vertex_of(view, shape, opposite)};
-    double e[3][3];
+// From an edge (at a, along the unit vector e) into a triangle with this third corner: unit, at right angles to the edge.
+static void side_direction(const SceneView *view, const ShapeRecord *shape, const float *a, const double e[3], int32_t corner,
+                           double out[3]) {
+    const float *p = vertex_of(view, shape, corner);
+    double along = 0, length = 0;
     for (int k = 0; k < 3; k++) {
-        for (int c = 0; c < 3; c++) {
-            e[k][c] = (double)p[k + 1][c] - (double)p[0][c];
+        out[k] = (double)p[k] - (double)a[k];
+        along += out[k] * e[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        out[k] -= along * e[k];
+        length += out[k] * out[k];
+    }
+    length = sqrt(length);
+    for (int k = 0; k < 3; k++) {
+        out[k] = length > 0 ? out[k] / length : 0;
+    }
+}
+
+enum { MOST_SIDES = 16 };
+
+// The triangles around an edge, by their directions: triangles that lie on each other are one.
+typedef struct Around {
+    double direction[MOST_SIDES][3];
+    int32_t side[MOST_SIDES];
+    int32_t count;
+} Around;
+
+static Around look_around(const SceneView *view, const ShapeRecord *shape, const Side *sides, int32_t count) {
+    const int32_t *indices = mesh_indices(view, shape);
+    const float *a = vertex_of(view, shape, sides[0].low), *b = vertex_of(view, shape, sides[0].high);
+    double e[3], length = 0;
+    for (int k = 0; k < 3; k++) {
+        e[k] = (double)b[k] - (double)a[k];
+        length += e[k] * e[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        e[k] /= sqrt(length);
+    }
+    Around r = {.count = 0};
+    for (int32_t i = 0; i < count && r.count < MOST_SIDES; i++) {
+        double d[3];
+        int32_t at = sides[i].at;
+        side_direction(view, shape, a, e, indices[at / 3 * 3 + (at % 3 + 2) % 3], d);
+        bool known = false;
+        for (int32_t k = 0; k < r.count; k++) {
+            double off = 0;
+            for (int c = 0; c < 3; c++) {
+                off += (d[c] - r.direction[k][c]) * (d[c] - r.direction[k][c]);
+            }
+            known |= off < 1e-10;
+        }
+        if (!known) {
+            memcpy(r.direction[r.count], d, sizeof d);
+            r.side[r.count++] = i;
         }
     }
-    double n[3] = {e[0][1] * e[1][2] - e[0][2] * e[1][1], e[0][2] * e[1][0] - e[0][0] * e[1][2],
-                   e[0][0] * e[1][1] - e[0][1] * e[1][0]};
-    double volume = n[0] * e[2][0] + n[1] * e[2][1] + n[2] * e[2][2];
-    double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) *
-                  sqrt(e[2][0] * e[2][0] + e[2][1] * e[2][1] + e[2][2] * e[2][2]);
-    return fabs(volume) <= 1e-7 * size;
+    return r;
+}
+
+// Two triangles in one plane, one on each side: no view makes a silhouette of their edge.
+static bool is_flat(const Around *r) {
+    double off = 0;
+    for (int k = 0; k < 3 && r->count == 2; k++) {
+        double sum = r->direction[0][k] + r->direction[1][k];
+        off += sum * sum;
+    }
+    return r->count == 2 && off < 1e-13;
 }
 
 // The edge that `count` sides share.
-static EdgeRecord mesh_edge(const SceneView *view, int32_t id, const Side *sides, int32_t count) {
+static rey_result mesh_edge(rey_scene *scene, int32_t id, const Side *sides, int32_t count, const Around *r, Array *fans,
+                            EdgeRecord *e) {
+    const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
     const int32_t *indices = mesh_indices(view, shape);
-    int32_t prim = sides[0].at / 3, corner = sides[0].at % 3;
-    EdgeRecord e = {EDGE_MESH, id, 0, prim, corner, EDGE_OPEN, 1, 0, 1};
-    if (count == 2) {
-        int32_t other = sides[1].at / 3, corner2 = sides[1].at % 3;
-        e.opposite = indices[3 * other + (corner2 + 2) % 3];
-        // With vertex normals, shading runs on where both triangles use the same vertices.
-        int32_t a = indices[sides[0].at], b = indices[3 * prim + (corner + 1) % 3];
-        int32_t c = indices[sides[1].at], d = indices[3 * other + (corner2 + 1) % 3];
-        bool same = (a == c && b == d) || (a == d && b == c);
-        e.crease = !(same && (shape->flags & SHAPE_HAS_NORMALS));
-    } else if (count > 2) {
-        e.opposite = EDGE_MANY;
+    *e = (EdgeRecord){.kind = EDGE_MESH, .shape = id, .prim = sides[0].at / 3, .corner = sides[0].at % 3,
+                      .opposite = EDGE_OPEN, .other = count > 1 ? EDGE_ANY : EDGE_NONE, .crease = 1, .last = 1};
+    if (r->count > 1) {
+        int32_t at = sides[r->side[1]].at, other = at / 3;
+        e->opposite = indices[3 * other + (at % 3 + 2) % 3];
+        if (count == 2) {
+            e->other = other;
+            // With vertex normals, shading runs on where both triangles use the same vertices.
+            int32_t a = indices[sides[0].at], b = indices[3 * e->prim + (e->corner + 1) % 3];
+            int32_t c = indices[at], d = indices[3 * other + (at % 3 + 1) % 3];
+            bool same = (a == c && b == d) || (a == d && b == c);
+            e->crease = !(same && (shape->flags & SHAPE_HAS_NORMALS));
+        }
     }
-    return e;
+    e->fan = (int32_t)fans->count;
+    for (int32_t i = 2; i < r->count; i++) {
+        int32_t *vertex = rey_array_push(scene->ctx, fans, sizeof *vertex, 1), at = sides[r->side[i]].at;
+        if (!vertex) {
+            return REY_ERROR_MEMORY;
+        }
+        *vertex = indices[at / 3 * 3 + (at % 3 + 2) % 3];
+        e->fan_count++;
+    }
+    return REY_OK;
 }
 
 static rey_result push_edge(rey_scene *scene, Array *edges, EdgeRecord e) {
@@ -100,10 +165,10 @@ static rey_result push_edge(rey_scene *scene, Array *edges, EdgeRecord e) {
     return REY_OK;
 }
 
-static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges) {
+static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges, Array *fans) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
-    int32_t n = 3 * shape->triangle_count;
+    const int32_t n = 3 * shape->triangle_count;
     Side *sides = rey_alloc_array(scene->ctx, (size_t)n + 1, sizeof *sides);
     if (!sides) {
         return REY_ERROR_MEMORY;
@@ -114,11 +179,14 @@ static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges) {
         for (next = i + 1; next < n && sides[next].low == sides[i].low && sides[next].high == sides[i].high;) {
             next++;
         }
-        EdgeRecord e = mesh_edge(view, id, sides + i, next - i);
-        bool flat = e.opposite >= 0 && is_flat(view, shape, mesh_indices(view, shape) + 3 * e.prim, e.opposite);
-        // Vertices of a flat edge may move out of its plane, but then both sides turn by as much as nothing.
-        if (sides[i].low != sides[i].high && !flat) {
-            result = push_edge(scene, edges, e);
+        if (sides[i].low == sides[i].high) {
+            continue;
+        }
+        Around around = look_around(view, shape, sides + i, next - i);
+        if (!is_flat(&around)) {
+            EdgeRecord e;
+            result = mesh_edge(scene, id, sides + i, next - i, &around, fans, &e);
+            result = result == REY_OK ? push_edge(scene, edges, e) : result;
         }
     }
     rey_free(scene->ctx, sides);
@@ -130,13 +198,14 @@ static rey_result curve_edges(rey_scene *scene, int32_t id, int32_t kind, int32_
     const int32_t pieces = kind == EDGE_SIDE ? 8 : 64;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < pieces && result == REY_OK; i++) {
-        EdgeRecord e = {kind, id, 0, 0, end, EDGE_OPEN, 1, (float)i / (float)pieces, (float)(i + 1) / (float)pieces};
+        EdgeRecord e = {.kind = kind, .shape = id, .corner = end, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = 1,
+                        .first = (float)i / (float)pieces, .last = (float)(i + 1) / (float)pieces};
         result = push_edge(scene, edges, e);
     }
     return result;
 }
 
-rey_result rey_edges_find(rey_scene *scene, Array *edges) {
+rey_result rey_edges_find(rey_scene *scene, Array *edges, Array *fans) {
     rey_result result = REY_OK;
     for (int32_t id = 0; id < scene->view.shapes_count && result == REY_OK; id++) {
         const ShapeRecord *shape = scene->view.shapes + id;
@@ -145,7 +214,7 @@ rey_result rey_edges_find(rey_scene *scene, Array *edges) {
         }
         switch (shape->kind) {
         case SHAPE_MESH:
-            result = mesh_edges(scene, id, edges);
+            result = mesh_edges(scene, id, edges, fans);
             break;
         case SHAPE_SPHERE:
             result = curve_edges(scene, id, EDGE_OUTLINE, 0, edges);

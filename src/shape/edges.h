@@ -6,16 +6,20 @@
 
 // EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer.
 enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE };
-enum { EDGE_OPEN = -1, EDGE_MANY = -2 };
+enum { EDGE_OPEN = -1 };
+enum { EDGE_NONE = -1, EDGE_ANY = -2 };
 
 typedef struct EdgeRecord {
     int32_t kind, shape;
     int32_t instance;    // of shapes with SHAPE_INSTANCED, else 0
     int32_t prim, corner; // meshes: it runs from this corner of this triangle to the next one; rims and sides: which, 0 or 1
-    int32_t opposite;    // meshes: vertex of the other triangle that is not on it, EDGE_OPEN, or EDGE_MANY triangles
+    int32_t opposite;    // meshes: vertex of the other triangle that is not on it, or EDGE_OPEN
+    int32_t other;       // meshes: that triangle, EDGE_NONE, or EDGE_ANY triangle of the mesh
+    int32_t fan, fan_count; // meshes: where more than two triangles meet, such vertices of the others, in `fans`
     int32_t crease;      // shading jumps across it
     float first, last;   // the part of it that counts, within [0, 1]
 } EdgeRecord;
 
-// Appends the edges of all surfaces to `edges`, an Array of EdgeRecord. Grids of distances and curves have none yet.
-rey_result rey_edges_find(rey_scene *scene, Array *edges);
+// Appends the edges of all surfaces to `edges`, an Array of EdgeRecord, and to `fans`, an Array of int32_t. Grids of distances
+// and curves have none yet.
+rey_result rey_edges_find(rey_scene *scene, Array *edges, Array *fans);

@@ -17,7 +17,9 @@ void rey_normal_sums(const MeshView *mesh, double *sums);
 // normals[3 v ..] = unit(sums[3 welded[v] ..]), or (0,0,1) where the sum is zero.
 void rey_normals_from_sums(const MeshView *mesh, const double *sums, float *normals);
 
-// Accumulates the adjoint of the unit normals of rey_normals_from_sums (3 per vertex) into that of the positions.
-rey_result rey_normals_adj(rey_context *ctx, const MeshView *mesh, const double *dnormals, double *dpositions);
+// Accumulates the adjoint of the unit normals of rey_normals_from_sums (3 per vertex) into that of the positions. sums: those
+// of rey_normal_sums.
+rey_result rey_normals_adj(rey_context *ctx, const MeshView *mesh, const double *sums, const double *dnormals,
+                           double *dpositions);
 // The motion of the normals that a motion of the positions makes; overwrites.
 rey_result rey_normals_tangent(rey_context *ctx, const MeshView *mesh, const float *positions, float *normals);

@@ -85,16 +85,21 @@ static void unit_change(const double *sum, const double *d, double *out) {
     }
 }
 
-rey_result rey_normals_adj(rey_context *ctx, const MeshView *mesh, const double *dnormals, double *dpositions) {
+static bool any(const double *d) { return d[0] != 0 || d[1] != 0 || d[2] != 0; }
+
+rey_result rey_normals_adj(rey_context *ctx, const MeshView *mesh, const double *sums, const double *dnormals,
+                           double *dpositions) {
     size_t n = 3 * (size_t)mesh->vertex_count;
-    double *sums = rey_alloc_array(ctx, 2 * n + 1, sizeof *sums), *dsums = sums + n;
-    if (!sums) {
+    double *dsums = rey_alloc_array(ctx, n + 1, sizeof *dsums);
+    if (!dsums) {
         return REY_ERROR_MEMORY;
     }
-    rey_normal_sums(mesh, sums);
     memset(dsums, 0, n * sizeof *dsums);
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
         double d[3], *at = dsums + 3 * (size_t)mesh->welded[i];
+        if (!any(dnormals + 3 * i)) {
+            continue;
+        }
         unit_change(sums + 3 * (size_t)mesh->welded[i], dnormals + 3 * i, d);
         for (int k = 0; k < 3; k++) {
             at[k] += d[k];
@@ -102,20 +107,21 @@ rey_result rey_normals_adj(rey_context *ctx, const MeshView *mesh, const double 
     }
     for (int64_t f = 0; f < mesh->face_count; f++) {
         Face face;
-        if (!face_of(mesh, f, &face)) {
-            continue;
-        }
         const double *dsum[3];
         double dp[3][3];
         for (int k = 0; k < 3; k++) {
             dsum[k] = dsums + 3 * (size_t)mesh->welded[mesh->faces[3 * f + k]];
+        }
+        // Most samples see few of the faces.
+        if (!(any(dsum[0]) || any(dsum[1]) || any(dsum[2])) || !face_of(mesh, f, &face)) {
+            continue;
         }
         face_adj(&face, dsum, dp);
         for (int k = 0; k < 9; k++) {
             dpositions[3 * (size_t)mesh->faces[3 * f + k / 3] + (size_t)(k % 3)] += dp[k / 3][k % 3];
         }
     }
-    rey_free(ctx, sums);
+    rey_free(ctx, dsums);
     return REY_OK;
 }
 

@@ -8,6 +8,7 @@ typedef struct BoundaryJob {
     PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
     bool primary;             // what the camera sees; else what other vertices see
     const EdgeRecord *edges;
+    const int32_t *fans;      // see EdgeRecord
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term

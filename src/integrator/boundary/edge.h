@@ -10,6 +10,9 @@ typedef struct EdgePoint {
     Vec3 p, tangent;    // tangent: dx/dt
     Vec3 side[2];       // from the edge into its surfaces; the second one only where it is not open
     Mask open, crease;
+    Int other;          // the second triangle, or EDGE_
+    Int fan, fan_count; // see EdgeRecord; 0 where none
+    Vec3 origin;        // of a mesh's edge: its first vertex, in its own space
     Mask round;         // which points it has depends on the eye
     Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
 } EdgePoint;
@@ -68,6 +71,7 @@ static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->hit.v = f_select(m, f_select(second, t, f_select(third, 1.0f - t, f_set(0))), out->hit.v);
     out->p = v3_select(m, p, out->p);
     out->tangent = v3_select(m, v[1], out->tangent);
+    out->origin = v3_select(m, a, out->origin);
     out->side[0] = v3_select(m, v[2], out->side[0]);
     out->side[1] = v3_select(m, v[3], out->side[1]);
     out->open = out->open & ~(m & mi_lt(i_set(-1), opposite));
@@ -142,6 +146,10 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.probability = out.probability * f_safe_rcp(range);
     out.p = out.tangent = out.side[0] = out.side[1] = v3_zero();
     out.open = m_set(true);
+    out.other = EDGE_FIELD(b, e, other);
+    out.fan = EDGE_FIELD(b, e, fan);
+    out.fan_count = EDGE_FIELD(b, e, fan_count);
+    out.origin = v3_zero();
     out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
     Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE));
     Mask side = mi_eq(kind, i_set(EDGE_SIDE));
@@ -174,8 +182,24 @@ KFN Vec3 edge_reference(const SceneView *scene, const EdgePoint *e) {
     return v3_select(e->round, middle, e->p);
 }
 
-// Whether both sides of an edge lie on one side of the plane with normal n through it: a silhouette for rays in that
-// plane. Elsewhere such rays pass from one of its faces to the other.
-KFN Mask edge_is_silhouette(const EdgePoint *e, Vec3 n) {
-    return e->open | m_gt(v3_dot(e->side[0], n) * v3_dot(e->side[1], n), f_set(0));
+// Whether all triangles at an edge lie on one side of the plane with normal n through it: a silhouette for rays in that
+// plane. Elsewhere such rays pass from one of its faces to another.
+static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, const EdgePoint *e, Vec3 n) {
+    Float first = v3_dot(e->side[0], n);
+    Mask silhouette = e->open | m_gt(first * v3_dot(e->side[1], n), f_set(0));
+    Mask left = silhouette & mi_lt(i_set(0), e->fan_count);
+    for (int32_t i = 0; m_any(left); i++, left = left & mi_lt(i_set(i), e->fan_count)) {
+        Hit hit = e->hit;
+        hit.shape = i_select(left, hit.shape, i_set(i_lane(hit.shape, m_first(left))));
+        Int vertex = i_gather(b->fans, i_select(left, e->fan + i, i_set(0)));
+        Int at = i_select(left, SHAPE_FIELD(scene, hit.shape, positions) + vertex * 3, i_set(0));
+        Vec3 side = v3_sub(theta_v3(scene, at), e->origin);
+        Mask inside = left & mi_lt(i_set(-1), SHAPE_FIELD(scene, hit.shape, collection));
+        if (m_any(inside)) {
+            hit.instance = i_select(inside, hit.instance, i_set(0));
+            side = v3_select(inside, edge_to_world(scene, &hit, side), side);
+        }
+        silhouette = silhouette & (~left | m_gt(first * v3_dot(side, n), f_set(0)));
+    }
+    return silhouette;
 }

@@ -24,7 +24,7 @@ typedef struct PrimarySample {
     Vec3 n;         // normal of the plane of edge and view: what moves along it moves the edge on the film
     Float nx, ny;   // the side of the edge that n points to, on the film, unit
     Float weight;   // of dL times the velocity along n, over the density
-    Mask m;
+    Mask silhouette, m;
 } PrimarySample;
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
@@ -44,8 +44,9 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->nx = f_copysign(rcp, turn) * -along.y;
     out->ny = f_copysign(rcp, turn) * along.x;
     out->weight = f_abs(turn) * f_safe_rcp(e.probability);
+    out->silhouette = edge_is_silhouette(t->scene, b, &e, n);
     out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
-             m_gt(out->weight, f_set(0)) & (edge_is_silhouette(&e, n) | e.crease);
+             m_gt(out->weight, f_set(0)) & (out->silhouette | e.crease);
     // The film ends where no samples are taken.
     const PathJob *job = t->job;
     out->m = out->m & m_ge(s.x, f_set((real)job->x)) & m_lt(s.x, f_set((real)(job->x + job->width))) &
@@ -60,17 +61,25 @@ KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real step) {
     return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
 }
 
-// Lanes of m whose edge nothing hides: rays on one of its sides get there. (On the other, round shapes hide their own
-// outline.)
-KFN Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
-    Mask hidden = m;
-    for (int side = 0; side < 2 && m_any(hidden); side++) {
+// Lanes of m whose edge the camera sees, between the surfaces that meet or end there. Next to a corner a path may miss
+// them; what it meets instead belongs to another edge's jump.
+static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
+    const EdgePoint *e = &s->edge;
+    Mask own[2], clear[2], silhouette = s->silhouette, above = m_gt(v3_dot(e->side[0], s->n), f_set(0));
+    for (int side = 0; side < 2; side++) {
         Ray ray = primary_ray(t, s, side ? PRIMARY_STEP : -PRIMARY_STEP).ray;
-        ray.tmax = v3_dot(v3_sub(s->edge.p, ray.o), ray.d) * (1.0f - 1e-4f);
-        t->job->rays += m_count(hidden);
-        hidden = hidden & ~m_gt(spec_max(trace_transmittance(t->scene, &ray, hidden)), f_set(0));
+        Hit hit = trace_closest(t->scene, &ray, m, false);
+        Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
+        Mask met = mi_lt(i_set(-1), hit.shape);
+        own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
+        Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
+                                  mi_eq(e->other, i_set(EDGE_ANY)));
+        own[side] = (silhouette & own[side]) | faces;
+        clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
     }
-    return m & ~hidden;
+    t->job->rays += 2 * m_count(m);
+    Mask inside = (above & own[1] & clear[0]) | (~above & own[0] & clear[1]);
+    return m & ((silhouette & inside) | (~silhouette & own[0] & own[1]));
 }
 
 // Finds which of `count` samples from number `first` on can contribute; writes their numbers behind `kept`.

@@ -138,7 +138,7 @@ static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, b
     Float into = v3_dot(s->edge.side[0], n);
     s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
     s->weight = length * share * f_safe_rcp(s->edge.probability);
-    s->m = s->m & edge_is_silhouette(&s->edge, n) & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) &
+    s->m = s->m & edge_is_silhouette(t->scene, b, &s->edge, n) & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) &
            m_finite(s->weight) & m_gt(s->edge.probability, f_set(0));
 }
 
