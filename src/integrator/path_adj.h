@@ -155,8 +155,11 @@ KFN bool passing_is_live(const Tracer *t) {
 // round throughout. Where normals turn away from the light, the scattering function goes to 0 with the cosine, and
 // nothing jumps.
 KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
-    if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
-        Mask selected = s->m & mi_lt(i_set(-1), i_gather(sink->normals_at, s->hit.shape));
+    // What moves: the surface, the sensor, or an earlier vertex that looks at it.
+    bool moved = sink->any_motion && (sink->any_camera || !s->first || (t->job->live[s->group - t->scene->groups] & LIVE_MOTION));
+    bool smooth = s->group->shape_kind == SHAPE_MESH && (s->group->shape_flags & SHAPE_HAS_NORMALS);
+    if (smooth && (sink->any_normals || moved)) {
+        Mask selected = moved ? s->m : s->m & mi_lt(i_set(-1), i_gather(sink->normals_at, s->hit.shape));
         Float geometric = -v3_dot(s->d, s->si.ng);
         Mask away = m_le(s->wi.z * geometric, f_set(0));
         sink->faces |= (m_any(selected & away) ? FACES_AWAY : 0) | (m_any(selected & ~away) ? FACES_ALIKE : 0);
@@ -180,7 +183,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
         s.call.surface = &s.surface;
     }
-    if (job->watch_turned && (live & LIVE_SCATTERING) && !batch->ends) {
+    if (job->watch_turned && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, &s, sink);
     }
     if ((live & LIVE_SCATTERING) || live_passing) {

@@ -133,16 +133,23 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     }
 }
 
-// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own.
+// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own; and so it does
+// where shading normals turn away from the viewer.
 static void name_chains(Builder *b) {
     rey_scene *scene = b->scene;
-    bool bends = false;
+    bool bends = false, turns = false;
     for (size_t i = 0; i < scene->build.bsdfs.count; i++) {
-        bends |= rey_bsdf_bends(ARRAY_AT(scene->build.bsdfs, BsdfNode, i).kind);
+        const BsdfNode *bsdf = &ARRAY_AT(scene->build.bsdfs, BsdfNode, i);
+        bends |= rey_bsdf_bends(bsdf->kind);
+        turns |= bsdf->turns;
     }
-    for (size_t i = 0; i < scene->params.count && bends; i++) {
+    for (size_t i = 0; i < scene->build.shapes.count; i++) {
+        turns |= (ARRAY_AT(scene->build.shapes, ShapeRecord, i).flags & SHAPE_HAS_NORMALS) != 0;
+    }
+    const int terms = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
+    for (size_t i = 0; i < scene->params.count && terms; i++) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
-        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? REY_TERM_SPECULAR : 0;
+        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? terms : 0;
     }
 }
 

@@ -13,7 +13,7 @@ enum { BOUNDARY_SHARDS = 8, LEAST_SAMPLES = 1024 };
 
 static rey_result refuse(rey_scene *scene, int term, const char *what) {
     return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the term '%s' does not know %s yet. --terms interior gives the part without", rey_term_name(term), what);
+                    "the term '%s' does not know %s. --terms interior gives the part without", rey_term_name(term), what);
 }
 
 // Jumps of what the camera sees that no edge explains.
@@ -35,20 +35,20 @@ rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int 
     }
     if (term == REY_TERM_PRIMARY && has_steps(view)) {
         return refuse(scene, term, "the jumps of checkerboards, of textures with filter_type=\"nearest\" and of face "
-                                   "attributes, and the scene has one");
+                                   "attributes, and the scene has one of them");
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         if (shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_BSPLINE || shape->kind == SHAPE_LINEAR) {
-            return refuse(scene, term, "the outlines of curves and grids of distances, and the scene has one");
+            return refuse(scene, term, "the outlines of curves and grids of distances, and the scene has one of them");
         }
         if (shape->collection >= 0 && shape->kind != SHAPE_MESH) {
-            return refuse(scene, term, "the outlines of spheres, disks and cylinders in shapegroups, and the scene has one");
+            return refuse(scene, term, "the outlines of spheres, disks and cylinders in shapegroups, and the scene has one of them");
         }
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
         if (view->emitters[i].kind == EMITTER_DIRECTIONALAREA) {
-            return refuse(scene, term, "the emitter 'directionalarea', and the scene has one");
+            return refuse(scene, term, "the emitter 'directionalarea', and the scene has one of them");
         }
     }
     return REY_OK;

@@ -28,7 +28,7 @@ static const Motion motions[] = {
     {"boundary_lamp.xml", "camera.x_fov", ADD, {0, 0, 0}, 0.2, 1},
     {"boundary_bulb.xml", "crate.to_world", SHIFT, {0.3f, 0, 1}, 0.02, 1},
     {"boundary_bulb.xml", "gem.positions", SHEAR, {0, 0, 0}, 0.02, 1},
-    {"boundary_bulb.xml", "hat.positions", SHEAR, {0, 0, 0}, 0.02, 5},
+    {"boundary_bulb.xml", "hat.positions", SHEAR, {0, 0, 0}, 0.02, 10},
     {"boundary_bulb.xml", "bulb.position", ADD, {0, 0, 0}, 0.03, 1},
     {"boundary_bulb.xml", "camera.to_world", SHIFT, {0, 0.5f, 1}, 0.02, 1},
     {"boundary_sky.xml", "card.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 4},
