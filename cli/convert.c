@@ -2,6 +2,13 @@
 #include "cli.h"
 
 #include <stdio.h>
+#include <sys/stat.h>
+
+// Whether both names mean one file.
+static bool same_file(const char *a, const char *b) {
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
 
 static void print_json(const Session *s) {
     Json json = json_begin(stdout);
@@ -21,6 +28,11 @@ int cli_convert(int argc, char **argv) {
         return status;
     }
     options.output = options.files[1];
+    if (same_file(options.files[0], options.files[1])) {
+        fprintf(stderr, "reynolds convert: %s is both read and written; name another file for the result\n", options.files[1]);
+        cli_options_free(&options);
+        return 2;
+    }
     status = cli_session_open(&options, "convert", &session);
     if (!status) {
         rey_result result = rey_scene_save(session.scene, options.files[1]);

@@ -91,6 +91,8 @@ rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **byt
         result = fail_errno(ctx, path, "read");
     } else if (S_ISDIR(status.st_mode)) {
         result = rey_fail(ctx, REY_ERROR_IO, "%s: cannot read: is a directory, expected a file", path);
+    } else if (S_ISCHR(status.st_mode) || S_ISBLK(status.st_mode)) {
+        result = rey_fail(ctx, REY_ERROR_IO, "%s: cannot read: is a device, which may never end, expected a file", path);
     } else {
         size_t hint = S_ISREG(status.st_mode) && status.st_size > 0 ? (size_t)status.st_size : 0;
         result = read_all(ctx, path, file, hint, bytes, size);

@@ -133,23 +133,54 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     }
 }
 
-// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own; and so it does
-// where shading normals turn away from the viewer.
-static void name_chains(Builder *b) {
+// Whether a scattering function, itself or inside, has a smooth mirror, glass, or lets paths pass.
+static bool bends_within(const rey_scene *scene, int32_t bsdf) {
+    const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
+    bool bends = rey_bsdf_bends(node->kind);
+    for (int i = 0; i < MAX_CHILDREN && !bends; i++) {
+        bends = node->child[i] >= 0 && bends_within(scene, node->child[i]);
+    }
+    return bends;
+}
+
+// Whether a texture turns the normals of a function that bends paths.
+static bool texture_turns_mirror(const rey_scene *scene, int32_t texture) {
+    bool turns = false;
+    for (size_t i = 0; i < scene->build.bsdfs.count && !turns; i++) {
+        const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, i);
+        if (!rey_bsdf_turns(node->kind) || !bends_within(scene, (int32_t)i)) {
+            continue;
+        }
+        for (int k = 0; k < MAX_SLOTS; k++) {
+            const TextureNode *t = node->slot[k] >= 0 && node->slot[k] < (int32_t)scene->build.textures.count
+                                       ? &ARRAY_AT(scene->build.textures, TextureNode, node->slot[k])
+                                       : NULL;
+            turns |= t && (node->slot[k] == texture || t->child[0] == texture || t->child[1] == texture);
+        }
+    }
+    return turns;
+}
+
+// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
+// what turns such mirrors' normals; what moves needs another where shading normals turn away from the viewer.
+static void name_further_terms(Builder *b) {
     rey_scene *scene = b->scene;
     bool bends = false, turns = false;
     for (size_t i = 0; i < scene->build.bsdfs.count; i++) {
-        const BsdfNode *bsdf = &ARRAY_AT(scene->build.bsdfs, BsdfNode, i);
-        bends |= rey_bsdf_bends(bsdf->kind);
-        turns |= bsdf->turns;
+        bends |= rey_bsdf_bends(ARRAY_AT(scene->build.bsdfs, BsdfNode, i).kind);
+        turns |= ARRAY_AT(scene->build.bsdfs, BsdfNode, i).turns;
     }
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         turns |= (ARRAY_AT(scene->build.shapes, ShapeRecord, i).flags & SHAPE_HAS_NORMALS) != 0;
     }
-    const int terms = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
-    for (size_t i = 0; i < scene->params.count && terms; i++) {
+    const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
+    for (size_t i = 0; i < scene->params.count && moving; i++) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
-        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? terms : 0;
+        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
+        bool mirror = p->normals >= 0
+                          ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
+                          : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);
+        p->terms |= bends && mirror ? REY_TERM_SPECULAR : 0;
     }
 }
 
@@ -206,7 +237,7 @@ static rey_result build_scene(Builder *b) {
     TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
     find_drops(b);
-    name_chains(b);
+    name_further_terms(b);
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);

@@ -3,6 +3,19 @@
 
 #include "render/motion.h"
 
+// Why a parameter needs a term.
+static const char *term_reason(int bit, const rey_param_info *info) {
+    switch (bit) {
+    case REY_TERM_SPECULAR:
+        return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and what "
+               "is seen in or through them moves along chains that are not followed";
+    case REY_TERM_TERMINATOR:
+        return "the picture jumps where shading normals turn away from the viewer";
+    default:
+        return info->why;
+    }
+}
+
 // The terms of a parameter's derivative that exist.
 static int terms_known(const rey_scene *scene, const rey_render_def *def, const Param *p) {
     const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
@@ -36,7 +49,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
-                            rey_term_name(bit), info.why, interior ? ". --terms interior gives the part that does" : "");
+                            rey_term_name(bit), term_reason(bit, &info), interior ? ". --terms interior gives the part that does" : "");
         }
         if (missing && !interior) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
