@@ -51,8 +51,13 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     json_string(&json, "mode", o->reverse ? "reverse" : "forward");
     json_number(&json, "value", g->value);
     json_number(&json, "standard_error", g->standard_error);
-    json_object(&json, "terms");
-    json_number(&json, rey_term_name(REY_TERM_INTERIOR), g->value);
+    json_object(&json, "terms"); // terms computed together have no values of their own
+    int computed = (g->used | (o->terms ? 0 : REY_TERM_INTERIOR)) & (REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
+    for (int bit = REY_TERM_INTERIOR; bit <= REY_TERM_INDIRECT; bit *= 2) {
+        if (computed & bit) {
+            json_number(&json, rey_term_name(bit), computed == bit ? g->value : NAN);
+        }
+    }
     json_object_end(&json);
     json_bool(&json, "complete", terms_left_out(g) == 0);
     cli_json_terms(&json, "needed_terms", g->needed & (~REY_TERM_TERMINATOR | g->stats.missing_terms));
