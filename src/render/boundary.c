@@ -57,7 +57,6 @@ rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int 
 void rey_boundary_free(Render *r, BoundaryPlan *plan) {
     rey_context *ctx = r->scene->ctx;
     rey_free(ctx, plan->edges);
-    rey_free(ctx, plan->fans);
     rey_free(ctx, plan->cdf);
     rey_free(ctx, plan->films);
     *plan = (BoundaryPlan){.shards = 0};
@@ -79,7 +78,7 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
     if (result == REY_OK) {
-        result = term == REY_TERM_PRIMARY ? rey_boundary_edges(r, plan) : rey_boundary_all_edges(r, plan);
+        result = rey_boundary_edges(r, term == REY_TERM_PRIMARY, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
         plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
@@ -90,7 +89,7 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp / (term == REY_TERM_PRIMARY ? 4 : 1);
     plan->samples = plan->samples < LEAST_SAMPLES ? LEAST_SAMPLES : plan->samples;
     plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges,
-                              .fans = plan->fans, .cdf = plan->cdf,
+                              .fans = r->fans.data, .cdf = plan->cdf,
                               .edge_count = edge_count,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;

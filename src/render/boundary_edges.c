@@ -148,13 +148,19 @@ static double see_mesh_edge(const SceneView *view, const Projection *p, const do
     return see_line(p, a, b, e);
 }
 
-// A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
-static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
-    const float *m = view->theta + view->shapes[e->shape].to_world;
-    double centre[3] = {m[3], m[7], m[11]}, local[3], size = 0;
+// Largest entry of a pose's linear part.
+static double pose_size(const float *m) {
+    double size = 0;
     for (int k = 0; k < 11; k++) {
         size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
     }
+    return size;
+}
+
+// A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
+static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
+    const float *m = view->theta + view->shapes[e->shape].to_world;
+    double centre[3] = {m[3], m[7], m[11]}, local[3], size = pose_size(m);
     to_sensor(p, centre, local);
     if (local[2] + 2 * size < p->near) {
         return 0;
@@ -230,59 +236,53 @@ static double mesh_edge_weight(const SceneView *view, const EdgeRecord *e) {
 }
 
 static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
-    const float *m = view->theta + view->shapes[e->shape].to_world;
-    double size = 0;
-    for (int k = 0; k < 11; k++) {
-        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
-    }
-    return 20 * size * (double)(e->last - e->first);
+    return 20 * pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
 }
 
-// Edges of what stands still may pass light between what moves; they are rarer.
-rey_result rey_boundary_all_edges(Render *r, BoundaryPlan *plan) {
+// What an edge that the sensor sees, or that other vertices see, is worth.
+typedef struct Weigher {
+    Projection projection;
+    double eye[4];  // or the direction of parallel views, and 0
+    bool primary;
+    double still;   // factor on edges that stand still: they may pass light between what moves
+} Weigher;
+
+static Weigher weigher_of(const Render *r, bool primary) {
     const SceneView *view = &r->scene->view;
-    const double still = r->job.any_camera ? 1 : 0.25;
-    Array all = {0}, fans = {0}, kept = {0}, weights = {0};
-    rey_result result = rey_edges_find(r->scene, &all, &fans);
-    plan->fans = fans.data;
-    for (size_t i = 0; i < all.count && result == REY_OK; i++) {
-        const EdgeRecord *e = &ARRAY_AT(all, EdgeRecord, i);
-        double weight = e->kind == EDGE_MESH ? mesh_edge_weight(view, e) : round_edge_weight(view, e);
-        result = keep_edge(r, e, weight * (edge_moves(r, e) ? 1 : still), &kept, &weights);
+    const float *m = view->theta + r->plan.sensor->to_world;
+    Weigher w = {projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, primary, r->job.any_camera ? 1 : 0.25};
+    if (w.projection.parallel) {
+        w.eye[0] = m[2], w.eye[1] = m[6], w.eye[2] = m[10], w.eye[3] = 0;
+    }
+    w.still = primary ? 0 : w.still;
+    return w;
+}
+
+// May cut the edge to what the film sees.
+static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
+    const SceneView *view = &r->scene->view;
+    double factor = edge_moves(r, e) ? 1 : w->still;
+    if (factor == 0) {
+        return 0;
+    }
+    if (w->primary) {
+        return e->kind == EDGE_MESH ? see_mesh_edge(view, &w->projection, w->eye, e) : see_round(view, &w->projection, e);
+    }
+    return factor * (e->kind == EDGE_MESH ? mesh_edge_weight(view, e) : round_edge_weight(view, e));
+}
+
+rey_result rey_boundary_edges(Render *r, bool primary, BoundaryPlan *plan) {
+    const Weigher w = weigher_of(r, primary);
+    Array kept = {0}, weights = {0};
+    rey_result result = r->edges.count ? REY_OK : rey_edges_find(r->scene, &r->edges, &r->fans);
+    for (size_t i = 0; i < r->edges.count && result == REY_OK; i++) {
+        EdgeRecord e = ARRAY_AT(r->edges, EdgeRecord, i);
+        double weight = edge_weight(r, &w, &e);
+        result = keep_edge(r, &e, weight, &kept, &weights);
     }
     if (result == REY_OK) {
         result = accumulate(r, plan, &kept, &weights);
     }
-    rey_array_free(r->scene->ctx, &all);
-    rey_array_free(r->scene->ctx, &kept);
-    rey_array_free(r->scene->ctx, &weights);
-    return result;
-}
-
-rey_result rey_boundary_edges(Render *r, BoundaryPlan *plan) {
-    const SceneView *view = &r->scene->view;
-    const SensorRecord *s = r->plan.sensor;
-    Projection p = projection_of(view, &r->plan);
-    const float *m = view->theta + s->to_world;
-    double eye[4] = {m[3], m[7], m[11], 1};
-    if (p.parallel) {
-        eye[0] = m[2], eye[1] = m[6], eye[2] = m[10], eye[3] = 0;
-    }
-    Array all = {0}, fans = {0}, kept = {0}, weights = {0};
-    rey_result result = rey_edges_find(r->scene, &all, &fans);
-    plan->fans = fans.data;
-    for (size_t i = 0; i < all.count && result == REY_OK; i++) {
-        EdgeRecord e = ARRAY_AT(all, EdgeRecord, i);
-        if (!edge_moves(r, &e)) {
-            continue;
-        }
-        double length = e.kind == EDGE_MESH ? see_mesh_edge(view, &p, eye, &e) : see_round(view, &p, &e);
-        result = keep_edge(r, &e, length, &kept, &weights);
-    }
-    if (result == REY_OK) {
-        result = accumulate(r, plan, &kept, &weights);
-    }
-    rey_array_free(r->scene->ctx, &all);
     rey_array_free(r->scene->ctx, &kept);
     rey_array_free(r->scene->ctx, &weights);
     return result;

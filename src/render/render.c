@@ -29,6 +29,8 @@ static void render_free(Render *r) {
     for (int i = 0; i < BOUNDARY_TERMS; i++) {
         rey_boundary_free(r, r->boundary + i);
     }
+    rey_array_free(ctx, &r->edges);
+    rey_array_free(ctx, &r->fans);
     rey_free(ctx, r->films);
     rey_free(ctx, r->squares);
     rey_free(ctx, r->coverage);

@@ -13,7 +13,6 @@ enum { BOUNDARY_TERMS = 2 }; // primary, indirect
 typedef struct BoundaryPlan {
     BoundaryJob job;         // what all units share
     EdgeRecord *edges;
-    int32_t *fans;
     float *cdf;
     FilmPlan film;           // one tile that covers the picture
     double *films;           // forward: one per shard
@@ -43,6 +42,7 @@ typedef struct Render {
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
     float *adjoint;
     int terms;             // REY_TERM_ bits that are computed
+    Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
     BoundaryPlan boundary[BOUNDARY_TERMS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;

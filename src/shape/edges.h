@@ -1,5 +1,5 @@
 // edges.h: the curves of surfaces along which visibility or shading can jump: edges of meshes, rims of disks and
-// cylinders, outlines of spheres. Found once per scene, since they depend on the topology alone.
+// cylinders, outlines of spheres. Meshes' edges depend on their vertices, too: those in a plane are none.
 #pragma once
 
 #include "scene/scene.h"
