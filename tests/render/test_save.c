@@ -234,8 +234,8 @@ static void wrong_values_are_refused(void **state) {
     static const char *const texts[] = {
         "<bsdf type='diffuse' id='wall'><rgb name='reflectance' value='0.3'/></bsdf><bsdf type='diffuse' id='wal'/>",
         "<bsdf type='roughconductor' id='wall'/>",
-        "<bsdf type='diffuse' id='wall'><texture type='bitmap' name='reflectance'><string name='filename' "
-        "value='texels.exr'/></texture></bsdf>",
+        ("<bsdf type='diffuse' id='wall'><texture type='bitmap' name='reflectance'><string name='filename' "
+         "value='texels.exr'/></texture></bsdf>"),
         "<texture type='bitmap' id='wall'><string name='filename' value='texels.exr'/></texture>",
     };
     static const char *const words[] = {
