@@ -98,8 +98,6 @@ rey_result build_finish(Builder *b, rey_xml_node *node, const char *path);
 // Refuses a plugin: by name and reason where it is one of the format's, else with the nearest known name.
 rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user);
 
-const char *build_medium_word(void *user, int i); // plugins of participating media
-
 // What a texture-valued slot expects.
 typedef struct TextureUse {
     rey_colour_use colour;
@@ -123,6 +121,8 @@ rey_result build_attribute_texture(Builder *b, rey_xml_node *node, int32_t textu
 rey_result build_attribute_tables(Builder *b);
 // A spectrum as an object.
 rey_result build_spectrum(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
+// Numbers of a string property, between blanks and commas, as double; the caller frees the list.
+rey_result build_number_list(Builder *b, rey_xml_node *node, const char *name, Array *list);
 // Appends a texture node with identity mapping; *theta has room for count numbers. Where a texture came from.
 rey_result build_add_texture(Builder *b, int32_t kind, int64_t count, int32_t *id, float **theta);
 rey_result build_note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture);
@@ -141,6 +141,20 @@ rey_result build_bsdf(Builder *b, rey_xml_node *node, const char *path, int32_t 
 rey_result build_default_bsdf(Builder *b, rey_xml_node *node, double reflectance, const char *path, int32_t *out);
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path);
 rey_result build_group(Builder *b, ShapeRecord *shape); // finds its shading group
+// A field over space: an object, or the value or texture in slot `name` of a node (see build_volume.c). *out: among `volumes`.
+rey_result build_volume(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
+rey_result build_volume_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, double value,
+                             const char *path, int32_t *out);
+// A colour as a volume, known as `path`.name; node and name say where it came from.
+rey_result build_volume_value(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double rgb[3],
+                              const char *path, int32_t *out);
+rey_result build_phase(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
+rey_result build_isotropic_phase(Builder *b, int32_t *out);
+rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
+// The medium in a slot of a node (name null: any medium, under the path); -1 where there is none.
+rey_result build_medium_slot(Builder *b, rey_xml_node *node, const char *name, const char *path, int32_t *out);
+// Whether paths go through media.
+rey_result build_media_use(Builder *b);
 rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);
 bool build_is_curve(const char *plugin);
 int build_curve_order(const char *plugin); // control points per segment

@@ -301,6 +301,10 @@ rey_result build_emitter(Builder *b, rey_xml_node *node, int32_t shape, const ch
     }
     const EmitterKind *kind = rey_emitter_kinds + e.kind;
     bool surface = kind->form == EMITTER_IS_SURFACE;
+    char name[MAX_PATH_NAME];
+    int32_t medium; // that it stands in: paths know that without it
+    build_join(name, path, "medium");
+    TRY(build_medium_slot(b, node, NULL, name, &medium));
     if (!surface && shape >= 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape's emitter must be an 'area' light, not '%s'",
                             node->type);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "depth", "aov", "ptracer"};
+static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "prbvolpath", "depth", "aov", "ptracer"};
 
 static const char *integrator_word(void *user, int i) {
     UNUSED(user);
@@ -46,11 +46,11 @@ static rey_result get_depths(Builder *b, rey_xml_node *node, SceneView *view) {
         view->solid = true;
         return get_split(b, node, view);
     }
-    TRY(rey_xml_get_int(b->ctx, node, "max_depth", -1, INT32_MAX, is(node, "prb") ? 6 : -1, &depth));
+    TRY(rey_xml_get_int(b->ctx, node, "max_depth", -1, INT32_MAX, is(node, "prb") || is(node, "prbvolpath") ? 6 : -1, &depth));
     TRY(rey_xml_get_int(b->ctx, node, "rr_depth", 1, INT32_MAX, 5, &roulette));
     view->max_depth = (int32_t)depth;
     view->rr_depth = (int32_t)roulette;
-    view->through = strncmp(node->type, "volpath", 7) == 0;
+    view->through = strstr(node->type, "volpath") != NULL;
     if (is(node, "volpathmis")) {
         bool spectral;
         return rey_xml_get_bool(b->ctx, node, "use_spectral_mis", true, &spectral);

@@ -256,11 +256,9 @@ static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, co
     if (shape >= 0 && s->kind != SENSOR_IRRADIANCEMETER) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the sensor of a shape must be an irradiancemeter");
     }
-    rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
-    if (medium) {
-        Snapshot before = build_snapshot(b);
-        TRY(build_forgive(b, &before, medium, "", build_unknown(b, medium->node, build_medium_word, NULL), NULL));
-    }
+    char name[MAX_PATH_NAME];
+    build_join(name, path, "medium");
+    TRY(build_medium_slot(b, node, NULL, name, &s->medium));
     rey_xml_child *film = rey_xml_child_of(node, REY_XML_BIT(REY_XML_FILM), 0);
     rey_xml_child *sampler = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SAMPLER), 0);
     TRY(build_film(b, film ? film->node : NULL, s));

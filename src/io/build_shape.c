@@ -230,11 +230,10 @@ rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, in
     if (several || rey_xml_count_children(node, REY_XML_BIT(REY_XML_EMITTER)) > 1) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a shape can have one bsdf and one emitter");
     }
-    rey_xml_child *medium = rey_xml_child_of(node, REY_XML_BIT(REY_XML_MEDIUM), 0);
-    if (medium) {
-        Snapshot s = build_snapshot(b);
-        TRY(build_forgive(b, &s, medium, "", build_unknown(b, medium->node, build_medium_word, NULL), NULL));
-    }
+    build_join(name, path, "interior_medium");
+    TRY(build_medium_slot(b, node, "interior", name, &shape->interior));
+    build_join(name, path, "exterior_medium");
+    TRY(build_medium_slot(b, node, "exterior", name, &shape->exterior));
     rey_xml_child *emitter = rey_xml_child_of(node, REY_XML_BIT(REY_XML_EMITTER), 0);
     rey_xml_child *sensor = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SENSOR), 0);
     build_join(name, path, "bsdf");

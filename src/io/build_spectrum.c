@@ -46,7 +46,7 @@ static rey_result build_blackbody(Builder *b, rey_xml_node *node, TextureUse use
 }
 
 // Numbers between blanks and commas, as many as there are.
-static rey_result get_list(Builder *b, rey_xml_node *node, const char *name, Array *list) {
+rey_result build_number_list(Builder *b, rey_xml_node *node, const char *name, Array *list) {
     const char *text, *end;
     TRY(rey_xml_require(b->ctx, node, name));
     TRY(rey_xml_get_string(b->ctx, node, name, "", &text));
@@ -72,7 +72,7 @@ static rey_result get_list(Builder *b, rey_xml_node *node, const char *name, Arr
 static rey_result get_wavelengths(Builder *b, rey_xml_node *node, size_t count, Array *wavelengths) {
     double low, high;
     if (strcmp(node->type, "irregular") == 0) {
-        return get_list(b, node, "wavelengths", wavelengths);
+        return build_number_list(b, node, "wavelengths", wavelengths);
     }
     TRY(rey_xml_require(b->ctx, node, "wavelength_min"));
     TRY(rey_xml_require(b->ctx, node, "wavelength_max"));
@@ -87,7 +87,7 @@ static rey_result get_wavelengths(Builder *b, rey_xml_node *node, size_t count, 
 
 static rey_result sampled_colour(Builder *b, rey_xml_node *node, rey_colour_use use, double rgb[3]) {
     Array values = {0}, wavelengths = {0};
-    rey_result result = get_list(b, node, "values", &values);
+    rey_result result = build_number_list(b, node, "values", &values);
     if (result == REY_OK) {
         result = get_wavelengths(b, node, values.count, &wavelengths);
     }

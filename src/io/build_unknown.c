@@ -4,7 +4,6 @@
 #include <string.h>
 
 static const char no_polarisation[] = "light has no polarisation here";
-static const char no_media[] = "participating media are missing yet";
 static const char no_sky[] = "sky models are missing; a picture of one can be an 'envmap'";
 static const char no_splats[] = "volumetric primitives are missing";
 static const char same_light[] = "'path' renders the same light";
@@ -30,17 +29,6 @@ static const struct {
                {"ellipsoidsmesh", no_splats},
                {"volprim_rf_basic", no_splats},
                {"specfilm", "there are no spectral films; 'hdrfilm' is the film"},
-               {"homogeneous", no_media},
-               {"heterogeneous", no_media},
-               {"gridvolume", no_media},
-               {"constvolume", no_media},
-               {"isotropic", no_media},
-               {"hg", no_media},
-               {"rayleigh", no_media},
-               {"blendphase", no_media},
-               {"tabphase", no_media},
-               {"sggx", no_media},
-               {"prbvolpath", no_media},
                {"volume", missing},
                {"roughdiffuse", "'diffuse' is its limit of no roughness"},
                {"phong", two_lobes},
@@ -82,13 +70,6 @@ static const struct {
                {"prb_basic", missing},
                {"direct_projective", missing},
                {"prb_projective", missing}};
-
-const char *build_medium_word(void *user, int i) {
-    static const char *const words[] = {"homogeneous", "heterogeneous", "gridvolume", "constvolume", "isotropic",
-                                        "hg",          "rayleigh",      "blendphase", "tabphase",    "sggx"};
-    UNUSED(user);
-    return i < COUNT_OF(words) ? words[i] : NULL;
-}
 
 rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user) {
     const char *tag = rey_xml_tag_name(node->tag);

@@ -101,3 +101,40 @@ rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **byt
     return result;
 }
 
+rey_result rey_file_open(rey_context *ctx, const char *path, int *file, size_t *size) {
+    struct stat status;
+    *size = 0;
+    *file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (*file < 0) {
+        return fail_errno(ctx, path, "open");
+    }
+    rey_result result = fstat(*file, &status) != 0 ? fail_errno(ctx, path, "read")
+                        : S_ISREG(status.st_mode)  ? REY_OK
+                                                   : rey_fail(ctx, REY_ERROR_IO, "%s: cannot read: expected a regular file", path);
+    if (result != REY_OK) {
+        close(*file);
+        *file = -1;
+        return result;
+    }
+    *size = (size_t)status.st_size;
+    return REY_OK;
+}
+
+rey_result rey_file_read_part(rey_context *ctx, const char *path, int file, size_t offset, void *bytes, size_t size) {
+    enum { MOST = 1 << 30 };
+    unsigned char *to = bytes;
+    while (size > 0) {
+        ssize_t got = pread(file, to, size < MOST ? size : MOST, (off_t)offset);
+        if (got == 0) {
+            return rey_fail(ctx, REY_ERROR_IO, "%s: byte %zu: the file ended while it was read", path, offset);
+        }
+        if (got < 0 && errno != EINTR) {
+            return fail_errno(ctx, path, "read");
+        }
+        size_t n = got > 0 ? (size_t)got : 0;
+        to += n;
+        offset += n;
+        size -= n;
+    }
+    return REY_OK;
+}

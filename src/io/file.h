@@ -8,6 +8,11 @@
 // *bytes is null and *size 0.
 rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size);
 
+// A file to read in parts, and its size; no pipe or device. The caller closes it.
+rey_result rey_file_open(rey_context *ctx, const char *path, int *file, size_t *size);
+// All of the bytes from an offset; fewer are a failure.
+rey_result rey_file_read_part(rey_context *ctx, const char *path, int file, size_t offset, void *bytes, size_t size);
+
 // Writes a file so that path holds either its former content or all of the new: a temporary file beside it is
 // written, flushed to the device and renamed over it. A symbolic link stays one: the file that it leads to is replaced.
 // Devices and pipes are written as they are. On failure the temporary file is removed.

@@ -1,9 +1,9 @@
 // image_raw.c: PFM and NumPy arrays.
 #include "io/file.h"
 #include "io/image.h"
+#include "io/npy.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
@@ -32,62 +32,27 @@ rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char 
     return result;
 }
 
-// Shape and element size from the array's header text: "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }".
-static bool npy_header(const char *text, int *item, int64_t shape[3], int *dims) {
-    const char *descr = strstr(text, "'descr'"), *order = strstr(text, "'fortran_order'"), *list = strstr(text, "'shape'");
-    if (!descr || !order || !list) {
-        return false;
-    }
-    *item = strstr(descr, "'<f4'") ? 4 : strstr(descr, "'<f8'") ? 8 : 0;
-    list = strchr(list, '(');
-    const char *falsehood = strstr(order, "False");
-    if (!*item || !list || !falsehood || falsehood - order > 24) {
-        return false;
-    }
-    *dims = 0;
-    for (const char *p = list + 1; *p && *p != ')';) {
-        char *end;
-        long long n = strtoll(p, &end, 10);
-        if (end == p || n < 0 || *dims == 3) {
-            return false;
-        }
-        shape[(*dims)++] = n;
-        p = end + strspn(end, ", ");
-    }
-    return true;
-}
-
 rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                               rey_image *out) {
-    char text[1024];
-    int item, dims;
-    int64_t shape[3] = {0, 0, 1};
-    bool second = size > 12 && bytes[6] >= 2;
-    size_t length = size > 12 ? (size_t)bytes[8] | (size_t)bytes[9] << 8 : 0;
-    if (second) {
-        length |= (size_t)bytes[10] << 16 | (size_t)bytes[11] << 24;
+    rey_npy npy;
+    rey_result result = rey_npy_header(ctx, name, bytes, size, size, &npy);
+    if (result != REY_OK) {
+        return result;
     }
-    size_t at = (second ? 12u : 10u) + length;
-    if (size <= 12 || at > size || length >= sizeof text) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: malformed NPY header", name);
-    }
-    memcpy(text, bytes + at - length, length);
-    text[length] = 0;
-    if (!npy_header(text, &item, shape, &dims) || dims < 2) {
+    int64_t channels = npy.dims == 3 ? npy.shape[2] : 1;
+    if (npy.dims < 2 || npy.dims > 3 || npy.shape[0] > IMAGE_LARGEST || npy.shape[1] > IMAGE_LARGEST || channels < 1 ||
+        channels > 64) {
         return rey_fail(ctx, REY_ERROR_FORMAT,
-                        "%s: expected a C-ordered float32 or float64 array of 2 or 3 dimensions", name);
+                        "%s: expected an array of height x width or height x width x channels, each side at most %d and up "
+                        "to 64 channels", name, IMAGE_LARGEST);
     }
-    if (shape[0] > IMAGE_LARGEST || shape[1] > IMAGE_LARGEST || shape[2] < 1 || shape[2] > 64 ||
-        (uint64_t)(shape[0] * shape[1] * shape[2]) > (size - at) / (size_t)item) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends before its array", name);
-    }
-    rey_result result = rey_image_new(ctx, name, shape[1], shape[0], (int)shape[2], out);
-    for (int64_t i = 0; i < shape[0] * shape[1] * shape[2] && result == REY_OK; i++) {
+    result = rey_image_new(ctx, name, npy.shape[1], npy.shape[0], (int)channels, out);
+    for (int64_t i = 0; i < npy.count && result == REY_OK; i++) {
         double wide;
-        if (item == 4) {
-            memcpy(out->data + i, bytes + at + 4 * i, 4);
+        if (npy.item == 4) {
+            memcpy(out->data + i, bytes + npy.data + 4 * i, 4);
         } else {
-            memcpy(&wide, bytes + at + 8 * i, 8);
+            memcpy(&wide, bytes + npy.data + 8 * i, 8);
             out->data[i] = (float)wide;
         }
     }

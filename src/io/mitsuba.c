@@ -123,10 +123,14 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
             return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a scene can have only one integrator");
         }
         return build_integrator(b, node);
-    case REY_XML_MEDIUM:
-    case REY_XML_VOLUME:
+    case REY_XML_VOLUME: {
+        TextureUse use = {REY_COLOUR_UNBOUNDED, true, -INFINITY, INFINITY, "", "values over space", 0, NULL};
+        return build_volume(b, node, use, name, &unused);
+    }
     case REY_XML_PHASE:
-        return build_unknown(b, node, build_medium_word, NULL);
+        return build_phase(b, node, name, &unused);
+    case REY_XML_MEDIUM:
+        return build_medium(b, node, name, &unused);
     default:
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a %s cannot stand at the top level of a scene",
                             rey_xml_tag_name(node->tag));
@@ -237,6 +241,7 @@ static rey_result build_scene(Builder *b) {
     TRY(build_check_unused(b, root));
     TRY(build_attribute_tables(b));
     find_drops(b);
+    TRY(build_media_use(b));
     name_further_terms(b);
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);

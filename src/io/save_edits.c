@@ -74,10 +74,13 @@ static Edit find_edit(const Writer *w, int i) {
                                              : NULL;
     Edit edit = {.param = i, .next = -1};
     if (s) {
-        bool constant = w->scene->view.textures[s->texture].kind == TEXTURE_CONSTANT;
+        int32_t kind = w->scene->view.textures[s->texture].kind;
         edit.node = s->node;
         edit.property = is_texture_object(w, s->node) ? NULL : s->property;
-        edit.kind = p->texture < 0 ? EDIT_TO_UV : constant ? EDIT_CONSTANT : EDIT_TEXELS;
+        edit.kind = p->texture < 0              ? EDIT_TO_UV
+                    : kind == TEXTURE_CONSTANT ? EDIT_CONSTANT
+                    : kind == TEXTURE_TABLE    ? EDIT_LIST
+                                               : EDIT_TEXELS;
         return edit;
     }
     edit.node = find_by_name(w, p->name);
@@ -155,7 +158,7 @@ bool rey_save_is_curve_or_grid(const rey_xml_node *node) {
 // Properties that say in other words what the leaf says.
 static bool leaf_replaces(const char *leaf, const char *property) {
     static const char *const pose[] = {"to_world", "position", "direction", "origin",
-                                       "center",   "radius",   "p0",        "p1",     NULL};
+                                       "center",   "radius",   "p0",        "p1",     "use_grid_bbox", NULL};
     static const char *const point[] = {"to_world", "position", "direction", NULL};
     static const char *const fov[] = {"fov", "fov_axis", "focal_length", NULL};
     return strcmp(leaf, "to_world") == 0                                    ? is_one_of(property, pose)
@@ -166,7 +169,9 @@ static bool leaf_replaces(const char *leaf, const char *property) {
 
 static bool constant_replaces(const char *constant, const char *property) {
     bool metal = strcmp(constant, "eta") == 0 || strcmp(constant, "k") == 0;
-    return strcmp(constant, property) == 0 || (metal && strcmp(property, "material") == 0) ||
+    bool medium = strcmp(constant, "sigma_t") == 0 || strcmp(constant, "albedo") == 0;
+    bool sum = strcmp(property, "sigma_s") == 0 || strcmp(property, "sigma_a") == 0;
+    return (medium && sum) || strcmp(constant, property) == 0 || (metal && strcmp(property, "material") == 0) ||
            (strcmp(constant, "int_ior") == 0 && strcmp(property, "ext_ior") == 0);
 }
 
@@ -174,6 +179,7 @@ bool rey_save_replaces(const Writer *w, const rey_xml_node *node, const char *pr
     static const char *const mesh[] = {"filename", "to_world", "shape_index", "flip_tex_coords", "face_normals", NULL};
     static const char *const curve[] = {"filename", "to_world", NULL}, *const grid[] = {"filename", NULL};
     static const char *const texels[] = {"filename", "raw", "format", NULL};
+    static const char *const voxels[] = {"filename", "to_world", "use_grid_bbox", NULL};
     for (const Edit *e = rey_save_first_edit(w, node); e; e = rey_save_next_edit(w, e)) {
         bool same = false;
         switch (e->kind) {
@@ -184,7 +190,10 @@ bool rey_save_replaces(const Writer *w, const rey_xml_node *node, const char *pr
             same = strcmp(property, "to_uv") == 0;
             break;
         case EDIT_TEXELS:
-            same = is_one_of(property, texels);
+            same = is_one_of(property, node->tag == REY_XML_VOLUME ? voxels : texels);
+            break;
+        case EDIT_LIST:
+            same = strcmp(property, e->property) == 0;
             break;
         case EDIT_GEOMETRY:
             same = is_one_of(property, build_is_curve(node->type) ? curve : rey_save_is_curve_or_grid(node) ? grid : mesh);
@@ -213,10 +222,38 @@ void rey_save_constant(Writer *w, int depth, const char *name, int32_t texture) 
     }
 }
 
-// The other half of a metal's index, when a material's name stood for both.
+// A constant; colours in place of a volume end at 1, those of a constvolume do not.
+static void write_value(Writer *w, int depth, const rey_xml_node *node, const char *name, int32_t texture) {
+    const TextureNode *t = w->scene->view.textures + texture;
+    const float *v = theta(w, t->theta);
+    if (node->tag != REY_XML_MEDIUM || t->channels != 3 || !(v[0] > 1 || v[1] > 1 || v[2] > 1)) {
+        rey_save_constant(w, depth, name, texture);
+        return;
+    }
+    rey_save_line(w, depth, "<volume type=\"constvolume\" name=\"%s\">", name);
+    rey_save_constant(w, depth + 1, "value", texture);
+    rey_save_line(w, depth, "</volume>");
+}
+
+// What goes with a property: the other half of a metal's index, and of a medium's coefficients.
+static const char *other_half(const Edit *e) {
+    static const char *const pairs[][2] = {{"eta", "k"}, {"sigma_t", "albedo"}};
+    bool metal = strstr(e->node->type, "conductor") != NULL;
+    bool medium = e->node->tag == REY_XML_MEDIUM && (rey_xml_has(e->node, "sigma_s") || rey_xml_has(e->node, "sigma_a"));
+    for (int i = 0; i < COUNT_OF(pairs); i++) {
+        for (int k = 0; k < 2 && (i ? medium : metal); k++) {
+            if (strcmp(e->property, pairs[i][k]) == 0) {
+                return pairs[i][1 - k];
+            }
+        }
+    }
+    return NULL;
+}
+
+// The other half, when other words stood for both.
 static void write_other_half(Writer *w, int depth, const Edit *e) {
-    const char *other = strcmp(e->property, "eta") == 0 ? "k" : strcmp(e->property, "k") == 0 ? "eta" : NULL;
-    if (!other || rey_xml_has(e->node, other) || strstr(e->node->type, "conductor") == NULL) {
+    const char *other = other_half(e);
+    if (!other || rey_xml_has(e->node, other)) {
         return;
     }
     for (size_t i = 0; i < w->source->textures.count; i++) {
@@ -227,7 +264,7 @@ static void write_other_half(Writer *w, int depth, const Edit *e) {
                     return;
                 }
             }
-            rey_save_constant(w, depth, other, s->texture);
+            write_value(w, depth, e->node, other, s->texture);
         }
     }
 }
@@ -240,7 +277,7 @@ static void write_constant(Writer *w, int depth, const Edit *e) {
         rey_save_line(w, depth, "</bsdf>");
         return;
     }
-    rey_save_constant(w, depth, e->property, texture);
+    write_value(w, depth, e->node, e->property, texture);
     if (strcmp(e->property, "int_ior") == 0) {
         rey_save_line(w, depth, "<float name=\"ext_ior\" value=\"1\"/>");
     }
@@ -267,10 +304,38 @@ static void write_to_uv(Writer *w, int depth, const Edit *e) {
     rey_save_matrix(w, depth, "to_uv", pose);
 }
 
+// Numbers, as many as there are.
+static rey_result write_list(Writer *w, int depth, const Edit *e) {
+    const Param *p = param_at(w, e->param);
+    enum { ROOM = 18 };
+    char *text = rey_alloc_array(w->ctx, (size_t)p->count + 1, ROOM);
+    size_t used = 0;
+    TRY(text ? REY_OK : REY_ERROR_MEMORY);
+    for (int32_t i = 0; i < p->count; i++) {
+        used += (size_t)snprintf(text + used, ROOM, "%s%.9g", i ? ", " : "", (double)theta(w, p->theta)[i]);
+    }
+    rey_save_value(w, depth, "string", e->property, text);
+    rey_free(w->ctx, text);
+    return REY_OK;
+}
+
 // ---- data files --------------------------------------------------------------------------------------------------
+
+// The voxels of a grid, and where it stands: its box may have come from the file that this one replaces.
+static rey_result write_voxels(Writer *w, int depth, int32_t volume) {
+    const VolumeNode *v = w->scene->view.volumes + volume;
+    char path[4096];
+    TRY(rey_save_new_file(w, depth, "volume", ".vol", path));
+    rey_save_matrix(w, depth, "to_world", theta(w, v->to_world));
+    rey_vol vol = {v->nx, v->ny, v->nz, v->channels, {0, 0, 0, 1, 1, 1}, w->scene->view.theta + v->theta};
+    return rey_vol_write(w->ctx, path, &vol);
+}
 
 static rey_result write_texels(Writer *w, int depth, const Edit *e) {
     const TextureNode *t = w->scene->view.textures + param_at(w, e->param)->texture;
+    if (t->kind == TEXTURE_VOLUME) {
+        return write_voxels(w, depth, t->volume);
+    }
     bool bitmap = (REY_XML_BIT(e->node->tag) & REY_XML_TEXTURES) != 0;
     char path[4096];
     TRY(rey_save_new_file(w, depth, bitmap ? "texture" : "environment", ".exr", path));
@@ -345,6 +410,7 @@ static rey_result write_geometry(Writer *w, int depth, const rey_xml_node *node)
 
 rey_result rey_save_write_edits(Writer *w, int depth, const rey_xml_node *node) {
     bool geometry = rey_save_has_edit(w, node, EDIT_GEOMETRY), mesh = geometry && !rey_save_is_curve_or_grid(node);
+    bool voxels = node->tag == REY_XML_VOLUME && rey_save_has_edit(w, node, EDIT_TEXELS);
     for (const Edit *e = rey_save_first_edit(w, node); e; e = rey_save_next_edit(w, e)) {
         switch (e->kind) {
         case EDIT_CONSTANT:
@@ -356,8 +422,11 @@ rey_result rey_save_write_edits(Writer *w, int depth, const rey_xml_node *node) 
         case EDIT_TEXELS:
             TRY(write_texels(w, depth, e));
             break;
+        case EDIT_LIST:
+            TRY(write_list(w, depth, e));
+            break;
         case EDIT_LEAF:
-            if (!mesh) { // a mesh's vertices are in the world
+            if (!mesh && !voxels) { // a mesh's vertices are in the world, and a grid's pose goes with its voxels
                 write_leaf(w, depth, e);
             }
             break;

@@ -9,7 +9,8 @@
 typedef enum EditKind {
     EDIT_CONSTANT, // a value: a property of a node, written or default, or the texture object itself
     EDIT_TO_UV,    // a texture's mapping
-    EDIT_TEXELS,   // a picture: of a bitmap or of an environment
+    EDIT_TEXELS,   // a picture: of a bitmap or of an environment; voxels of a grid
+    EDIT_LIST,     // numbers in a string
     EDIT_GEOMETRY, // vertices, attributes, control points or distances of a shape
     EDIT_LEAF      // a number, a vector or a pose of the name that the parameter ends in
 } EditKind;

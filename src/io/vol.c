@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { HEADER = 48 };
+enum { MOST_VALUES = INT32_MAX };
 
 void rey_vol_free(rey_context *ctx, rey_vol *vol) {
     rey_free(ctx, vol->data);
@@ -20,72 +20,84 @@ static uint32_t load(const unsigned char *at) {
 static float load_float(const unsigned char *at) {
     uint32_t bits = load(at);
     float value;
-    memcpy(&value, &bits, sizeof value);
+    memcpy(&value, &bits, sizeof bits);
     return value;
 }
 
-static rey_result read_header(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_vol *out) {
-    if (size < HEADER || memcmp(bytes, "VOL", 3) != 0) {
+// 5 bits of exponent, 10 of mantissa.
+static float load_half(const unsigned char *at) {
+    uint32_t bits = (uint32_t)at[0] | (uint32_t)at[1] << 8, exponent = bits >> 10 & 31, mantissa = bits & 1023;
+    float value = exponent == 31 ? (mantissa ? NAN : INFINITY)
+                  : exponent     ? ldexpf((float)(1024 + mantissa), (int)exponent - 25)
+                                 : ldexpf((float)mantissa, -24);
+    return bits >> 15 ? -value : value;
+}
+
+size_t rey_vol_item(int encoding) { return encoding == VOL_FLOAT ? 4 : encoding == VOL_HALF ? 2 : 1; }
+
+rey_result rey_vol_header(rey_context *ctx, const char *name, const unsigned char *header, size_t size, rey_vol *out,
+                          int *encoding) {
+    *out = (rey_vol){0};
+    if (size < VOL_HEADER || memcmp(header, "VOL", 3) != 0) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte 0: not a VOL file, expected 'VOL' and a header of %d bytes", name,
-                        HEADER);
+                        VOL_HEADER);
     }
-    if (bytes[3] != 3 || load(bytes + 4) != 1) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte 3: version %d, encoding %u, expected version 3, encoding 1", name,
-                        bytes[3], (unsigned)load(bytes + 4));
+    uint32_t code = load(header + 4);
+    if (header[3] < 1 || header[3] > 3 || code < VOL_FLOAT || code > VOL_BYTE) {
+        return rey_fail(ctx, REY_ERROR_FORMAT,
+                        "%s: byte 3: version %d, encoding %u, expected version 1 to 3, encoding 1 (float), 2 (half) or 3 "
+                        "(byte)", name, header[3], (unsigned)code);
     }
+    *encoding = (int)code;
     int64_t n[4], count = 1;
     for (int k = 0; k < 4; k++) {
-        n[k] = (int32_t)load(bytes + 8 + 4 * k);
-        if (n[k] < 1 || n[k] > 1 << 20 || count > (INT32_MAX / 4) / n[k]) {
+        n[k] = (int32_t)load(header + 8 + 4 * k);
+        if (n[k] < 1 || n[k] > 1 << 20 || count > MOST_VALUES / n[k]) {
             return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %d: %lld is no number of %s, expected 1 or more and at most %d "
-                            "values in all", name, 8 + 4 * k, (long long)n[k], k < 3 ? "nodes" : "channels", INT32_MAX / 4);
+                            "values in all", name, 8 + 4 * k, (long long)n[k], k < 3 ? "nodes" : "channels", MOST_VALUES);
         }
         count *= n[k];
     }
-    if ((uint64_t)count * 4 > size - HEADER) {
+    if ((uint64_t)count > (size - VOL_HEADER) / rey_vol_item(*encoding)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %zu: the file ends inside its data, expected %lld values", name,
                         size, (long long)count);
     }
-    *out = (rey_vol){.nx = (int32_t)n[0], .ny = (int32_t)n[1], .nz = (int32_t)n[2], .channels = (int32_t)n[3]};
+    rey_vol vol = {.nx = (int32_t)n[0], .ny = (int32_t)n[1], .nz = (int32_t)n[2], .channels = (int32_t)n[3]};
     for (int k = 0; k < 6; k++) {
-        out->box[k] = load_float(bytes + 24 + 4 * k);
-        if (!isfinite(out->box[k])) {
-            *out = (rey_vol){0};
+        vol.box[k] = load_float(header + 24 + 4 * k);
+        if (!isfinite(vol.box[k])) {
             return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %d: a corner of the box is not finite", name, 24 + 4 * k);
+        }
+    }
+    *out = vol;
+    return REY_OK;
+}
+
+rey_result rey_vol_decode(rey_context *ctx, const char *name, int encoding, const unsigned char *bytes, size_t first,
+                          size_t count, float *values) {
+    size_t item = rey_vol_item(encoding);
+    for (size_t i = 0; i < count; i++) {
+        const unsigned char *at = bytes + item * i;
+        values[i] = encoding == VOL_FLOAT ? load_float(at) : encoding == VOL_HALF ? load_half(at) : (float)*at / 255;
+        if (!isfinite(values[i])) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %zu: the value is not finite", name,
+                            VOL_HEADER + item * (first + i));
         }
     }
     return REY_OK;
 }
 
 rey_result rey_vol_read_memory(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_vol *out) {
-    *out = (rey_vol){0};
-    rey_result result = read_header(ctx, name, bytes, size, out);
+    int encoding;
+    rey_result result = rey_vol_header(ctx, name, bytes, size, out, &encoding);
     if (result != REY_OK) {
         return result;
     }
     size_t count = (size_t)out->nx * (size_t)out->ny * (size_t)out->nz * (size_t)out->channels;
     out->data = rey_alloc_array(ctx, count, sizeof *out->data);
-    if (!out->data) {
-        return REY_ERROR_MEMORY;
-    }
-    for (size_t i = 0; i < count; i++) {
-        out->data[i] = load_float(bytes + HEADER + 4 * i);
-        if (!isfinite(out->data[i])) {
-            rey_vol_free(ctx, out);
-            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %zu: the value is not finite", name, HEADER + 4 * i);
-        }
-    }
-    return REY_OK;
-}
-
-rey_result rey_vol_read(rey_context *ctx, const char *path, rey_vol *out) {
-    unsigned char *bytes;
-    size_t size;
-    *out = (rey_vol){0};
-    rey_result result = rey_file_read(ctx, path, &bytes, &size);
-    if (result == REY_OK) {
-        result = rey_vol_read_memory(ctx, path, bytes, size, out);
-        rey_free(ctx, bytes);
+    result = out->data ? rey_vol_decode(ctx, name, encoding, bytes + VOL_HEADER, 0, count, out->data) : REY_ERROR_MEMORY;
+    if (result != REY_OK) {
+        rey_vol_free(ctx, out);
     }
     return result;
 }
@@ -106,7 +118,7 @@ static void store_floats(unsigned char *to, const float *values, size_t count) {
 
 rey_result rey_vol_write(rey_context *ctx, const char *path, const rey_vol *vol) {
     size_t count = (size_t)vol->nx * (size_t)vol->ny * (size_t)vol->nz * (size_t)vol->channels;
-    unsigned char *bytes = rey_alloc_array(ctx, count + HEADER / 4, 4);
+    unsigned char *bytes = rey_alloc_array(ctx, count + VOL_HEADER / 4, 4);
     if (!bytes) {
         return REY_ERROR_MEMORY;
     }
@@ -116,8 +128,8 @@ rey_result rey_vol_write(rey_context *ctx, const char *path, const rey_vol *vol)
         store(bytes + 4 + 4 * k, (uint32_t)header[k]);
     }
     store_floats(bytes + 24, vol->box, 6);
-    store_floats(bytes + HEADER, vol->data, count);
-    rey_result result = rey_file_write(ctx, path, bytes, HEADER + 4 * count);
+    store_floats(bytes + VOL_HEADER, vol->data, count);
+    rey_result result = rey_file_write(ctx, path, bytes, VOL_HEADER + 4 * count);
     rey_free(ctx, bytes);
     return result;
 }

@@ -2,8 +2,8 @@
 // collision [amanatides1987; yue2010]. All lanes step together, each through cells of its own.
 #pragma once
 
-#include "medium/volume.h"
 #include "scene/tables.h"
+#include "scene/volume.h"
 
 typedef struct MajorantWalk {
     Vec3 o, d;        // in the space of sigma_t; d has the length that world distances give it

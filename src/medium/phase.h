@@ -68,7 +68,7 @@ KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d
     phase_scatter_##type(call, node->slot[slot++], adjoint->field, sink, m);
 #define DEFINE_PHASE_FETCH(prefix, Record, PARAMS)                                                                     \
     KFN Record prefix##_fetch(const PhaseCall *call) {                                                                 \
-        const PhaseNode *node = call->nodes + call->node;                                                              \
+        const PhaseNode *node = call->scene->phases + call->node;                                                              \
         int slot = 0;                                                                                                  \
         Record record = {.floor = call->floor};                                                                        \
         record.table = node->table >= 0 ? call->scene->tables + node->table : NULL;                                    \
@@ -76,7 +76,7 @@ KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d
         return record;                                                                                                 \
     }                                                                                                                  \
     KFN void prefix##_scatter(const PhaseCall *call, const Record *adjoint, Sink *sink, Mask m) {                      \
-        const PhaseNode *node = call->nodes + call->node;                                                              \
+        const PhaseNode *node = call->scene->phases + call->node;                                                              \
         int slot = 0;                                                                                                  \
         PARAMS(SCATTER_PHASE_FIELD) UNUSED(adjoint), UNUSED(node), UNUSED(slot), UNUSED(sink), UNUSED(m);              \
     }
@@ -89,7 +89,7 @@ KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d
 // ---- dispatch ----------------------------------------------------------------------------------------------------
 
 static NOINLINE Float phase_eval(const PhaseCall *call, Vec3 wi, Vec3 wo) {
-    switch (call->nodes[call->node].kind) {
+    switch (call->scene->phases[call->node].kind) {
 #define PHASE_LEAF(ENUM, prefix, Record, ...)                                                                          \
     case PHASE_##ENUM: {                                                                                               \
         Record p = prefix##_fetch(call);                                                                               \
@@ -110,7 +110,7 @@ static NOINLINE Float phase_eval(const PhaseCall *call, Vec3 wi, Vec3 wo) {
 
 // Density of phase_sample per solid angle.
 static NOINLINE Float phase_pdf(const PhaseCall *call, Vec3 wi, Vec3 wo) {
-    switch (call->nodes[call->node].kind) {
+    switch (call->scene->phases[call->node].kind) {
 #define PHASE_LEAF(ENUM, prefix, Record, ...)                                                                          \
     case PHASE_##ENUM: {                                                                                               \
         Record p = prefix##_fetch(call);                                                                               \
@@ -131,7 +131,7 @@ static NOINLINE Float phase_pdf(const PhaseCall *call, Vec3 wi, Vec3 wo) {
 
 // u1 chooses among functions, u2 directions.
 static NOINLINE Vec3 phase_sample(const PhaseCall *call, Vec3 wi, Float u1, Vec2 u2) {
-    switch (call->nodes[call->node].kind) {
+    switch (call->scene->phases[call->node].kind) {
 #define PHASE_LEAF(ENUM, prefix, Record, ...)                                                                          \
     case PHASE_##ENUM: {                                                                                               \
         Record p = prefix##_fetch(call);                                                                               \
@@ -152,7 +152,7 @@ static NOINLINE Vec3 phase_sample(const PhaseCall *call, Vec3 wi, Float u1, Vec2
 
 static NOINLINE void phase_adj(const PhaseCall *call, Vec3 wi, Vec3 wo, Float df, Sink *sink, Mask m, Vec3 *dwi,
                                Vec3 *dwo) {
-    switch (call->nodes[call->node].kind) {
+    switch (call->scene->phases[call->node].kind) {
 #define PHASE_LEAF(ENUM, prefix, Record, ...)                                                                          \
     case PHASE_##ENUM: {                                                                                               \
         Record p = prefix##_fetch(call), dp = {.floor = 0};                                                            \

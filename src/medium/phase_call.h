@@ -1,12 +1,10 @@
 // phase_call.h: how a phase function made of others calls these; defined in phase.h.
 #pragma once
 
-#include "medium/phase_node.h"
 #include "medium/phase_record.h"
 
 typedef struct PhaseCall {
     const SceneView *scene;
-    const PhaseNode *nodes;
     int32_t node;
     TexCoord at;
     real floor; // see PHASE_RECORD
@@ -20,6 +18,6 @@ static NOINLINE void phase_adj(const PhaseCall *call, Vec3 wi, Vec3 wo, Float df
 
 KFN PhaseCall phase_child(const PhaseCall *call, int child) {
     PhaseCall c = *call;
-    c.node = call->nodes[call->node].child[child];
+    c.node = call->scene->phases[call->node].child[child];
     return c;
 }

@@ -1,7 +1,7 @@
 // table.h: the phase functions as data, for the reader, the documentation and the tests; and what they derive.
 #pragma once
 
-#include "medium/phase_node.h"
+#include "scene/scene.h"
 
 typedef enum PhaseParamType { PHASE_PARAM_NUMBER, PHASE_PARAM_TABLE, PHASE_PARAM_MATRIX } PhaseParamType;
 

@@ -53,6 +53,10 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
         return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no integrator, expected one such as <integrator "
                                               "type=\"path\"/>");
     }
+    if (scene->view.has_media) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "participating media are missing yet: the scene can be read and "
+                                                    "converted, but not rendered");
+    }
     if (scene->view.sensors_count == 0) {
         return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
     }

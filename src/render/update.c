@@ -5,6 +5,9 @@
 #include "bsdf/table.h"
 #include "emitter/update.h"
 #include "math/colour.h"
+#include "medium/majorant_build.h"
+#include "medium/table.h"
+#include "shape/affine.h"
 #include "shape/update.h"
 
 #include <string.h>
@@ -31,6 +34,45 @@ static void update_blackbodies(const SceneView *view) {
     }
 }
 
+static rey_result update_volume(rey_scene *scene, const VolumeNode *v) {
+    double inverse[12];
+    if (v->to_world < 0) {
+        return REY_OK;
+    }
+    if (!rey_affine_inverse(scene->view.theta + v->to_world, inverse)) {
+        return rey_fail(scene->ctx, REY_ERROR_PARAM, "a volume's to_world cannot be inverted");
+    }
+    for (int k = 0; k < 12; k++) {
+        scene->view.tables[v->table + k] = (float)inverse[k];
+    }
+    return REY_OK;
+}
+
+// What media derive from their parameters.
+static rey_result update_media(rey_scene *scene) {
+    const SceneView *view = &scene->view;
+    for (int64_t i = 0; i < view->volumes_count; i++) {
+        rey_result result = scene->dirty_volumes[i] ? update_volume(scene, view->volumes + i) : REY_OK;
+        if (result != REY_OK) {
+            return result;
+        }
+    }
+    for (int64_t i = 0; i < view->phases_count; i++) {
+        if (scene->dirty_phases[i]) {
+            rey_phase_update(view, view->phases + i);
+        }
+    }
+    for (int64_t i = 0; i < view->media_count; i++) {
+        if (scene->dirty_media[i]) {
+            rey_medium_update(view, view->volumes + view->media[i].sigma_t, view->media + i);
+        }
+    }
+    memset(scene->dirty_volumes, 0, (size_t)view->volumes_count);
+    memset(scene->dirty_phases, 0, (size_t)view->phases_count);
+    memset(scene->dirty_media, 0, (size_t)view->media_count);
+    return REY_OK;
+}
+
 rey_result rey_scene_update(rey_scene *scene) {
     SceneView *view = &scene->view;
     rey_result result = REY_OK;
@@ -50,6 +92,9 @@ rey_result rey_scene_update(rey_scene *scene) {
     }
     for (int32_t i = 0; i < view->emitters_count && result == REY_OK; i++) {
         result = scene->dirty_emitters[i] ? rey_emitter_update(scene, i) : REY_OK;
+    }
+    if (result == REY_OK) {
+        result = update_media(scene);
     }
     if (result == REY_OK) {
         result = rey_accel_update(scene);

@@ -130,6 +130,16 @@ static void texture_changed(rey_scene *scene, int32_t texture) {
             scene->dirty_bsdfs[i] |= b->slot[k] == texture;
         }
     }
+    for (int64_t i = 0; i < scene->view.media_count; i++) {
+        const MediumNode *m = scene->view.media + i;
+        scene->dirty_media[i] |= scene->view.volumes[m->sigma_t].texture == texture || m->scale_texture == texture;
+    }
+    for (int64_t i = 0; i < scene->view.phases_count; i++) {
+        const PhaseNode *p = scene->view.phases + i;
+        for (int k = 0; k < MAX_PHASE_SLOTS && p->table >= 0; k++) {
+            scene->dirty_phases[i] |= p->slot[k] == texture;
+        }
+    }
 }
 
 rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count) {
@@ -165,6 +175,9 @@ static void mark_change(rey_scene *scene, const Param *p) {
     }
     if (p->emitter >= 0) {
         scene->dirty_emitters[p->emitter] = 1;
+    }
+    if (p->volume >= 0) {
+        scene->dirty_volumes[p->volume] = 1;
     }
 }
 

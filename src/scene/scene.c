@@ -88,7 +88,11 @@ rey_result rey_scene_freeze(rey_scene *scene) {
     scene->dirty_instances = rey_alloc(scene->ctx, scene->build.instances.count + 1);
     scene->dirty_bsdfs = rey_alloc(scene->ctx, scene->build.bsdfs.count + 1);
     scene->dirty_emitters = rey_alloc(scene->ctx, scene->build.emitters.count + 1);
-    if (!scene->arena || !scene->dirty_shapes || !scene->dirty_instances || !scene->dirty_bsdfs || !scene->dirty_emitters) {
+    scene->dirty_volumes = rey_alloc(scene->ctx, scene->build.volumes.count + 1);
+    scene->dirty_media = rey_alloc(scene->ctx, scene->build.media.count + 1);
+    scene->dirty_phases = rey_alloc(scene->ctx, scene->build.phases.count + 1);
+    if (!scene->arena || !scene->dirty_shapes || !scene->dirty_instances || !scene->dirty_bsdfs || !scene->dirty_emitters ||
+        !scene->dirty_volumes || !scene->dirty_media || !scene->dirty_phases) {
         return REY_ERROR_MEMORY;
     }
 #define ARRAY(type, name, comment)                                                                                     \
@@ -104,6 +108,9 @@ rey_result rey_scene_freeze(rey_scene *scene) {
     memset(scene->dirty_instances, 1, (size_t)scene->view.instances_count);
     memset(scene->dirty_bsdfs, 1, (size_t)scene->view.bsdfs_count);
     memset(scene->dirty_emitters, 1, (size_t)scene->view.emitters_count);
+    memset(scene->dirty_volumes, 1, (size_t)scene->view.volumes_count);
+    memset(scene->dirty_media, 1, (size_t)scene->view.media_count);
+    memset(scene->dirty_phases, 1, (size_t)scene->view.phases_count);
     scene->dirty = true;
     return REY_OK;
 }
@@ -137,6 +144,9 @@ void rey_scene_destroy(rey_scene *scene) {
     rey_free(ctx, scene->dirty_instances);
     rey_free(ctx, scene->dirty_bsdfs);
     rey_free(ctx, scene->dirty_emitters);
+    rey_free(ctx, scene->dirty_volumes);
+    rey_free(ctx, scene->dirty_media);
+    rey_free(ctx, scene->dirty_phases);
     rey_free(ctx, scene->integrator);
     if (scene->document_free) {
         scene->document_free(scene->document);

@@ -7,7 +7,15 @@
 
 enum { MAX_SLOTS = 16, MAX_CONFIG = 4, MAX_CHILDREN = 2, MAX_EMITTER_SLOTS = 5 };
 
-enum { TEXTURE_CONSTANT, TEXTURE_BITMAP, TEXTURE_CHECKERBOARD, TEXTURE_ATTRIBUTE, TEXTURE_BLACKBODY };
+enum {
+    TEXTURE_CONSTANT,
+    TEXTURE_BITMAP,
+    TEXTURE_CHECKERBOARD,
+    TEXTURE_ATTRIBUTE,
+    TEXTURE_BLACKBODY,
+    TEXTURE_VOLUME, // the voxels of a grid
+    TEXTURE_TABLE   // a list of `width` numbers that its user looks up itself
+};
 // What a black body derives from its temperature, in theta: colour, derivative, the temperature that these belong to; and
 // the wavelengths that it emits.
 enum { BLACKBODY_SLOPE = 3, BLACKBODY_BUILT = 6, BLACKBODY_RANGE = 7, BLACKBODY_NUMBERS = 9 };
@@ -23,6 +31,7 @@ typedef struct TextureNode {
     int32_t child[2]; // checkerboard: color0, color1; mesh_attribute: scale, -1; blackbody: temperature, -1
     int32_t attribute; // mesh_attribute: its first entry in `attributes`
     int32_t per_face;
+    int32_t volume;    // volume: whose voxels these are
 } TextureNode;
 
 typedef struct BsdfNode {
@@ -35,6 +44,43 @@ typedef struct BsdfNode {
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
     int32_t turns;               // turns the shading normal, itself or in a child
 } BsdfNode;
+
+enum {
+#define VOLUME(ENUM, prefix, name) VOLUME_##ENUM,
+#include "scene/volumes.inl"
+#undef VOLUME
+    VOLUME_KIND_COUNT
+};
+
+// A field over the unit cube, which to_world places.
+typedef struct VolumeNode {
+    int32_t kind;
+    int32_t theta, channels; // first value; 1, 3 or 6 numbers per voxel
+    int32_t nx, ny, nz;      // voxels, x fastest
+    int32_t filter, wrap;    // as of bitmaps
+    int32_t table;           // rows of the inverse of to_world (12), -1 = the unit cube itself
+    int32_t to_world;        // theta offset of 4 x 4, -1 = the unit cube itself
+    int32_t texture;         // what its values are known as where derivatives are gathered
+} VolumeNode;
+
+enum { MAX_PHASE_SLOTS = 1, MAX_PHASE_CHILDREN = 2 };
+
+typedef struct PhaseNode {
+    int32_t kind;                      // medium/kinds.inl
+    int32_t slot[MAX_PHASE_SLOTS];     // textures, in the order of the kind's parameter list; tables: as many as width says
+    int32_t child[MAX_PHASE_CHILDREN]; // nested functions, -1 = none
+    int32_t table;                     // first derived value in `tables`, -1 = none
+} PhaseNode;
+
+// Extinction is scale x sigma_t, of which the share `albedo` scatters.
+typedef struct MediumNode {
+    int32_t sigma_t, albedo;        // volumes
+    int32_t emission;               // volume: radiance that is added per unit of length, whatever sigma_t and scale are; -1 = none
+    int32_t phase;
+    int32_t scale, scale_texture;   // theta offset, and the texture of that number
+    int32_t bounded;                // heterogeneous: nothing lies outside of the cube of sigma_t
+    int32_t nx, ny, nz, table;      // supervoxels, and the largest extinction in each of them
+} MediumNode;
 
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };
 // Host only: the vertex normals were computed from the positions and follow them.
@@ -157,6 +203,7 @@ typedef struct SceneView {
     int32_t max_depth, rr_depth, hide_emitters;
     bool solid;               // surfaces that let a ray pass hide nothing behind them, and count in alpha (direct)
     bool drops;               // with hidden emitters, a path that met only surfaces that let it pass brings nothing (path)
+    bool has_media;           // paths go through participating media
     bool through;             // passing a surface undeviated counts in no depth, and shadow rays do it (volpath)
     // direct: of `split` samples in a row, the first light_samples sample a light and the first scatter_samples the
     // scattering function; 0 = every sample does both.
@@ -187,10 +234,11 @@ typedef struct Param {
     int32_t camera;           // which of a sensor's numbers that is: CAMERA_, -1 = none
     int32_t emitter;          // emitter whose place this is, -1 = none
     int32_t place;            // which of its slots that is
+    int32_t volume;           // volume whose pose this is, -1 = none
     uint32_t version;         // counts changes of the values
     uint32_t built;           // the version that derived data was built from
 } Param;
-#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .camera = -1, .emitter = -1, .low = -INFINITY, .high = INFINITY
+#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .camera = -1, .emitter = -1, .volume = -1, .low = -INFINITY, .high = INFINITY
 
 typedef struct Alias {
     char *name;
@@ -215,7 +263,7 @@ struct rey_scene {
     struct Surface *embree_surfaces; // per shape: what the ray tracer's callbacks see (shape/pose.h)
     void *embree_device, **embree_groups; // RTCDevice; one RTCScene per shapegroup
     void (*accel_free)(rey_scene *scene); // set by accel, which owns view.embree and embree_device
-    uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters; // derived data to rebuild before the next kernel runs
+    uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters, *dirty_volumes, *dirty_media, *dirty_phases; // derived data to rebuild before the next kernel runs
     bool dirty;
     char *integrator;
     void *document;           // io's source document, owned; freed through document_free

@@ -24,7 +24,7 @@ static void failures_of_convert(void **state) {
 static const char *const broken_scene =
     "<scene version='3.0.0'><integrator type='stokes'/><sensor type='perspective'><film type='hdrfilm'>"
     "<integer name='width' value='8'/><integer name='height' value='8'/></film><float name='zoom' value='2'/></sensor>"
-    "<medium type='homogeneous' id='fog'/><emitter type='sunsky'/><emitter type='constant'/>"
+    "<medium type='haze' id='fog'/><emitter type='sunsky'/><emitter type='constant'/>"
     "<shape type='sphere'><bsdf type='twosided'><bsdf type='hair' id='fur'/></bsdf>"
     "<ref name='interior' id='fog'/></shape>"
     "<shape type='cube'><bsdf type='diffuse' id='wood'><texture type='bitmap' name='reflectance'>"
@@ -34,8 +34,8 @@ static const char *const broken_scene =
     "</scene>";
 
 static void lenient_reading_lists_what_it_leaves_out(void **state) {
-    static const char *const words[] = {"stokes",   "zoom", "homogeneous", "sunsky", "hair",
-                                        "212: medium", "none.png", "ellipsoids",  "no.obj"};
+    static const char *const words[] = {"stokes",   "zoom", "haze", "sunsky", "hair",
+                                        "212: there is no medium", "none.png", "ellipsoids",  "no.obj"};
     static const char *const commands[] = {"params broken.xml --lenient --json", "info broken.xml --lenient --json",
                                            "render broken.xml --spp 2 -o a.npy --lenient --json",
                                            "convert broken.xml mended.xml --lenient --json"};

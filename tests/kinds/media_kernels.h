@@ -1,7 +1,7 @@
 // media_kernels.h: what the tests of volumes and of tracking share, compiled as phase_kernels.h says.
 #pragma once
 
-#include "medium/medium_node.h"
+#include "scene/scene.h"
 
 enum { MEDIA_THETA = 1024, MEDIA_TABLES = 256 };
 

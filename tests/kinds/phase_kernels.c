@@ -38,6 +38,7 @@ static void view_make(const PhaseCase *c, View *v) {
     v->scene.theta = v->theta;
     v->scene.tables = v->tables;
     v->scene.textures = (TextureNode *)(uintptr_t)c->textures;
+    v->scene.phases = (PhaseNode *)(uintptr_t)c->nodes;
 }
 
 // Entry k of lane l is item (first + l), the last one repeated past the end.
@@ -56,7 +57,7 @@ static void view_make(const PhaseCase *c, View *v) {
         GATHER((target).y, (field)[1]);                                                                                \
         GATHER((target).z, (field)[2]);                                                                                \
     } while (0)
-#define CALL(uv) {&view.scene, c->nodes, c->root, texcoord(uv, NULL), (real)c->floor}
+#define CALL(uv) {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor}
 
 static void put3(double *to, Vec3 v, int lane) {
     to[0] = (double)f_lane(v.x, lane);

@@ -2,7 +2,7 @@
 // in float at every width and in double throughout.
 #pragma once
 
-#include "medium/phase_node.h"
+#include "scene/scene.h"
 
 enum { PHASE_NODES = 3, PHASE_TEXTURES = 4, PHASE_THETA = 64 };
 

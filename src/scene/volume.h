@@ -2,7 +2,6 @@
 // NOT differentiated: jumps of nearest voxels and of the cube's border under a point that moves.
 #pragma once
 
-#include "medium/medium_node.h"
 #include "scene/sink.h"
 #include "scene/texture.h"
 
@@ -121,7 +120,7 @@ KFN Spec volume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
     case VOLUME_##ENUM:                                                                                                \
         return prefix##_eval(scene, v, p);
     default:
-#include "medium/volumes.inl"
+#include "scene/volumes.inl"
 #undef VOLUME
     }
 }
@@ -132,7 +131,7 @@ KFN void volume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d,
     case VOLUME_##ENUM:                                                                                                \
         prefix##_adj(scene, v, p, d, at, dp, sink, m);                                                                 \
         break;
-#include "medium/volumes.inl"
+#include "scene/volumes.inl"
 #undef VOLUME
     default:
         break;

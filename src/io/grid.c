@@ -1,0 +1,90 @@
+// grid.c: fields over space from files.
+#include "io/grid.h"
+
+#include "io/file.h"
+#include "io/npy.h"
+#include "io/vol.h"
+
+#include <string.h>
+#include <unistd.h>
+
+enum { GRID_VOL, GRID_NPY };
+enum { HEAD = 1 << 12, CHUNK = 1 << 20 }; // bytes; values
+
+int64_t rey_grid_count(const rey_grid *grid) { return (int64_t)grid->nx * grid->ny * grid->nz * grid->channels; }
+
+void rey_grid_close(rey_grid *grid) {
+    close(grid->file);
+    grid->file = -1;
+}
+
+static rey_result read_vol_header(rey_context *ctx, const unsigned char *head, size_t size, rey_grid *out) {
+    rey_vol vol;
+    rey_result result = rey_vol_header(ctx, out->path, head, size, &vol, &out->encoding);
+    out->nx = vol.nx;
+    out->ny = vol.ny;
+    out->nz = vol.nz;
+    out->channels = vol.channels;
+    memcpy(out->box, vol.box, sizeof out->box);
+    out->data = VOL_HEADER;
+    return result;
+}
+
+// Z x Y x X, or Z x Y x X x channels.
+static rey_result read_npy_header(rey_context *ctx, const unsigned char *head, size_t head_size, size_t size, rey_grid *out) {
+    rey_npy npy;
+    rey_result result = rey_npy_header(ctx, out->path, head, head_size, size, &npy);
+    if (result != REY_OK) {
+        return result;
+    }
+    const int64_t *n = npy.shape;
+    if (npy.dims < 3 || npy.count < 1 || npy.count > INT32_MAX) {
+        return rey_fail(ctx, REY_ERROR_FORMAT,
+                        "%s: an array of %d dimensions and %lld numbers is no grid, expected Z x Y x X or Z x Y x X x channels "
+                        "and 1 to 2^31 - 1 numbers", out->path, npy.dims, (long long)npy.count);
+    }
+    out->nz = (int32_t)n[0];
+    out->ny = (int32_t)n[1];
+    out->nx = (int32_t)n[2];
+    out->channels = npy.dims == 4 ? (int32_t)n[3] : 1;
+    out->encoding = npy.item;
+    out->data = npy.data;
+    memcpy(out->box, (const float[6]){0, 0, 0, 1, 1, 1}, sizeof out->box);
+    return REY_OK;
+}
+
+rey_result rey_grid_open(rey_context *ctx, const char *path, rey_grid *out) {
+    unsigned char head[HEAD];
+    size_t size;
+    *out = (rey_grid){.path = path, .file = -1};
+    rey_result result = rey_file_open(ctx, path, &out->file, &size);
+    if (result != REY_OK) {
+        return result;
+    }
+    size_t known = size < HEAD ? size : HEAD;
+    result = rey_file_read_part(ctx, path, out->file, 0, head, known);
+    if (result == REY_OK) {
+        out->format = known >= 6 && memcmp(head, "\x93NUMPY", 6) == 0 ? GRID_NPY : GRID_VOL;
+        result = out->format == GRID_NPY ? read_npy_header(ctx, head, known, size, out) : read_vol_header(ctx, head, size, out);
+    }
+    if (result != REY_OK) {
+        rey_grid_close(out);
+    }
+    return result;
+}
+
+rey_result rey_grid_read(rey_context *ctx, const rey_grid *grid, float *values) {
+    size_t count = (size_t)rey_grid_count(grid), item = grid->format == GRID_NPY ? (size_t)grid->encoding : rey_vol_item(grid->encoding);
+    unsigned char *bytes = rey_alloc_array(ctx, count < CHUNK ? count : CHUNK, item);
+    rey_result result = bytes ? REY_OK : REY_ERROR_MEMORY;
+    for (size_t first = 0; first < count && result == REY_OK; first += CHUNK) {
+        size_t n = count - first < CHUNK ? count - first : CHUNK;
+        result = rey_file_read_part(ctx, grid->path, grid->file, grid->data + item * first, bytes, item * n);
+        if (result == REY_OK) {
+            result = grid->format == GRID_NPY ? rey_npy_decode(ctx, grid->path, grid->encoding, bytes, first, n, values + first)
+                                              : rey_vol_decode(ctx, grid->path, grid->encoding, bytes, first, n, values + first);
+        }
+    }
+    rey_free(ctx, bytes);
+    return result;
+}
