@@ -277,6 +277,18 @@ static void test_update(void **state) {
     rey_scene_destroy(scene);
 }
 
+// Grids of other files: NanoVDB with its own box, and arrays where an sdfgrid wants its nodes.
+static void test_other_files(void **state) {
+    static const float rows[12] = {9, 0, 0, -1.75f, 0, 7.5f, 0, 61.75f, 0, 0, 3.5f, 4.25f};
+    rey_scene *scene = must_load(*state, HETERO(GRID("sigma_t", TEST_DATA_DIR "/nvdb/float.nvdb", "<boolean name='use_grid_bbox' value='true'/>"))
+                                         "<shape type='sdfgrid' id='blob'><string name='filename' value='dense.npy'/></shape>");
+    const VolumeNode *v = scene->view.volumes + scene->view.media[0].sigma_t;
+    assert_true(v->nx == 18 && v->ny == 15 && v->nz == 7);
+    assert_memory_equal(scene->view.theta + v->to_world, rows, sizeof rows);
+    assert_true(rey_param_values(scene, find(scene, "blob.grid"))[7] == 7);
+    rey_scene_destroy(scene);
+}
+
 static void assert_same(rey_scene *a, rey_scene *b) {
     assert_int_equal(rey_param_count(a), rey_param_count(b));
     for (int i = 0; i < rey_param_count(a); i++) {
@@ -322,6 +334,7 @@ static void test_round_trip(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_records),
                                        cmocka_unit_test(test_use),      cmocka_unit_test(test_parameters),
-                                       cmocka_unit_test(test_update),   cmocka_unit_test(test_round_trip)};
+                                       cmocka_unit_test(test_update),   cmocka_unit_test(test_other_files),
+                                       cmocka_unit_test(test_round_trip)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -73,7 +73,7 @@ static void test_written_is_read(void **state) {
     again = (rey_vol){.nx = grid.nx, .ny = grid.ny, .nz = grid.nz, .channels = grid.channels, .data = values};
     memcpy(again.box, grid.box, sizeof again.box);
     assert_int_equal(rey_grid_read(*state, &grid, values), REY_OK);
-    rey_grid_close(&grid);
+    rey_grid_close(*state, &grid);
     unlink(path);
     check_grid(&again);
     rey_vol_free(*state, &v);
@@ -136,7 +136,7 @@ static void test_npy(void **state) {
         assert_true(grid.nz == shapes[i][0] && grid.ny == shapes[i][1] && grid.nx == shapes[i][2]);
         assert_true(grid.channels == (i ? 3 : 1) && grid.box[0] == 0 && grid.box[5] == 1);
         assert_int_equal(rey_grid_read(*state, &grid, values), REY_OK);
-        rey_grid_close(&grid);
+        rey_grid_close(*state, &grid);
         assert_memory_equal(values, data, sizeof data);
     }
     assert_int_equal(rey_file_write(*state, path, "\x93NUMPY\1\0\x4a\0{'descr': '<f4', 'fortran_order': False, 'shape': (1048576, 1048576, 9), }     ", 84), REY_OK);

@@ -37,7 +37,7 @@ rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char 
     int64_t count = rey_grid_count(&grid);
     if (result == REY_OK) {
         result = read_nodes(b, node, &grid, shape);
-        rey_grid_close(&grid);
+        rey_grid_close(b->ctx, &grid);
     }
     rey_free(b->ctx, file);
     TRY(result);

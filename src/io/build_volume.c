@@ -123,8 +123,10 @@ static rey_result build_gridvolume(Builder *b, rey_xml_node *node, TextureUse us
     TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
     rey_result result = rey_grid_open(b->ctx, file, &grid);
     if (result == REY_OK) {
-        result = add_grid(b, node, &grid, use, path, id, volume);
-        rey_grid_close(&grid);
+        result = box && !grid.placed
+                     ? rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the file says no box along the axes, which 'use_grid_bbox' asks for")
+                     : add_grid(b, node, &grid, use, path, id, volume);
+        rey_grid_close(b->ctx, &grid);
     }
     rey_free(b->ctx, file);
     TRY(result);

@@ -8,14 +8,17 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { GRID_VOL, GRID_NPY };
+enum { GRID_VOL, GRID_NPY, GRID_NVDB };
 enum { HEAD = 1 << 12, CHUNK = 1 << 20 }; // bytes; values
 
 int64_t rey_grid_count(const rey_grid *grid) { return (int64_t)grid->nx * grid->ny * grid->nz * grid->channels; }
 
-void rey_grid_close(rey_grid *grid) {
+void rey_grid_close(rey_context *ctx, rey_grid *grid) {
     close(grid->file);
     grid->file = -1;
+    rey_nvdb_free(ctx, &grid->nvdb);
+    rey_free(ctx, grid->bytes);
+    grid->bytes = NULL;
 }
 
 static rey_result read_vol_header(rey_context *ctx, const unsigned char *head, size_t size, rey_grid *out) {
@@ -26,6 +29,7 @@ static rey_result read_vol_header(rey_context *ctx, const unsigned char *head, s
     out->nz = vol.nz;
     out->channels = vol.channels;
     memcpy(out->box, vol.box, sizeof out->box);
+    out->placed = true;
     out->data = VOL_HEADER;
     return result;
 }
@@ -49,14 +53,43 @@ static rey_result read_npy_header(rey_context *ctx, const unsigned char *head, s
     out->channels = npy.dims == 4 ? (int32_t)n[3] : 1;
     out->encoding = npy.item;
     out->data = npy.data;
-    memcpy(out->box, (const float[6]){0, 0, 0, 1, 1, 1}, sizeof out->box);
     return REY_OK;
+}
+
+static rey_result read_nvdb_header(rey_context *ctx, size_t size, rey_grid *out) {
+    out->bytes = rey_alloc(ctx, size);
+    rey_result result = out->bytes ? rey_file_read_part(ctx, out->path, out->file, 0, out->bytes, size) : REY_ERROR_MEMORY;
+    if (result == REY_OK) {
+        result = rey_nvdb_open(ctx, out->path, out->bytes, size, &out->nvdb);
+    }
+    if (result != REY_OK) {
+        return result;
+    }
+    out->nx = out->nvdb.nx;
+    out->ny = out->nvdb.ny;
+    out->nz = out->nvdb.nz;
+    out->channels = out->nvdb.channels;
+    out->placed = out->nvdb.placed;
+    memcpy(out->box, out->nvdb.box, sizeof out->box);
+    return REY_OK;
+}
+
+static rey_result read_header(rey_context *ctx, const unsigned char *head, size_t head_size, size_t size, rey_grid *out) {
+    if (rey_nvdb_known(head, head_size)) {
+        out->format = GRID_NVDB;
+        return read_nvdb_header(ctx, size, out);
+    }
+    if (head_size >= 6 && memcmp(head, "\x93NUMPY", 6) == 0) {
+        out->format = GRID_NPY;
+        return read_npy_header(ctx, head, head_size, size, out);
+    }
+    return read_vol_header(ctx, head, size, out);
 }
 
 rey_result rey_grid_open(rey_context *ctx, const char *path, rey_grid *out) {
     unsigned char head[HEAD];
     size_t size;
-    *out = (rey_grid){.path = path, .file = -1};
+    *out = (rey_grid){.path = path, .file = -1, .format = GRID_VOL, .box = {0, 0, 0, 1, 1, 1}};
     rey_result result = rey_file_open(ctx, path, &out->file, &size);
     if (result != REY_OK) {
         return result;
@@ -64,16 +97,18 @@ rey_result rey_grid_open(rey_context *ctx, const char *path, rey_grid *out) {
     size_t known = size < HEAD ? size : HEAD;
     result = rey_file_read_part(ctx, path, out->file, 0, head, known);
     if (result == REY_OK) {
-        out->format = known >= 6 && memcmp(head, "\x93NUMPY", 6) == 0 ? GRID_NPY : GRID_VOL;
-        result = out->format == GRID_NPY ? read_npy_header(ctx, head, known, size, out) : read_vol_header(ctx, head, size, out);
+        result = read_header(ctx, head, known, size, out);
     }
     if (result != REY_OK) {
-        rey_grid_close(out);
+        rey_grid_close(ctx, out);
     }
     return result;
 }
 
 rey_result rey_grid_read(rey_context *ctx, const rey_grid *grid, float *values) {
+    if (grid->format == GRID_NVDB) {
+        return rey_nvdb_read(ctx, grid->path, &grid->nvdb, values);
+    }
     size_t count = (size_t)rey_grid_count(grid), item = grid->format == GRID_NPY ? (size_t)grid->encoding : rey_vol_item(grid->encoding);
     unsigned char *bytes = rey_alloc_array(ctx, count < CHUNK ? count : CHUNK, item);
     rey_result result = bytes ? REY_OK : REY_ERROR_MEMORY;

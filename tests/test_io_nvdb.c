@@ -1,0 +1,170 @@
+// NanoVDB files, as its own library wrote them: voxels of every type that is read, compressed and not, and what becomes of
+// damaged ones.
+#include "io/file.h"
+#include "io/grid.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { NX = 18, NY = 15, NZ = 7, RECORDS = 16 + 176 }; // of the block; bytes before the first grid's name
+
+static int open_context(void **state) { return rey_context_create(NULL, (rey_context **)state) != REY_OK; }
+
+static int close_context(void **state) {
+    rey_context_destroy(*state);
+    return 0;
+}
+
+static void sample_path(const char *name, char path[1024]) { snprintf(path, 1024, "%s/nvdb/%s.nvdb", TEST_DATA_DIR, name); }
+
+// A block of voxels from (-5, 120, 3) to (12, 134, 9), across leaves and nodes, with a hole; outside is 0.
+static float block(int x, int y, int z) {
+    bool hole = x > 2 && x < 5 && y > 125;
+    return hole ? 0 : 0.25f + 0.5f * (0.5f + 0.5f * sinf(0.7f * (float)x + 0.3f * (float)y - 0.5f * (float)z));
+}
+
+static void check_block(const float *values, float tolerance) {
+    for (int i = 0; i < NX * NY * NZ; i++) {
+        float expected = block(i % NX - 5, i / NX % NY + 120, i / NX / NY + 3);
+        if (!(fabsf(values[i] - expected) <= (expected == 0 ? 0 : tolerance))) {
+            fail_msg("voxel %d is %g, expected %g", i, (double)values[i], (double)expected);
+        }
+    }
+}
+
+static void test_types(void **state) {
+    static const struct {
+        const char *name;
+        float tolerance;
+    } cases[] = {{"float", 1e-6f}, {"fp4", 0.026f}, {"fp8", 1.6e-3f}, {"fpn", 1e-2f}};
+    static const float box[6] = {-1.75f, 61.75f, 4.25f, 7.25f, 69.25f, 7.75f}; // half a unit a voxel, moved by (1, 2, 3)
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        char path[1024];
+        float values[NX * NY * NZ];
+        rey_grid grid;
+        sample_path(cases[i].name, path);
+        assert_int_equal(rey_grid_open(*state, path, &grid), REY_OK);
+        assert_true(grid.nx == NX && grid.ny == NY && grid.nz == NZ && grid.channels == 1 && grid.placed);
+        assert_memory_equal(grid.box, box, sizeof box);
+        assert_int_equal(rey_grid_read(*state, &grid, values), REY_OK);
+        rey_grid_close(*state, &grid);
+        check_block(values, cases[i].tolerance);
+    }
+}
+
+static void test_vectors(void **state) {
+    char path[1024];
+    float values[3 * 4 * 2 * 3];
+    rey_grid grid;
+    sample_path("vec3", path);
+    assert_int_equal(rey_grid_open(*state, path, &grid), REY_OK);
+    assert_true(grid.nx == 3 && grid.ny == 4 && grid.nz == 2 && grid.channels == 3);
+    assert_int_equal(rey_grid_read(*state, &grid, values), REY_OK);
+    rey_grid_close(*state, &grid);
+    for (int i = 0; i < 24; i++) {
+        const float expected[3] = {0.1f * (float)(i % 3), 0.1f * (float)(i / 3 % 4 + 6), 0.1f * (float)(i / 12)};
+        for (int c = 0; c < 3; c++) {
+            assert_true(fabsf(values[3 * i + c] - expected[c]) < 1e-6f);
+        }
+    }
+}
+
+// The same file without its compression.
+static unsigned char *make_plain(rey_context *ctx, size_t *size) {
+    char path[1024];
+    unsigned char *packed;
+    size_t packed_size;
+    rey_nvdb nvdb;
+    sample_path("float", path);
+    assert_int_equal(rey_file_read(ctx, path, &packed, &packed_size), REY_OK);
+    assert_int_equal(rey_nvdb_open(ctx, "packed", packed, packed_size, &nvdb), REY_OK);
+    size_t grid = nvdb.size + (size_t)(nvdb.tree - nvdb.own), head = RECORDS + 8; // "density" and its end
+    unsigned char *plain = malloc(head + grid);
+    assert_non_null(plain);
+    memcpy(plain, packed, head);
+    memcpy(plain + head, nvdb.own, grid);
+    plain[14] = 0;
+    rey_nvdb_free(ctx, &nvdb);
+    rey_free(ctx, packed);
+    *size = head + grid;
+    return plain;
+}
+
+static rey_result read_bytes(rey_context *ctx, const unsigned char *bytes, size_t size, float *values) {
+    rey_nvdb nvdb;
+    rey_result result = rey_nvdb_open(ctx, "v", bytes, size, &nvdb);
+    if (result == REY_OK) {
+        result = nvdb.nx * nvdb.ny * nvdb.nz * nvdb.channels == NX * NY * NZ ? rey_nvdb_read(ctx, "v", &nvdb, values) : REY_OK;
+        rey_nvdb_free(ctx, &nvdb);
+    }
+    return result;
+}
+
+static void test_plain(void **state) {
+    float values[NX * NY * NZ];
+    size_t size;
+    unsigned char *plain = make_plain(*state, &size);
+    assert_int_equal(read_bytes(*state, plain, size, values), REY_OK);
+    check_block(values, 1e-6f);
+    for (size_t part = 0; part < size - 64; part += part < 1024 ? 7 : 20011) { // no longer than what is read, for the sanitizer
+        unsigned char *cut = malloc(part + 1);
+        assert_non_null(cut);
+        memcpy(cut, plain, part);
+        assert_int_not_equal(read_bytes(*state, cut, part, values), REY_OK);
+        free(cut);
+    }
+    free(plain);
+}
+
+static void test_refused(void **state) {
+    enum { GRID = RECORDS + 8, TREE = GRID + 672, ROOT = TREE + 64 };
+    static const struct {
+        size_t at; // byte that gets a value of four
+        uint32_t value;
+        const char *message;
+    } cases[] = {{0, 0, "v: not a NanoVDB file"},
+                 {8, 33u << 21, "v: version 33 with 1 grids, expected version 32"},
+                 {12, 0, "v: version 32 with 0 grids"},
+                 {12, 0x20001, "v: the grid is compressed with Blosc"},
+                 {12, 0x70001, "v: the grid is compressed in an unknown way"},
+                 {16 + 136, UINT32_MAX, "v: the file ends inside the records"},
+                 {GRID, 0, "v: the file ends inside its grid"},
+                 {GRID + 636, 2, "v: the voxels are of type 2, expected float"},
+                 {TREE + 24, UINT32_MAX, "v: the file ends inside its grid"},
+                 {ROOT, 13, "v: the box of the grid has 0 voxels along axis 0"},
+                 {ROOT + 20, 1048577, "v: 283115250 voxels in a grid of"},
+                 {ROOT + 12, 0x7fffffff, "v: the box of the grid has"},
+                 {ROOT + 24, UINT32_MAX, "v: a node of the grid lies outside"},
+                 {ROOT + 28, 0x7fc00000, "v: a voxel is not finite"},
+                 {ROOT + 64 + 8, 0x70000000, "v: a node of the grid lies outside"}};
+    float values[NX * NY * NZ];
+    size_t size;
+    unsigned char *plain = make_plain(*state, &size);
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        unsigned char before[4];
+        memcpy(before, plain + cases[i].at, 4);
+        for (int k = 0; k < 4; k++) {
+            plain[cases[i].at + (size_t)k] = (unsigned char)(cases[i].value >> (8 * k));
+        }
+        rey_result result = read_bytes(*state, plain, size, values);
+        if (result == REY_OK || strncmp(rey_error(*state), cases[i].message, strlen(cases[i].message)) != 0) {
+            fail_msg("case %d: %s, expected %s", i, result ? rey_error(*state) : "read", cases[i].message);
+        }
+        memcpy(plain + cases[i].at, before, 4);
+    }
+    assert_int_equal(read_bytes(*state, plain, size, values), REY_OK);
+    free(plain);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_types), cmocka_unit_test(test_vectors),
+                                       cmocka_unit_test(test_plain), cmocka_unit_test(test_refused)};
+    return cmocka_run_group_tests(tests, open_context, close_context);
+}
