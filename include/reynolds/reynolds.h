@@ -135,7 +135,7 @@ enum {
     REY_TERM_INTERIOR = 1,    /* everything that does not move a discontinuity */
     REY_TERM_PRIMARY = 2,     /* silhouettes seen by the camera */
     REY_TERM_INDIRECT = 4,    /* silhouettes seen from other path vertices */
-    REY_TERM_SPECULAR = 8,    /* chains of smooth mirrors and glass */
+    REY_TERM_SPECULAR = 8,    /* edges seen in smooth mirrors and through glass */
     REY_TERM_MEDIUM = 16,     /* participating media */
     REY_TERM_TERMINATOR = 32, /* jumps where a shading normal turns away from the viewer or the light */
     REY_TERM_ALL = 63

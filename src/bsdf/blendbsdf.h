@@ -69,7 +69,9 @@ KFN void blendbsdf_adj(const BsdfCall *call, const BlendBsdf *p, Vec3 wi, Vec3 w
         if (m_any(mine)) {
             BsdfCall inner = bsdf_child(call, child);
             Spec d = spec_zero_unless(mine, spec_scale(df, child ? w : 1.0f - w));
-            bsdf_adj(&inner, wi, wo, lobe_to_child(lobe), d, sink, mine, dwi, dwo, duv);
+            Vec3 own = v3_select(mine, *dwo, v3_zero());
+            bsdf_adj(&inner, wi, wo, lobe_to_child(lobe), d, sink, mine, dwi, &own, duv);
+            *dwo = v3_select(mine, own, *dwo);
         }
     }
 }

@@ -23,6 +23,7 @@ static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe)
 static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);
 static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, Vec2 u2);
 // Accumulates the adjoint df of bsdf_eval into the sink (lanes of m), dwi, dwo and duv (null: not asked for).
+// The direction of a delta lobe is a function of wi and of the parameters: of such lanes, *dwo holds its adjoint on entry.
 static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
                               Vec3 *dwo, Vec2 *duv);
 

@@ -33,7 +33,7 @@ KFN BsdfSample conductor_sample(const Conductor *p, Vec3 wi, Float u1, Vec2 u2) 
 
 KFN void conductor_adj(const Conductor *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Conductor *dp, Vec3 *dwi, Vec3 *dwo) {
     UNUSED(wo);
-    UNUSED(dwo);
+    mirrored_adj(conductor_counts(wi, lobe), dwo, dwi);
     df = spec_zero_unless(conductor_counts(wi, lobe), df);
     // f = F(wi.z) specular_reflectance
     Spec fresnel = fresnel_conductor(wi.z, p->eta, p->k);

@@ -1,5 +1,5 @@
 // dielectric.h: smooth glass. Deltas: reflection F and refraction (1 - F) / eta_it^2 (radiance is compressed), each
-// times its colour; from both sides. NOT differentiated: the refracted direction with respect to the index.
+// times its colour; from both sides.
 #pragma once
 
 #include "bsdf/record.h"
@@ -45,17 +45,21 @@ KFN BsdfSample dielectric_sample(const Dielectric *p, Vec3 wi, Float u1, Vec2 u2
 
 KFN void dielectric_adj(const Dielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Dielectric *dp, Vec3 *dwi, Vec3 *dwo) {
     UNUSED(wo);
-    UNUSED(dwo);
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(wi.z, p->eta, &cos_t, &eta_it, &eta_ti);
+    Mask refracts = mi_eq(lobe, i_set(LOBE_TRANSMIT));
     Spec dr = spec_zero_unless(mi_eq(lobe, i_set(LOBE_REFLECT)), df);
-    Spec dt = spec_zero_unless(mi_eq(lobe, i_set(LOBE_TRANSMIT)), df);
+    Spec dt = spec_zero_unless(refracts, df);
+    // wo = (-wi.x, -wi.y, wi.z) or (-eta_ti wi.x, -eta_ti wi.y, cos_t)
+    mirrored_adj(mi_eq(lobe, i_set(LOBE_REFLECT)), dwo, dwi);
+    Vec3 dbent = v3_select(refracts, *dwo, v3_zero());
+    v3_acc(dwi, v3(-eta_ti * dbent.x, -eta_ti * dbent.y, f_set(0)));
     // r = F specular_reflectance, t = (1 - F) eta_ti^2 specular_transmittance
-    Float tint = spec_dot(dt, p->specular_transmittance), unused = f_set(0);
+    Float tint = spec_dot(dt, p->specular_transmittance);
     spec_acc(&dp->specular_reflectance, spec_scale(dr, f));
     spec_acc(&dp->specular_transmittance, spec_scale(dt, (1.0f - f) * eta_ti * eta_ti));
     Float dfresnel = spec_dot(dr, p->specular_reflectance) - tint * eta_ti * eta_ti;
-    fresnel_dielectric_adj(wi.z, p->eta, dfresnel, unused, &dwi->z, &dp->eta);
+    fresnel_dielectric_adj(wi.z, p->eta, dfresnel, dbent.z, &dwi->z, &dp->eta);
     // eta_ti = 1 / eta from outside, eta from inside
-    Float deta_ti = 2.0f * tint * (1.0f - f) * eta_ti;
+    Float deta_ti = 2.0f * tint * (1.0f - f) * eta_ti - wi.x * dbent.x - wi.y * dbent.y;
     dp->eta = dp->eta + f_select(m_ge(wi.z, f_set(0)), -deta_ti * eta_ti * eta_ti, deta_ti);
 }

@@ -71,6 +71,7 @@ KFN void plastic_adj(const Plastic *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Plas
     Mask front = m_gt(wi.z, f_set(0));
     Spec dcoat = spec_zero_unless(front & mi_eq(lobe, i_set(LOBE_REFLECT)), df);
     Spec dbase = spec_zero_unless(front & m_gt(wo.z, f_set(0)) & mi_eq(lobe, i_set(LOBE_SMOOTH)), df);
+    mirrored_adj(front & mi_eq(lobe, i_set(LOBE_REFLECT)), dwo, dwi);
     Float fi = plastic_fresnel(p, wi.z), fo = plastic_fresnel(p, wo.z);
     Float rcp_eta = 1.0f / p->eta, fdr = fresnel_diffuse_reflectance(rcp_eta);
     Float rest = wo.z * rcp_eta * rcp_eta * INV_PI, ti = 1.0f - fi, to = 1.0f - fo;

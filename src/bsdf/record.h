@@ -4,10 +4,6 @@
 #include "scene/kind.h"
 #include "scene/texture_gradient.h"
 
-// Which part of a function a direction belongs to. Values of delta lobes are coefficients of the delta, their
-// densities discrete probabilities.
-enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL };
-
 // Reflections and refractions of the two functions of a blend may go different ways. Their lobes carry, above the two
 // bits of the list above, one bit per blend on the way to the function that they belong to, the outermost blend lowest.
 KFN Mask lobe_is_shared(Int lobe) { return mi_eq(lobe, i_set(LOBE_SMOOTH)) | mi_eq(lobe & 3, i_set(LOBE_NULL)); }
@@ -15,6 +11,8 @@ KFN Int lobe_from_child(Int lobe, int child) {
     return i_select(lobe_is_shared(lobe), lobe, (lobe & 3) | ((lobe >> 2) * 2 + child) * 4);
 }
 KFN Int lobe_to_child(Int lobe) { return (lobe & 3) | (lobe >> 3) * 4; }
+// Reflections and refractions: their directions follow from wi.
+KFN Mask lobe_turns(Int lobe) { return mi_eq(lobe & 3, i_set(LOBE_REFLECT)) | mi_eq(lobe & 3, i_set(LOBE_TRANSMIT)); }
 KFN Mask lobe_in_child(Int lobe, int child) { return lobe_is_shared(lobe) | mi_eq(lobe >> 2 & 1, i_set(child)); }
 
 typedef struct BsdfSample {
@@ -49,6 +47,12 @@ typedef struct BsdfSample {
     } Type;
 
 #define NO_CONFIG(C)
+
+// Adjoint of a mirrored direction wo = (-wi.x, -wi.y, wi.z), in the lanes of m.
+KFN void mirrored_adj(Mask m, const Vec3 *dwo, Vec3 *dwi) {
+    Vec3 d = v3_select(m, *dwo, v3_zero());
+    v3_acc(dwi, v3(-d.x, -d.y, d.z));
+}
 
 // Probability of the first of two lobes with weights a and b, kept at least `floor` away from 0 and 1.
 KFN Float lobe_probability(Float a, Float b, real floor) {

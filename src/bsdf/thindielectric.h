@@ -46,7 +46,7 @@ KFN BsdfSample thindielectric_sample(const ThinDielectric *p, Vec3 wi, Float u1,
 KFN void thindielectric_adj(const ThinDielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, ThinDielectric *dp, Vec3 *dwi,
                             Vec3 *dwo) {
     UNUSED(wo);
-    UNUSED(dwo);
+    mirrored_adj(mi_eq(lobe, i_set(LOBE_REFLECT)), dwo, dwi);
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(f_abs(wi.z), p->eta, &cos_t, &eta_it, &eta_ti);
     Float inv = 1.0f / (1.0f + f), r = 2.0f * f * inv, dcos = f_set(0);
     Spec dr = spec_zero_unless(mi_eq(lobe, i_set(LOBE_REFLECT)), df);

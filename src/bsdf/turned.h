@@ -117,9 +117,16 @@ KFN void turned_adj(const BsdfCall *call, Vec3 n, int32_t shadowing, Vec3 wi, Ve
         dwo->z = dwo->z + dshadow * by_wo;
         df = spec_scale(df, shadow);
     }
+    Mask delta = lobe_turns(lobe);
+    if (m_any(delta)) {
+        // wo = to_world(nested wo)
+        Vec3 dsampled = v3_select(delta, *dwo, v3_zero());
+        frame_to_world_adj(t.wo, dsampled, &dframe);
+        db = frame_to_local(&t.frame, dsampled);
+    }
     bsdf_adj(&child, t.wi, t.wo, lobe, df, sink, m, &da, &db, duv);
     // nested(to_local(wi), to_local(wo))
     frame_to_local_adj(&t.frame, wi, da, &dframe, dwi);
-    frame_to_local_adj(&t.frame, wo, db, &dframe, dwo);
+    frame_to_local_adj(&t.frame, wo, v3_select(delta, v3_zero(), db), &dframe, dwo);
     turned_frame_adj(&t.frame, &dframe, dn);
 }

@@ -68,7 +68,7 @@ KFN void twosided_adj(const BsdfCall *call, const Twosided *p, Vec3 wi, Vec3 wo,
     UNUSED(p);
     UNUSED(dp);
     Mask back = m_lt(wi.z, f_set(0));
-    Vec3 a = v3_flip_z(back, wi), b = v3_flip_z(back, wo), da = v3_zero(), db = v3_zero();
+    Vec3 a = v3_flip_z(back, wi), b = v3_flip_z(back, wo), da = v3_zero(), db = v3_flip_z(back, *dwo);
     BsdfCall front_call = twosided_side(call, false);
     if (twosided_shared(call)) {
         bsdf_adj(&front_call, a, b, lobe, df, sink, m, &da, &db, duv);
@@ -79,5 +79,5 @@ KFN void twosided_adj(const BsdfCall *call, const Twosided *p, Vec3 wi, Vec3 wo,
     }
     // a = flip(wi), b = flip(wo)
     v3_acc(dwi, v3_flip_z(back, da));
-    v3_acc(dwo, v3_flip_z(back, db));
+    *dwo = v3_flip_z(back, db);
 }

@@ -178,7 +178,7 @@ KFN void envmap_adj(const SceneView *scene, const Light *l, TexCoord uv, Float d
     }
 }
 
-// The picture turns over directions that stay.
+// The picture turns over directions that stay, or directions turn.
 KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 d, Float distance, LightMove *move,
                          Sink *sink, Mask m) {
     UNUSED(ref), UNUSED(distance);
@@ -188,7 +188,7 @@ KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 
     Float du = move->uv.x * INV_TWO_PI / ring2, dv = move->uv.y * INV_PI / (ring2 + y.y * y.y);
     Float dring = dv * y.y / ring;
     Vec3 dy = v3(dring * y.x - du * y.z, -dv * ring, dring * y.z + du * y.x);
-    light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, dy, sink, m);
+    move->d = v3_add(move->d, light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, dy, sink, m));
 }
 
 KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {

@@ -65,6 +65,7 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec e
     i_store(r->prim + at, v->hit.prim);
     i_store(r->instance + at, v->hit.instance);
     i_store(r->slot + at, v->slot);
+    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
     f_store(r->u + at, v->hit.u);
     f_store(r->v + at, v->hit.v);
     f_store(r->px + at, v->hit.p.x);
@@ -120,6 +121,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
     int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
     if (at >= 0) {
         record_vertex(t, at, &v, mis, l);
+        t->ws.batches[t->batch_count - 1].first_vertex = bounce == 0;
     }
 }
 

@@ -2,7 +2,7 @@
 // vertex k is  L_k = w_e Le + sum_lights f Le T w_l + f w_s L_(k+1),  so that its derivative with respect to anything
 // in f and Le at that vertex is weighted by delta x throughput, and L is summed from the end of the path: no
 // subtraction, and no division by f, so that nothing is lost where f = 0.
-// NOT differentiated: visibility, sampling decisions, chains of smooth mirrors and glass. What moves: path_move.h.
+// NOT differentiated: visibility, sampling decisions. What moves: path_move.h.
 #pragma once
 
 #include "integrator/path_move.h"
@@ -23,9 +23,16 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
         LightMove move = light_move_zero();
         emitter_adj(t->scene, t->scene->environment, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl),
-                    sink->any_places ? &move : NULL, sink, m);
-        if (sink->any_places) {
+                    sink->any_places || sink->any_motion ? &move : NULL, sink, m);
+        if (sink->any_places || sink->any_motion) {
             emitter_move_adj(t->scene, t->scene->environment, v3_zero(), d, f_set(1), &move, sink, m);
+        }
+        if (sink->any_motion) {
+            rows_scatter(&t->ws.turn, c, slot, move.d, m);
+        }
+        if (sink->any_camera && batch->first_vertex) {
+            Carried carried = {v3_zero(), move.d};
+            camera_move_adj(t, slot, d, &carried, sink, m);
         }
         forward_flush(t, sink, slot, c, m);
     }
@@ -58,6 +65,15 @@ KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall 
     }
 }
 
+// Adjoint of what scattering brings of the radiance l behind: L += f w_s l. dwo: of the direction onwards.
+KFN void scattered_adj(const SurfaceSweep *s, const BsdfCall *call, Spec weight, Spec l, Mask m, VertexAdj *d, Vec3 *dwo,
+                       Sink *sink) {
+    Vec3 local = v3_zero();
+    Spec df = spec_zero_unless(m, spec_scale(spec_mul(weight, l), s->scatter_weight));
+    bsdf_adj(call, s->wi, s->wo, s->lobe, df, sink, m, &d->wi, &local, vertex_uv_adj(s, d, sink));
+    frame_to_local_adj(&s->si.sh, s->wo_d, local, &d->frame, dwo);
+}
+
 // Adjoint of the vertex's outgoing radiance for one delta, by what of the vertex is live.
 KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec delta, int channel, Sink *sink) {
     Spec weight = spec_mul(delta, s->beta);
@@ -77,17 +93,20 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     if (m_any(s->connected)) {
         connections_adj(t, s, &call, live, weight, &d, sink);
     }
-    if ((live & LIVE_SCATTERING) && m_any(s->scattered)) {
-        // L += f w_s L_next
-        Vec3 dwo = v3_zero();
-        Spec df = spec_zero_unless(s->scattered, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
-        bsdf_adj(&call, s->wi, s->wo, s->lobe, df, sink, s->scattered, &d.wi, &dwo, vertex_uv_adj(s, &d, sink));
-        frame_to_local_adj(&s->si.sh, s->wo_d, dwo, &d.frame, &d.wo);
+    Mask scattered = sink->any_motion ? s->scattered & ~s->chained : s->scattered;
+    if ((live & LIVE_SCATTERING) && m_any(scattered)) {
+        Spec chain = spec_sub(s->suffix, s->attached);
+        scattered_adj(s, &call, weight, s->attached, scattered, &d, &d.wo, sink);
+        if (sink->any_motion && m_any(scattered & m_gt(spec_dot(chain, chain), f_set(0)))) {
+            // A chain that begins here has a fixed direction.
+            Vec3 fixed = v3_zero();
+            scattered_adj(s, &call, weight, chain, scattered, &d, &fixed, sink);
+        }
     }
     sink->at = NULL;
     if (sink->any_motion) {
-        d.onward = f_zero_unless(s->scattered, spec_dot(spec_mul(weight, s->suffix), spec_load(t->ws.records.weight, s->at)));
-        vertex_move_adj(t, s, &d, live, channel, sink);
+        d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
+        vertex_move_adj(t, s, &d, &s->call, weight, live, channel, sink);
     } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         vertex_frame_adj(s, call.surface != NULL, &d);
         mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &d.frame, sink, s->m);
@@ -172,12 +191,13 @@ KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
 }
 
 // The adjoint of a batch of surface vertices that something selected reaches.
-static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
-                          Sink *sink) {
+static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Spec attached, Mask finite,
+                          bool live_passing, Sink *sink) {
     PathJob *job = t->job;
     int32_t live = job->live[batch->group];
     Walk walk;
     SurfaceSweep s = surface_load(t, batch, slot, suffix);
+    s.attached = attached;
     s.call.uv.hit = &s.hit;
     if (t->scene->bsdfs[s.group->bsdf].surface) {
         find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
@@ -208,6 +228,17 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     }
 }
 
+// Keeps what leaves the vertices of a batch and does not go on along a chain; returns what their successors left.
+static Spec attached_keep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask m) {
+    const Records *r = &t->ws.records;
+    int32_t at = batch->first;
+    Spec next = spec_gather(t->ws.attached, slot);
+    Mask chained = chain_lanes(t, i_load(r->lobe + at), mi_eq(i_load(r->slides + at), i_set(1)));
+    Spec onward = spec_zero_unless(~chained, spec_mul(spec_load(r->weight, at), suffix));
+    spec_scatter(t->ws.attached, slot, spec_add(spec_load(r->local, at), onward), m);
+    return next;
+}
+
 // Sweeps the chunk's records from the last vertex to the first.
 static void path_backward(Tracer *t) {
     PathJob *job = t->job;
@@ -227,8 +258,9 @@ static void path_backward(Tracer *t) {
         Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
         Mask finite = m & m_finite(spec_sum(l));
         spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
+        Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
         if (job->live[batch->group] || job->live_lights || live_passing) {
-            surface_sweep(t, batch, slot, suffix, finite, live_passing, &sink);
+            surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &sink);
         }
     }
     job->faces |= sink.faces;

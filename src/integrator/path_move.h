@@ -5,8 +5,13 @@
 // relative to its value when it was sampled: with c the segment's contribution, N_q the unit normal n now and r = |r| w
 //   dr += c (n / (n . w) - 3 w) / |r| + (dw - w (w . dw)) / |r|,   dN_q += c w / (n . w)
 // where dw is what the functions and lights at both ends make of the direction. Directions to environments are fixed.
-// NOT differentiated: visibility, jumps of what the camera sees, vertices behind smooth mirrors and glass, surfaces that
-// let a path pass, and transmittances of shadow rays.
+// Chains of smooth mirrors and glass are not attached: the direction at the vertex before them (or the film position) is
+// fixed, and what follows slides along the rays that this makes, up to the first vertex that scatters. A ray carries the
+// adjoints of its position where it meets the next surface (drag) and of its direction (turn) back through the chain.
+// Radiance that leaves a vertex is thus of two kinds: `attached`, and what came along a chain. Light samples cannot make
+// chains, so that no MIS weight joins the two.
+// NOT differentiated: visibility, jumps of what the camera sees, surfaces that let a path between two vertices pass, and
+// transmittances of shadow rays.
 #pragma once
 
 #include "integrator/sweep.h"
@@ -38,7 +43,7 @@ KFN void vertex_adj_clear(VertexAdj *d, bool motion) {
 
 // Texture coordinates of attached points stay; those of spheres do as long as their pose remains a similarity.
 KFN bool vertex_uv_moves(const SurfaceSweep *s, const Sink *sink) {
-    return sink->any_motion && (s->first || s->group->shape_kind == SHAPE_SPHERE);
+    return sink->any_motion && (m_any(s->slides | s->chained) || s->group->shape_kind == SHAPE_SPHERE);
 }
 KFN Vec2 *vertex_uv_adj(const SurfaceSweep *s, VertexAdj *d, const Sink *sink) {
     return vertex_uv_moves(s, sink) ? &d->uv : NULL;
@@ -129,6 +134,11 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
     return dp;
 }
 
+// What the ray that found a vertex carries back: the adjoints of its position there, and of its direction.
+typedef struct Carried {
+    Vec3 drag, turn;
+} Carried;
+
 // The segment to the next vertex, which the sweep has just left: returns the adjoint of this vertex's position.
 static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const VertexAdj *v, int channel, Sink *sink) {
     const Workspace *ws = &t->ws;
@@ -140,39 +150,34 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     }
     next = i_max(next, i_set(0));
     Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, s->slot), n = LOAD_V3(*ws, next_nx, next_ny, next_nz, s->slot);
-    Vec3 back = v3(real_gather(ws->back_x[channel], s->slot), real_gather(ws->back_y[channel], s->slot),
-                   real_gather(ws->back_z[channel], s->slot));
+    Vec3 back = rows_gather(&ws->back, channel, s->slot);
     Vec3 darea, w = s->wo_d;
     Float distance = v3_length(v3_sub(q, s->si.p));
     Vec3 dr = segment_adj(w, distance, n, v->onward, v3_sub(v->wo, back), &darea);
     Hit hit = {i_gather(r->shape, next), i_gather(r->prim, next), real_gather(r->u, next), real_gather(r->v, next), q,
                i_gather(r->instance, next)};
     points_move_adj(t, &hit, dr, darea, sink, attached);
-    return v3_select(attached, v3_neg(dr), v3_zero());
+    // A chain that begins here moves with this vertex, in its fixed direction.
+    Vec3 drag = rows_gather(&ws->drag, channel, s->slot);
+    return v3_select(attached, v3_sub(drag, dr), v3_zero());
 }
 
-// The first vertex stays on the camera's ray: where surface or ray move, it slides.
-static void camera_move_adj(const Tracer *t, const SurfaceSweep *s, Vec3 back, SurfaceAdj *d, Sink *sink) {
-    Slide slide[2];
-    shape_slide(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit, &s->si, slide);
-    Vec3 position = slide_adj(slide, s->d, d);
-    d->p = v3_sub(d->p, position);
-    if (!sink->any_camera) {
-        return;
-    }
+// The sensor's part in the adjoints of the rays that it sent out.
+static void camera_move_adj(const Tracer *t, Int slot, Vec3 target, const Carried *carried, Sink *sink, Mask m) {
     Vec2 lens = {f_set(0), f_set(0)};
     if (sensor_has_lens(t->sensor)) {
-        SampleKey key = slot_key(t, s->slot);
+        SampleKey key = slot_key(t, slot);
         lens = rng_2d(&key, DIMENSION_LENS);
     }
-    RayAdj ray = {s->si.p, position, v3_neg(back)};
-    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, s->slot), real_gather(t->ws.film_y, s->slot), lens,
-                   &ray, sink, s->m);
+    RayAdj ray = {target, carried->drag, carried->turn};
+    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), lens, &ray, sink,
+                   m);
 }
 
-// Adjoint of where a batch of vertices lies, for one delta.
-static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, int32_t live, int channel,
-                                     Sink *sink) {
+// Adjoint of where vertices lie, for one delta; dp: of their positions. The lanes of `slides` lie where a ray meets
+// their surface, and what that asks of the ray is added to `carried`.
+static NOINLINE void vertex_place_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, Vec3 dp, Mask slides,
+                                      int32_t live, Carried *carried, Sink *sink) {
     SurfaceAdj d = surface_adj_zero();
     bool surface = s->call.surface != NULL;
     vertex_frame_adj(s, surface, v);
@@ -183,18 +188,69 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     }
     d.uv = v->uv;
     d.at = v->at;
-    d.p = v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink));
-    Vec3 back = frame_to_world(&s->si.sh, v->wi);
-    if (s->first) {
-        camera_move_adj(t, s, back, &d, sink);
-    } else {
-        f_scatter(t->ws.back_x[channel], s->slot, back.x, s->m);
-        f_scatter(t->ws.back_y[channel], s->slot, back.y, s->m);
-        f_scatter(t->ws.back_z[channel], s->slot, back.z, s->m);
+    d.p = dp;
+    if (m_any(slides)) {
+        Slide slide[2];
+        shape_slide(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit, &s->si, slide);
+        Vec3 position = v3_select(slides, slide_adj(slide, s->d, &d), v3_zero());
+        d.p = v3_sub(d.p, position);
+        v3_acc(&carried->drag, position);
+        v3_acc(&carried->turn, v3_select(slides, v3_neg(frame_to_world(&s->si.sh, v->wi)), v3_zero()));
     }
     if (live & LIVE_MOTION) {
         shape_move_adj(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit, &s->si, &d, sink, s->m);
     }
+}
+
+// What is mirrored or refracted at a batch of vertices, for one delta: L += f w_s L_next along a direction that follows from
+// how the path came.
+static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, Spec weight, int32_t live,
+                                    int channel, Carried *carried, Sink *sink) {
+    const Workspace *ws = &t->ws;
+    SurfaceSweep chain = *s;
+    chain.m = s->scattered & s->chained;
+    Mask passes = chain.m & mi_eq(s->lobe & 3, i_set(LOBE_NULL)), turns = chain.m & ~passes;
+    Vec3 drag = rows_gather(&ws->drag, channel, s->slot), turn = rows_gather(&ws->turn, channel, s->slot);
+    // The ray's position at the next vertex is p + distance d'; behind an environment there is none.
+    Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, s->slot);
+    Mask meets = mi_lt(i_set(-1), i_gather(ws->next, s->slot));
+    Vec3 dd = v3_select(meets, v3_madd(turn, v3_length(v3_sub(q, s->si.p)), drag), turn);
+    VertexAdj d;
+    vertex_adj_clear(&d, true);
+    BsdfCall own = *call;
+    own.dsurface = own.surface ? &d.surface : NULL;
+    // d' = to_world(wo(wi))
+    Vec3 sampled = v3_select(turns, dd, v3_zero()), dwo = frame_to_local(&s->si.sh, sampled);
+    frame_to_world_adj(s->wo, sampled, &d.frame);
+    Spec df = spec_zero_unless(chain.m, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
+    sink->at = &d.at;
+    bsdf_adj(&own, s->wi, s->wo, s->lobe, df, sink, chain.m, &d.wi, &dwo, &d.uv);
+    sink->at = NULL;
+    // A ray that passes stays the same line.
+    v3_acc(&carried->drag, v3_select(passes, drag, v3_zero()));
+    v3_acc(&carried->turn, v3_select(passes, dd, v3_zero()));
+    vertex_place_adj(t, &chain, &d, v3_select(turns, drag, v3_zero()), chain.m, live, carried, sink);
+}
+
+// Adjoint of where a batch of vertices lies, for one delta.
+static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, const BsdfCall *call, Spec weight,
+                                     int32_t live, int channel, Sink *sink) {
+    Carried carried = {v3_zero(), v3_zero()};
+    Vec3 dp = v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink));
+    vertex_place_adj(t, s, v, dp, s->slides, live, &carried, sink);
+    Vec3 back = frame_to_world(&s->si.sh, v->wi);
+    if (m_any(s->scattered & s->chained)) {
+        chain_move_adj(t, s, call, weight, live, channel, &carried, sink);
+    }
+    if (s->first) {
+        if (sink->any_camera) {
+            camera_move_adj(t, s->slot, s->si.p, &carried, sink, s->m);
+        }
+        return;
+    }
+    rows_scatter(&t->ws.back, channel, s->slot, back, s->m);
+    rows_scatter(&t->ws.drag, channel, s->slot, carried.drag, s->m);
+    rows_scatter(&t->ws.turn, channel, s->slot, carried.turn, s->m);
 }
 
 // Leaves the vertices for those before them.

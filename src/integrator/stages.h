@@ -55,6 +55,16 @@ KFN SampleKey slot_key(const Tracer *t, Int slot) {
     return key;
 }
 
+// A vector per slot and channel.
+KFN Vec3 rows_gather(const ChannelRows *r, int channel, Int slot) {
+    return v3(real_gather(r->x[channel], slot), real_gather(r->y[channel], slot), real_gather(r->z[channel], slot));
+}
+KFN void rows_scatter(const ChannelRows *r, int channel, Int slot, Vec3 v, Mask m) {
+    f_scatter(r->x[channel], slot, v.x, m);
+    f_scatter(r->y[channel], slot, v.y, m);
+    f_scatter(r->z[channel], slot, v.z, m);
+}
+
 #define LOAD_V3(a, x, y, z, i) v3(real_gather((a).x, i), real_gather((a).y, i), real_gather((a).z, i))
 
 // ---- camera ------------------------------------------------------------------------------------------------------
@@ -83,6 +93,11 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     spec_store(t->ws.suffix, i, spec_zero());
     if (t->job->any_motion) {
         i_store(t->ws.next + i, i_set(-1));
+        spec_store(t->ws.attached, i, spec_zero());
+        for (int c = 0; c < SPEC_N; c++) {
+            rows_scatter(&t->ws.drag, c, i_iota() + i, v3_zero(), m_set(true));
+            rows_scatter(&t->ws.turn, c, i_iota() + i, v3_zero(), m_set(true));
+        }
     }
 }
 

@@ -27,13 +27,14 @@ enum {
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
 // the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the
 // scattering function),
-// the sampled direction (world) and 1 / (density x survival). Radiance leaving the vertex is local + weight x radiance
-// arriving along the sampled direction.
+// the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
+// camera, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
+// radiance arriving along the sampled direction.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw)
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
-#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe)
+#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides)
 
 // Of a camera sample: where it lies on the film, and its alpha.
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
@@ -63,6 +64,11 @@ typedef struct RecordBatch {
     bool first_vertex; // these are what the camera sees
 } RecordBatch;
 
+// A vector per slot, for each channel that forward mode drives.
+typedef struct ChannelRows {
+    real *x[SPEC_N], *y[SPEC_N], *z[SPEC_N];
+} ChannelRows;
+
 typedef struct Workspace {
     Paths paths[2];
     Shadows shadows;
@@ -78,11 +84,13 @@ typedef struct Workspace {
     SpecRows radiance, adjoint, suffix;
     SAMPLE_FLOATS(DECLARE_FLOAT)
     int32_t *pixel, *sample;
-    // per slot, of the vertex that the sweep has just left (path_move.h): its record (-1: none), position and normal, and
-    // per channel the adjoint of the direction back to the vertex before it
+    // per slot, of the vertex that the sweep has just left (path_move.h): its record (-1: none), position and normal, what
+    // leaves it but does not go on along a chain, and per channel the adjoint of the direction back to the vertex before it,
+    // and where the vertex slides, of the ray's position there and of its direction
     int32_t *next;
     MOVE_FLOATS(DECLARE_FLOAT)
-    real *back_x[SPEC_N], *back_y[SPEC_N], *back_z[SPEC_N];
+    SpecRows attached;
+    ChannelRows back, drag, turn;
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
@@ -102,9 +110,13 @@ typedef struct Workspace {
 static inline size_t workspace_layout_moves(Workspace *ws, char *block, size_t at, size_t n) {
     CARVE(ws->next, n)
     MOVE_FLOATS(CARVE_SAMPLE)
-    CARVE_SPEC(ws->back_x, n)
-    CARVE_SPEC(ws->back_y, n)
-    CARVE_SPEC(ws->back_z, n)
+    CARVE_SPEC(ws->attached, n)
+    ChannelRows *rows[] = {&ws->back, &ws->drag, &ws->turn};
+    for (int i = 0; i < 3; i++) {
+        CARVE_SPEC(rows[i]->x, n)
+        CARVE_SPEC(rows[i]->y, n)
+        CARVE_SPEC(rows[i]->z, n)
+    }
     return at;
 }
 

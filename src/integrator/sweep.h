@@ -32,8 +32,9 @@ typedef struct SurfaceSweep {
     int32_t at;           // first record of the batch
     bool first;           // the vertices that the camera sees
     Mask m, lit, connected, scattered;
+    Mask slides, chained;  // see record; lanes that are mirrored or refracted
     Int slot, light, light_prim, lobe;
-    Spec beta, suffix, light_weight, light_value, f_light;
+    Spec beta, suffix, attached, light_weight, light_value, f_light;
     Float mis, scatter_weight, light_distance;
     Vec2 light_uv;
     Vec3 d, wi, light_d, wo_d, wl, wo;
@@ -46,6 +47,12 @@ typedef struct SurfaceSweep {
     const Group *group;
 } SurfaceSweep;
 
+// Lanes whose path goes on along a direction that follows from how it came. Where shadow rays pass surfaces, so does
+// the segment between two vertices that scatter.
+KFN Mask chain_lanes(const Tracer *t, Int lobe, Mask slides) {
+    return lobe_turns(lobe) | (mi_eq(lobe & 3, i_set(LOBE_NULL)) & (slides | m_set(!t->scene->through)));
+}
+
 KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
     const Records *r = &t->ws.records;
     int32_t at = batch->first;
@@ -55,6 +62,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.m = m_first_n(batch->count);
     s.slot = slot;
     s.suffix = suffix;
+    s.attached = suffix;
     s.group = t->scene->groups + batch->group;
     s.hit.shape = i_load(r->shape + at);
     s.hit.prim = i_load(r->prim + at);
@@ -81,6 +89,8 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
     s.wo_d = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), back);
     s.lobe = i_select(s.scattered, s.lobe, i_set(LOBE_SMOOTH));
+    s.slides = s.m & mi_eq(i_load(r->slides + at), i_set(1));
+    s.chained = chain_lanes(t, s.lobe, s.slides);
     s.si = shape_interaction(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
     s.wi = frame_to_local(&s.si.sh, back);
     s.wl = frame_to_local(&s.si.sh, s.light_d);

@@ -60,6 +60,14 @@ KFN void frame_to_local_adj(const Frame *f, Vec3 v, Vec3 dy, Frame *df, Vec3 *dv
     v3_acc(dv, frame_to_world(f, dy));
 }
 
+// What the frame makes of the adjoint dy of frame_to_world(f, v).
+KFN void frame_to_world_adj(Vec3 v, Vec3 dy, Frame *df) {
+    // y = s v.x + t v.y + n v.z
+    v3_acc(&df->s, v3_scale(dy, v.x));
+    v3_acc(&df->t, v3_scale(dy, v.y));
+    v3_acc(&df->n, v3_scale(dy, v.z));
+}
+
 // A tangent for a normal without a parameterisation [duff2017 listing 3].
 KFN Frame frame_from_normal(Vec3 n) {
     Float sign = f_sign(n.z);

@@ -7,8 +7,8 @@
 static const char *term_reason(int bit, const rey_param_info *info) {
     switch (bit) {
     case REY_TERM_SPECULAR:
-        return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and what "
-               "is seen in or through them moves along chains that are not followed";
+        return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and the "
+               "edges that are seen in or through them are not found";
     case REY_TERM_TERMINATOR:
         return "the picture jumps where shading normals turn away from the viewer";
     default:

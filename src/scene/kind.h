@@ -9,11 +9,15 @@
 
 #include "scene/scene.h"
 
+// Which part of a function a direction belongs to. Values of delta lobes are coefficients of the delta, their
+// densities discrete probabilities.
+enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL };
+
 typedef enum ParamType {
     PARAM_SPEC,      // colour texture
     PARAM_REAL,      // number texture
     PARAM_IOR,       // number: int_ior / ext_ior, or the ratio
-    PARAM_SMOOTH_IOR, // the same; it turns directions of delta lobes, so its derivative needs the specular term
+    PARAM_SMOOTH_IOR, // the same; it turns directions of delta lobes, and with them the edges that are seen behind
     PARAM_SPECULAR,  // number texture: the reflectance at normal incidence over 0.08, or `eta`
     PARAM_RATE,      // number: steers sampling only, no parameter
     PARAM_METAL_ETA, // colour: eta, or from `material`

@@ -192,10 +192,11 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
     view_make(c, &view);
     Sink sink = sink_make(&view, c, gradient, tangent);
     for (int first = 0; first < n; first += LANES) {
-        Vec3 wi, wo, dwi = v3_zero(), dwo = v3_zero();
+        Vec3 wi, wo, dwi = v3_zero(), dwo;
         Vec2 uv, duv = {f_set(0), f_set(0)};
         GATHER3(wi, q[AT(lane)].wi);
         GATHER3(wo, q[AT(lane)].wo);
+        GATHER3(dwo, a[AT(lane)].turn);
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
         BsdfSurface surface = surface_make(c);
