@@ -41,6 +41,8 @@ static void entries_text(const FitRow *row, const float *values, char *text, siz
     text[0] = 0;
     if (!values) {
         snprintf(text, size, "-");
+    } else if (rey_fit_pose_text(row, values, text, size)) {
+        return;
     } else if (row->count > SHOWN_ENTRIES) {
         double mean = 0;
         for (int64_t i = 0; i < row->count; i++) {

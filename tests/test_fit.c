@@ -174,71 +174,6 @@ static void test_loss_crosses_halves(void **state) {
     assert_float_equal((double)da[0], 0, 0);
 }
 
-// Minimises (log x - log 0.3)^2-like bowls in every parameterisation; the gradient is that of (x - 0.3)^2.
-static void test_optimizers_find_minimum(void **state) {
-    UNUSED(state);
-    for (int kind = 0; kind < OPTIMIZER_COUNT; kind++) {
-        for (int p = 0; p < PARAMETERISATION_RIGID; p++) {
-            Unknown item = {.count = 1, .low = 0.01, .high = 1, .parameterisation = (Parameterisation)p};
-            float start = 0.8f, value = 0;
-            double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
-            Unknowns u = {.items = {&item, 1, 1},
-                          .count = 1,
-                          .start = &start,
-                          .value = &value,
-                          .variable = &variable,
-                          .first = &first,
-                          .second = &second,
-                          .average = &average,
-                          .gradient = &gradient};
-            JobOptimizer o = {.kind = (OptimizerKind)kind,
-                              .learning_rate = kind == OPTIMIZER_ADAM ? 0.05 : 0.1,
-                              .beta1 = 0.9,
-                              .beta2 = 0.99,
-                              .epsilon = 1e-12,
-                              .momentum = 0.8,
-                              .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 600}};
-            rey_unknowns_begin(&u);
-            assert_float_equal((double)value, 0.8, 1e-6);
-            for (int i = 0; i < 600; i++) {
-                gradient = 2 * ((double)value - 0.3);
-                rey_optimizer_step(&o, &u, i);
-            }
-            assert_float_equal((double)value, 0.3, 2e-3);
-            gradient = 1e9; // far out of bounds
-            rey_optimizer_step(&(JobOptimizer){.kind = OPTIMIZER_SGD, .learning_rate = 1, .schedule = {.length = 1}},
-                               &u, 0);
-            assert_true(value >= 0.01f && value <= 0.0101f);
-        }
-    }
-}
-
-// Steps that jump about 0.3 by +-0.1 average out, and the start at 0.8 is forgotten.
-static void test_average(void **state) {
-    UNUSED(state);
-    Unknown item = {.count = 1, .low = 0, .high = 1};
-    float start = 0.8f, value = 0;
-    double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
-    Unknowns u = {.items = {&item, 1, 1},
-                  .count = 1,
-                  .start = &start,
-                  .value = &value,
-                  .variable = &variable,
-                  .first = &first,
-                  .second = &second,
-                  .average = &average,
-                  .gradient = &gradient};
-    JobOptimizer o = {.kind = OPTIMIZER_SGD, .learning_rate = 1, .average = 4, .schedule = {.length = 1}};
-    rey_unknowns_begin(&u);
-    for (int i = 0; i < 100; i++) {
-        gradient = (double)value - (i % 2 ? 0.2 : 0.4);
-        rey_optimizer_step(&o, &u, i);
-    }
-    assert_float_equal((double)value, 0.2, 1e-5);
-    rey_unknowns_take_average(&u);
-    assert_float_equal((double)value, 0.3, 0.004);
-}
-
 static void test_tensorboard_checksum(void **state) {
     UNUSED(state);
     // CRC-32C of "123456789" is 0xe3069283.
@@ -435,7 +370,9 @@ static void test_folder_is_kept(void **state) {
     expect_refusal(f, NULL, false, "holds 2 iterations of this fit; --resume continues, --overwrite");
     expect_refusal(f, "seed=5", false, "--overwrite replaces it");
     expect_run(f, true, false, NULL);
-    expect_run(f, false, false, NULL); // the same again
+    expect_refusal(f, NULL, false, "holds this fit, finished; --overwrite");
+    expect_run(f, true, false, "iterations=5"); // more of them, on the schedule that it had
+    expect_run(f, false, true, NULL);
     snprintf(folder, sizeof folder, "%s/d", f->folder);
     int other = open(folder, O_RDONLY | O_DIRECTORY);
     assert_true(other >= 0);
@@ -457,7 +394,9 @@ static void test_fit_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
         {"parameters.0.name=red.reflectanse.value", "did you mean 'red.reflectance.value'?"},
-        {"parameters.0.parameterisation=rigid", "is for poses"},
+        {"parameters.0.parameterisation=rigid", "are for poses"},
+        {"parameters.0.parameterisation=laplacian", "has no bounds"},
+        {"parameters.0.smoothness=3", "smoothness is for 'parameterisation: laplacian'"},
         {"parameters.3.name=red.*", "entry 0 of 'parameters' names it already"},
         {"parameters.3.name=nothing*", "matches no differentiable parameter"},
         {"parameters.0.start=[1, 2]", "start holds 2 numbers"},
@@ -486,9 +425,7 @@ int main(void) {
         cmocka_unit_test(test_job_round_trip),
         cmocka_unit_test(test_loss_derivatives),
         cmocka_unit_test(test_loss_crosses_halves),
-        cmocka_unit_test(test_optimizers_find_minimum),
         cmocka_unit_test(test_tensorboard_checksum),
-        cmocka_unit_test(test_average),
         cmocka_unit_test(test_fit_recovers),
         cmocka_unit_test(test_fit_resumes),
         cmocka_unit_test(test_damaged_checkpoint),

@@ -9,19 +9,20 @@
 
 #include <cmocka.h>
 
-// The gradient in a rotation vector and a shift against differences, near no turn and far from it; lengths stay.
+// The gradient in a rotation vector and a shift against differences, near no turn and far from it; lengths stay, but for the scale.
 static void test_rigid_poses(void **state) {
     (void)state;
     const float start[RIGID_VALUES] = {0.5f, -1, 0.2f, 3, 0.7f, 1.1f, 0.4f, -2, 0.1f, 0.3f, 2, 1, 0, 0, 0, 1};
-    const double places[][RIGID_VARIABLES] = {{0, 0, 0, 0, 0, 0}, {1e-6, 2e-6, -1e-6, 0, 0, 0}, {0.7, -1.9, 0.4, 2, -1, 5}};
-    for (int place = 0; place < 3; place++) {
+    const double places[][SIMILAR_VARIABLES] = {
+        {0}, {1e-6, 2e-6, -1e-6}, {0.7, -1.9, 0.4, 2, -1, 5}, {0.7, -1.9, 0.4, 2, -1, 5, -0.4}};
+    for (int place = 0; place < 4; place++) {
         double variable[RIGID_VALUES] = {0}, gradient[RIGID_VALUES], weights[RIGID_VALUES];
         memcpy(variable, places[place], sizeof places[place]);
         for (int i = 0; i < RIGID_VALUES; i++) {
             weights[i] = gradient[i] = sin(3 * i + 1.0);
         }
         rey_rigid_gradient(start, variable, gradient);
-        for (int k = 0; k < RIGID_VARIABLES; k++) {
+        for (int k = 0; k < SIMILAR_VARIABLES; k++) {
             double quotient = 0;
             const double h = 1e-2;
             for (int sign = -1; sign <= 1; sign += 2) {
@@ -38,11 +39,12 @@ static void test_rigid_poses(void **state) {
                     squares[0] += (double)value[4 * i + 1] * (double)value[4 * i + 1];
                     squares[1] += (double)start[4 * i + 1] * (double)start[4 * i + 1];
                 }
-                assert_float_equal(squares[0], squares[1], 1e-5);
+                double scale = exp(moved[RIGID_VARIABLES]);
+                assert_float_equal(squares[0], scale * scale * squares[1], 1e-5);
             }
             assert_float_equal(gradient[k], quotient, 1e-3 * (1 + fabs(quotient)));
         }
-        assert_true(gradient[6] == 0 && gradient[15] == 0);
+        assert_true(gradient[7] == 0 && gradient[15] == 0);
     }
 }
 

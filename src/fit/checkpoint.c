@@ -1,17 +1,18 @@
 // checkpoint.c: little-endian binary: magic, counts, resolved job, history, start and value as floats, variables and
-// moments and averages as doubles, and a 64-bit FNV-1a hash of everything before it.
+// moments, averages and the state of L-BFGS as doubles, and a 64-bit FNV-1a hash of everything before it.
 #include "fit/checkpoint.h"
 
 #include "fit/job.h"
 #include "io/file.h"
+#include "io/number.h"
 
 #include <string.h>
 
-static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '2'};
+static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '3'};
 
 typedef struct CheckpointHeader {
     char magic[8];
-    uint64_t job_bytes, numbers, rows, width;
+    uint64_t job_bytes, numbers, extra, rows, width; // extra: numbers of L-BFGS
     uint64_t iteration, converged;
     uint64_t job_hash; // of the resolved job
     double seconds;
@@ -30,7 +31,7 @@ typedef struct Part {
     void *data;
     size_t bytes;
 } Part;
-enum { PART_COUNT = 6 };
+enum { PART_COUNT = 7 };
 static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     size_t n = (size_t)u->count;
     parts[0] = (Part){u->start, n * sizeof(float)};
@@ -39,6 +40,7 @@ static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     parts[3] = (Part){u->first, n * sizeof(double)};
     parts[4] = (Part){u->second, n * sizeof(double)};
     parts[5] = (Part){u->average, n * sizeof(double)};
+    parts[6] = (Part){u->lbfgs, (size_t)u->lbfgs_count * sizeof(double)};
 }
 
 static void append(unsigned char *bytes, size_t *at, const void *data, size_t size) {
@@ -62,6 +64,7 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
     }
     CheckpointHeader header = {.job_bytes = job_bytes,
                                .numbers = (uint64_t)u->count,
+                               .extra = (uint64_t)u->lbfgs_count,
                                .rows = state->history.count / (size_t)state->history_width,
                                .width = (uint64_t)state->history_width,
                                .iteration = (uint64_t)state->iteration,
@@ -86,12 +89,13 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
 // Whether the sizes that the header claims make up the file's size exactly.
 static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     const uint64_t most = (uint64_t)1 << 40;
-    if (h->job_bytes > most || h->numbers > most || h->rows > most || h->width > 1 << 20) {
+    if (h->job_bytes > most || h->numbers > most || h->extra > most || h->rows > most || h->width > 1 << 20) {
         return false;
     }
     uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);
     uint64_t expected =
-        sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number + sizeof(uint64_t);
+        sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
+        h->extra * sizeof(double) + sizeof(uint64_t);
     return expected == size;
 }
 
@@ -108,32 +112,37 @@ static const char *find_line(const char *text, const char *key) {
     return "absent";
 }
 
-static rey_result check_job(rey_context *ctx, const char *path, const CheckpointHeader *header, const char *stored,
+// The text of the job that a checkpoint was written for, owned.
+static char *stored_job(rey_context *ctx, const CheckpointHeader *header, const unsigned char *bytes) {
+    char *text = rey_alloc(ctx, (size_t)header->job_bytes + 1);
+    if (text) {
+        memcpy(text, bytes + sizeof *header, (size_t)header->job_bytes);
+    }
+    return text;
+}
+
+static rey_result check_job(rey_context *ctx, const char *path, const CheckpointHeader *header, const unsigned char *bytes,
                             const char *flat) {
-    char *old = rey_alloc(ctx, (size_t)header->job_bytes + 1);
+    char *old = stored_job(ctx, header, bytes);
     if (!old) {
         return REY_ERROR_MEMORY;
     }
-    memcpy(old, stored, (size_t)header->job_bytes);
     char key[256];
     bool other = rey_job_difference(old, flat, key, sizeof key);
-    const char *hint = "finish with the old job or use another -o";
-    if (other && !strcmp(key, "optimizer.schedule.length")) { // by default it follows the number of iterations
-        hint = "set it to its former value to go on with other iterations";
-    }
     rey_result result = REY_OK;
     if (other) {
         const char *was = find_line(old, key), *now = find_line(flat, key);
-        result = rey_fail(ctx, REY_ERROR_ARGUMENT, "%s is from a different job: '%s' was %.*s and is now %.*s; %s",
-                          path, key, (int)strcspn(was, "\n"), was, (int)strcspn(now, "\n"), now, hint);
+        result = rey_fail(ctx, REY_ERROR_ARGUMENT, "%s is from a different job: '%s' was %.*s and is now %.*s; finish with the old job "
+                          "or use another -o",
+                          path, key, (int)strcspn(was, "\n"), was, (int)strcspn(now, "\n"), now);
     }
     rey_free(ctx, old);
     return result;
 }
 
-// The header of an undamaged checkpoint of this job.
-static rey_result read_header(rey_context *ctx, const char *path, const char *flat, const unsigned char *bytes,
-                              size_t size, CheckpointHeader *header) {
+// The header of an undamaged checkpoint.
+static rey_result read_header(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
+                              CheckpointHeader *header) {
     uint64_t hash;
     if (size < sizeof *header + sizeof hash || memcmp(bytes, MAGIC, sizeof MAGIC)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a checkpoint of this version", path);
@@ -143,17 +152,20 @@ static rey_result read_header(rey_context *ctx, const char *path, const char *fl
     if (!sizes_agree(header, size) || hash != hash_bytes(bytes, size - sizeof hash)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: damaged checkpoint", path);
     }
-    return check_job(ctx, path, header, (const char *)bytes + sizeof *header, flat);
+    return REY_OK;
 }
 
 static rey_result decode(const char *path, const char *flat, const unsigned char *bytes, size_t size, Unknowns *u,
                          FitState *state) {
     CheckpointHeader header;
-    rey_result result = read_header(u->ctx, path, flat, bytes, size, &header);
+    rey_result result = read_header(u->ctx, path, bytes, size, &header);
+    if (!result) {
+        result = check_job(u->ctx, path, &header, bytes, flat);
+    }
     if (result) {
         return result;
     }
-    if (header.numbers != (uint64_t)u->count || header.width != (uint64_t)state->history_width ||
+    if (header.numbers != (uint64_t)u->count || header.extra != (uint64_t)u->lbfgs_count || header.width != (uint64_t)state->history_width ||
         header.rows != header.iteration || header.rows > INT32_MAX) {
         return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: made for %llu numbers, but the scene now has %lld", path,
                         (unsigned long long)header.numbers, (long long)u->count);
@@ -196,9 +208,36 @@ rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *f
     CheckpointHeader header = {.iteration = 0};
     rey_result result = rey_file_read(ctx, path, &bytes, &size);
     if (!result) {
-        result = read_header(ctx, path, flat, bytes, size, &header);
+        result = read_header(ctx, path, bytes, size, &header);
+    }
+    if (!result) {
+        result = check_job(ctx, path, &header, bytes, flat);
     }
     rey_free(ctx, bytes);
     *state = (FitState){.iteration = (int)header.iteration, .seconds = header.seconds, .converged = header.converged};
+    return result;
+}
+
+rey_result rey_checkpoint_number(rey_context *ctx, const char *path, const char *key, double fallback, double *out) {
+    unsigned char *bytes;
+    size_t size;
+    CheckpointHeader header;
+    *out = fallback;
+    rey_result result = rey_file_read(ctx, path, &bytes, &size);
+    if (!result) {
+        result = read_header(ctx, path, bytes, size, &header);
+    }
+    char *text = result ? NULL : stored_job(ctx, &header, bytes);
+    if (text) {
+        const char *end;
+        double value;
+        if (rey_parse_real(find_line(text, key), &end, &value)) {
+            *out = value;
+        }
+    } else if (!result) {
+        result = REY_ERROR_MEMORY;
+    }
+    rey_free(ctx, text);
+    rey_free(ctx, bytes);
     return result;
 }

@@ -22,4 +22,6 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
 // Reads one that was written for the same job; names the first key that differs otherwise.
 rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state);
 // The same without the numbers: how far it came.
+// The value of a key of the job that it was written for, which is read as a number; `fallback` where there is none.
+rey_result rey_checkpoint_number(rey_context *ctx, const char *path, const char *key, double fallback, double *out);
 rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *flat, FitState *state);

@@ -34,12 +34,30 @@ static rey_result write_resolved(Fit *fit) {
     return result;
 }
 
+// A schedule that follows the number of iterations goes on as it began when there are to be more of them.
+static rey_result keep_schedule(Fit *fit, const char *checkpoint) {
+    JobSchedule *schedule = &fit->job.optimizer.schedule;
+    double length;
+    rey_result result =
+        rey_checkpoint_number(fit->ctx, checkpoint, "optimizer.schedule.length", (double)schedule->length, &length);
+    if (!result && !schedule->length_given && length >= 1 && length <= 1e9) {
+        schedule->length = (int)length;
+        rey_free(fit->ctx, fit->flat);
+        fit->flat = NULL;
+        result = rey_job_flat(&fit->job, &fit->flat);
+    }
+    return result;
+}
+
 // A fit that was killed before its first checkpoint goes on from its start.
 static rey_result resume(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin"), *job = rey_fit_output_path(fit, "job.resolved.yaml");
     rey_result result = path && job ? REY_OK : REY_ERROR_MEMORY;
     if (!result && (access(path, F_OK) == 0 || access(job, F_OK) != 0)) {
-        result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
+        result = keep_schedule(fit, path);
+        if (!result) {
+            result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
+        }
     }
     rey_free(fit->ctx, path);
     rey_free(fit->ctx, job);
@@ -155,6 +173,11 @@ static rey_result finish(Fit *fit, FitResult *out) {
         rey_unknowns_take_average(&fit->unknowns);
         result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
     }
+    if (!result && fit->job.optimizer.kind == OPTIMIZER_LBFGS && fit->state.iteration > 0) {
+        rey_optimizer_restart(&fit->job.optimizer, &fit->unknowns);
+        result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
+    }
+    rey_levels_reduce(fit, 1);
     if (!result) {
         result = save_scene(fit, out);
     }
@@ -181,7 +204,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
 }
 
 rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out) {
-    Fit fit = {.ctx = ctx, .def = def};
+    Fit fit = {.ctx = ctx, .def = def, .level = -1};
     *out = (FitResult){.ctx = ctx};
     locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0); // files hold decimal points, whatever the host has set
     locale_t host = plain ? uselocale(plain) : (locale_t)0;

@@ -3,6 +3,7 @@
 
 #include "fit/checkpoint.h"
 #include "fit/loss.h"
+#include "scene/scene.h"
 
 typedef struct FitProgress {
     int iteration, iterations; // done, and in all
@@ -56,9 +57,12 @@ void rey_fit_result_free(FitResult *result); // also after a failure
 /* ---- what the parts of a fit share --------------------------------------------------------------------- */
 
 typedef struct FitView {
-    int sensor, width, height;
-    float *target, *mask; // mask null = 1 everywhere
+    int sensor, width, height; // of the level at work, as all pictures are
+    float *target, *mask;      // mask null = 1 everywhere
     double mask_sum, weight;
+    int full_width, full_height;
+    float *full_target, *full_mask;
+    SensorRecord full_sensor;
 } FitView;
 
 typedef struct Fit {
@@ -69,6 +73,7 @@ typedef struct Fit {
     rey_scene *scene;
     Unknowns unknowns;
     FitView *views;
+    int level; // at work, -1 = none yet
     FitState state;
     char *output; // folder
     float *a, *b; // halves of the view at work
@@ -106,6 +111,17 @@ rey_result rey_frame_read(const Fit *fit, int view, int iteration, unsigned char
 rey_result rey_views_load(Fit *fit);
 void rey_views_free(Fit *fit);
 
+// Levels (levels.c): whether a view can be reduced as the job says; the pictures and films of a level.
+rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *view);
+rey_result rey_levels_enter(Fit *fit, int level);
+void rey_levels_reduce(Fit *fit, int r);
+
+// Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
+// back through that, with the gradient of an unknown exposure.
+double rey_exposure_of(const Fit *fit, int view, const float *values);
+void rey_exposure_scale(const Fit *fit, int view, double exposure, float *image);
+void rey_exposure_adjoint(Fit *fit, int view, double exposure);
+
 // metrics.jsonl and the TensorBoard file. open truncates to the iterations that are done.
 rey_result rey_metrics_open(Fit *fit);
 rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count);
@@ -114,5 +130,8 @@ void rey_metrics_close(Fit *fit);
 
 // Fills result->rows with starts and found values.
 rey_result rey_fit_table(Fit *fit, FitResult *result);
+// A pose (4 x 4) in words: where it is, and how far it is turned from the truth, or from the start where that is not known.
+// False for other parameters.
+bool rey_fit_pose_text(const FitRow *row, const float *values, char *text, size_t size);
 // Adds truths and errors to the rows; opens the truth when the job names one, which nothing does before.
 rey_result rey_fit_judge(Fit *fit, FitResult *result);

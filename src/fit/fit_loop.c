@@ -82,20 +82,26 @@ static rey_result render_half(Fit *fit, const FitView *view, uint32_t set, int s
 
 static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int spp, const float *adjoint) {
     rey_render_def def = view_def(fit, view, set, spp);
-    rey_selection selection = {fit->unknowns.params, (int)fit->unknowns.items.count};
+    rey_selection selection = {fit->unknowns.params, fit->unknowns.param_count};
     rey_stats stats = {0};
     rey_result result = rey_vjp(fit->scene, &def, selection, adjoint, fit->gradient, NULL, &stats);
     fit->nonfinite += stats.nonfinite;
-    for (int64_t i = 0; i < fit->unknowns.count && !result; i++) {
-        fit->unknowns.gradient[i] += fit->gradient[i];
+    const double *from = fit->gradient;
+    for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count && p->param >= 0; i++) {
+            fit->unknowns.gradient[i] += *from++;
+        }
     }
     return result;
 }
 
 // Adds one view's share of the gradient; *loss is its loss.
-static rey_result add_view(Fit *fit, const FitView *view, int batch_count, double *loss) {
+static rey_result add_view(Fit *fit, int index, int batch_count, double *loss) {
+    const FitView *view = &fit->views[index];
     int iteration = fit->state.iteration, spp = rey_job_spp_at(&fit->job, iteration) / 2;
-    uint32_t set_a = 2 * (uint32_t)iteration, set_b = set_a + 1;
+    bool frozen = fit->job.optimizer.kind == OPTIMIZER_LBFGS; // it needs one function, noise included
+    uint32_t set_a = frozen ? 0 : 2 * (uint32_t)iteration, set_b = set_a + 1;
     rey_result result = render_half(fit, view, set_a, spp, fit->a);
     if (!result) {
         result = render_half(fit, view, set_b, spp, fit->b);
@@ -103,10 +109,14 @@ static rey_result add_view(Fit *fit, const FitView *view, int batch_count, doubl
     if (result) {
         return result;
     }
+    double exposure = rey_exposure_of(fit, index, fit->unknowns.value);
+    rey_exposure_scale(fit, index, exposure, fit->a);
+    rey_exposure_scale(fit, index, exposure, fit->b);
     LossView loss_view = {view->target, view->mask, (int64_t)view->width * view->height, view->mask_sum};
     *loss = view->weight / batch_count *
             rey_loss(fit->job.loss, fit->job.loss_epsilon, &loss_view, fit->a, fit->b, view->weight / batch_count,
                      fit->adjoint_a, fit->adjoint_b);
+    rey_exposure_adjoint(fit, index, exposure);
     result = add_product(fit, view, set_a, spp, fit->adjoint_a);
     return result ? result : add_product(fit, view, set_b, spp, fit->adjoint_b);
 }
@@ -130,8 +140,28 @@ static rey_result add_history(Fit *fit, double loss, double norm) {
     return REY_OK;
 }
 
+// Pictures of another size or with other samples make another function of the unknowns.
+static rey_result begin_iteration(Fit *fit) {
+    const Job *job = &fit->job;
+    int i = fit->state.iteration, level = rey_job_level_at(job, i);
+    bool changed = i && (level != rey_job_level_at(job, i - 1) || rey_job_spp_at(job, i) != rey_job_spp_at(job, i - 1));
+    rey_result result = REY_OK;
+    if (changed) {
+        rey_optimizer_restart(&job->optimizer, &fit->unknowns);
+        result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
+    }
+    if (!result && level != fit->level) {
+        result = rey_levels_enter(fit, level);
+    }
+    return result;
+}
+
 static rey_result iterate(Fit *fit, int *order) {
     int count = choose_batch(fit, fit->state.iteration, order);
+    rey_result begun = begin_iteration(fit);
+    if (begun) {
+        return begun;
+    }
     double loss = 0;
     memset(fit->unknowns.gradient, 0, (size_t)fit->unknowns.count * sizeof *fit->unknowns.gradient);
     bool show = fit->job.image_every && fit->state.iteration % fit->job.image_every == 0;
@@ -139,7 +169,7 @@ static rey_result iterate(Fit *fit, int *order) {
     for (int k = 0; k < count; k++) {
         const FitView *view = &fit->views[order[k]];
         double part = 0;
-        rey_result result = add_view(fit, view, count, &part);
+        rey_result result = add_view(fit, order[k], count, &part);
         for (int64_t i = 0; (show || frame) && !result && i < (int64_t)view->width * view->height * 3; i++) {
             fit->a[i] = 0.5f * (fit->a[i] + fit->b[i]);
         }
@@ -154,7 +184,8 @@ static rey_result iterate(Fit *fit, int *order) {
         }
         loss += part;
     }
-    double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration);
+    loss += rey_unknowns_regularise(&fit->unknowns);
+    double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration, loss);
     if (!isfinite(loss) || !isfinite(norm)) {
         return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "the loss or its gradient is not finite at iteration %d",
                         fit->state.iteration);

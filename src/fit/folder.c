@@ -67,8 +67,8 @@ static void remove_files(const char *path, const char *start) {
     }
 }
 
-// Whether what the folder holds may be replaced: the finished fit of this very job would come out the same.
-static rey_result check_former(Fit *fit, const char *path) {
+// What the folder holds is not replaced unasked; the message says what it is.
+static rey_result refuse_former(Fit *fit, const char *path) {
     FitState state;
     rey_result result = rey_checkpoint_look(fit->ctx, path, fit->flat, &state);
     if (result == REY_ERROR_MEMORY) {
@@ -79,19 +79,20 @@ static rey_result check_former(Fit *fit, const char *path) {
         snprintf(why, sizeof why, "%s", rey_error(fit->ctx));
         return rey_fail(fit->ctx, result, "%s; --overwrite replaces it", why);
     }
-    if (state.iteration != fit->job.iterations && !state.converged) {
-        bool more = state.iteration < fit->job.iterations;
-        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds %d iteration%s of this fit; %s--overwrite starts again",
-                        fit->output, state.iteration, PLURAL(state.iteration), more ? "--resume continues, " : "");
+    if (state.iteration == fit->job.iterations || state.converged) {
+        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds this fit, finished; --overwrite starts again, -o writes "
+                        "elsewhere", fit->output);
     }
-    return REY_OK;
+    bool more = state.iteration < fit->job.iterations;
+    return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds %d iteration%s of this fit; %s--overwrite starts again",
+                    fit->output, state.iteration, PLURAL(state.iteration), more ? "--resume continues, " : "");
 }
 
 static rey_result take_over(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin"), *frames = rey_fit_output_path(fit, "frames");
     rey_result result = path && frames ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
-        result = fit->def->overwrite ? REY_OK : check_former(fit, path);
+        result = fit->def->overwrite ? REY_OK : refuse_former(fit, path);
     }
     if (!result) {
         remove_files(fit->output, "events.out.tfevents."); // or this fit would go on in them

@@ -12,10 +12,10 @@
         return function##_list[kind];                                                                                  \
     }
 NAMES(rey_loss_name, "l1", "l2", "relative_l2", "log_l2")
-NAMES(rey_optimizer_name, "adam", "sgd")
+NAMES(rey_optimizer_name, "adam", "sgd", "lbfgs")
 NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
-NAMES(rey_parameterisation_name, "identity", "log", "logit", "rigid")
-NAMES(rey_moment_name, "per_entry", "shared")
+NAMES(rey_parameterisation_name, "identity", "log", "logit", "rigid", "similarity", "laplacian")
+NAMES(rey_moment_name, "per_entry", "shared", "uniform")
 
 // Letters, digits and underscores, the first no digit.
 static bool is_name(const char *text) {
@@ -75,12 +75,34 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
     return result;
 }
 
+static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "from", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, from), .high = 1e9, .required = true},
+        {.key = "reduce", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, reduce), .low = 1, .high = 1024},
+        {0},
+    };
+    JobLevel **levels = target;
+    void *items = NULL;
+    rey_result result = rey_job_open_list(job, node, sizeof **levels, &items, &job->level_count);
+    *levels = items;
+    int i = 0;
+    for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
+        (*levels)[i].reduce = 1;
+        result = rey_job_read_map(job, entry, "levels", fields, &(*levels)[i]);
+        if (!result && (i ? (*levels)[i].from <= (*levels)[i - 1].from : (*levels)[0].from != 0)) {
+            result = rey_job_fail(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
+        }
+    }
+    return result;
+}
+
 static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
         {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
         {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
         {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .low = 1e-9, .high = 1e9},
+        {.key = "exposure", .type = FIELD_REAL, .offset = offsetof(JobView, exposure), .low = 1e-9, .high = 1e9},
         {0},
     };
     JobView **views = target;
@@ -89,7 +111,7 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     *views = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        (*views)[i] = (JobView){.sensor = i, .weight = 1, .line = entry->line};
+        (*views)[i] = (JobView){.sensor = i, .weight = 1, .exposure = 1, .line = entry->line};
         result = rey_job_read_map(job, entry, "views", fields, &(*views)[i]);
     }
     return result;
@@ -140,6 +162,7 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
         {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, epsilon), .low = 1e-30, .high = 1e6},
         {.key = "momentum", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, momentum), .high = 0.999999},
         {.key = "average", .type = FIELD_REAL, .offset = offsetof(JobOptimizer, average), .high = 1e6},
+        {.key = "memory", .type = FIELD_INTEGER, .offset = offsetof(JobOptimizer, memory), .low = 1, .high = 64},
         {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
         {0},
     };
@@ -191,6 +214,35 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     return result;
 }
 
+static rey_result read_regularisers(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "laplacian", .type = FIELD_REAL, .offset = offsetof(Regularisers, laplacian), .high = 1e12},
+        {.key = "edge_length", .type = FIELD_REAL, .offset = offsetof(Regularisers, edge_length), .high = 1e12},
+        {.key = "normals", .type = FIELD_REAL, .offset = offsetof(Regularisers, normals), .high = 1e12},
+        {0},
+    };
+    return rey_job_read_map(job, node, "regularisers", fields, target);
+}
+
+// What is said of laplacian alone, and what depends on it.
+static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter *p) {
+    bool laplacian = p->parameterisation == PARAMETERISATION_LAPLACIAN;
+    for (int i = 0; i < 2 && !laplacian; i++) {
+        const char *key = i ? "smoothness" : "regularisers";
+        const YamlNode *given = rey_yaml_find(node, key);
+        if (given) {
+            return rey_job_fail(job, given, "%s is for 'parameterisation: laplacian'", key);
+        }
+    }
+    if (laplacian && !isnan(p->bounds[0])) {
+        return rey_job_fail(job, rey_yaml_find(node, "bounds"), "parameterisation laplacian has no bounds");
+    }
+    if (p->moment == MOMENT_COUNT) {
+        p->moment = laplacian ? MOMENT_UNIFORM : MOMENT_PER_ENTRY;
+    }
+    return REY_OK;
+}
+
 static rey_result read_parameters(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "name", .type = FIELD_TEXT, .offset = offsetof(JobParameter, name), .required = true},
@@ -209,6 +261,11 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
          .offset = offsetof(JobParameter, moment),
          .names = rey_moment_name_list},
         {.key = "start", .type = FIELD_READER, .offset = 0, .read = read_start},
+        {.key = "smoothness", .type = FIELD_REAL, .offset = offsetof(JobParameter, smoothness), .high = 1e9},
+        {.key = "regularisers",
+         .type = FIELD_READER,
+         .offset = offsetof(JobParameter, regularisers),
+         .read = read_regularisers},
         {0},
     };
     JobParameter **parameters = target;
@@ -217,8 +274,12 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
     *parameters = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        (*parameters)[i] = (JobParameter){.bounds = {NAN, NAN}, .line = entry->line};
+        (*parameters)[i] =
+            (JobParameter){.bounds = {NAN, NAN}, .moment = MOMENT_COUNT, .smoothness = 19, .line = entry->line};
         result = rey_job_read_map(job, entry, "parameters", fields, &(*parameters)[i]);
+        if (!result) {
+            result = finish_parameter(job, entry, &(*parameters)[i]);
+        }
     }
     return result;
 }
@@ -251,6 +312,7 @@ static const Field job_fields[] = {
     {.key = "seed", .type = FIELD_SEED, .offset = offsetof(Job, seed), .high = 4294967295.0},
     {.key = "iterations", .type = FIELD_INTEGER, .offset = offsetof(Job, iterations), .high = 1e9},
     {.key = "spp", .type = FIELD_READER, .offset = offsetof(Job, spp), .read = read_spp},
+    {.key = "levels", .type = FIELD_READER, .offset = offsetof(Job, levels), .read = read_levels},
     {.key = "views", .type = FIELD_READER, .offset = offsetof(Job, views), .read = read_views, .required = true},
     {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
     {.key = "loss", .type = FIELD_READER, .read = read_loss},
@@ -290,11 +352,27 @@ static rey_result set_defaults(Job *job) {
                                     .beta2 = 0.99,
                                     .epsilon = 1e-12,
                                     .momentum = 0.9,
+                                    .memory = 10,
                                     .schedule = {.end = 0.05, .factor = 0.5, .every = 100}};
     job->checkpoint_every = 50;
     job->checkpoint_seconds = 30;
     job->image_every = 50;
     job->report_spp = 64;
+    return REY_OK;
+}
+
+// L-BFGS needs one function, and takes its steps by itself.
+static rey_result check_lbfgs(Job *job) {
+    const YamlNode *node = rey_yaml_find(job->tree, "optimizer");
+    if (job->optimizer.schedule.kind != SCHEDULE_CONSTANT) {
+        return rey_job_fail(job, node, "lbfgs finds the lengths of its steps by itself: it has no schedule");
+    }
+    if (job->optimizer.average > 0) {
+        return rey_job_fail(job, node, "lbfgs ends at its best point: it has no average");
+    }
+    if (job->views_per_iteration && job->views_per_iteration != job->view_count) {
+        return rey_job_fail(job, node, "lbfgs needs all views in every iteration");
+    }
     return REY_OK;
 }
 
@@ -311,8 +389,12 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     if (!result) {
         result = rey_job_read_map(job, job->tree, "the job", job_fields, job);
     }
+    job->optimizer.schedule.length_given = job->optimizer.schedule.length != 0;
     if (!result && !job->optimizer.schedule.length) {
         job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
+    }
+    if (!result && job->optimizer.kind == OPTIMIZER_LBFGS) {
+        result = check_lbfgs(job);
     }
     if (!result && job->views_per_iteration > job->view_count) {
         result = rey_job_fail(job, rey_yaml_find(job->tree, "views_per_iteration"),

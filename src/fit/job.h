@@ -1,10 +1,11 @@
 // job.h: what a fit job file says.
 #pragma once
 
+#include "fit/vertices.h"
 #include "fit/yaml.h"
 
 typedef enum LossKind { LOSS_L1, LOSS_L2, LOSS_RELATIVE_L2, LOSS_LOG_L2, LOSS_COUNT } LossKind;
-typedef enum OptimizerKind { OPTIMIZER_ADAM, OPTIMIZER_SGD, OPTIMIZER_COUNT } OptimizerKind;
+typedef enum OptimizerKind { OPTIMIZER_ADAM, OPTIMIZER_SGD, OPTIMIZER_LBFGS, OPTIMIZER_COUNT } OptimizerKind;
 typedef enum ScheduleKind {
     SCHEDULE_CONSTANT,
     SCHEDULE_COSINE,
@@ -17,15 +18,18 @@ typedef enum Parameterisation {
     PARAMETERISATION_LOG,
     PARAMETERISATION_LOGIT,
     PARAMETERISATION_RIGID, // of poses: a rotation vector and a shift from the start
+    PARAMETERISATION_SIMILARITY, // and a scale
+    PARAMETERISATION_LAPLACIAN, // of meshes: preconditioned vertices
     PARAMETERISATION_COUNT
 } Parameterisation;
-typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_COUNT } MomentKind;
+typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_UNIFORM, MOMENT_COUNT } MomentKind;
 
 typedef struct JobView {
     int sensor;         // of the scene
     const char *target; // picture file
     const char *mask;   // picture file of weights, null = 1 everywhere
     double weight;      // of this view in the loss
+    double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
     int line;
 } JobView;
 
@@ -35,6 +39,8 @@ typedef struct JobParameter {
     double bounds[2];     // NaN = the parameter's own range
     Parameterisation parameterisation;
     MomentKind moment;
+    double smoothness;         // of laplacian: lambda
+    Regularisers regularisers; // of laplacian
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none
@@ -45,10 +51,16 @@ typedef struct JobSpp { // samples per pixel from this iteration on
     int from, spp;
 } JobSpp;
 
+typedef struct JobLevel { // from coarse to fine, from this iteration on
+    int from;
+    int reduce; // every picture is so many times smaller in width and height
+} JobLevel;
+
 typedef struct JobSchedule { // factor of every learning rate at iteration i
     ScheduleKind kind;       // cosine: from 1 to `end` over `length`; exponential: end^(i / length);
     double end;              // step: factor^floor(i / every)
     int length;
+    bool length_given; // else it follows the iterations
     double factor;
     int every;
 } JobSchedule;
@@ -57,6 +69,7 @@ typedef struct JobOptimizer {
     OptimizerKind kind;
     double learning_rate, beta1, beta2, epsilon, momentum;
     double average; // what is found is a mean that weighs iteration t with t^average; 0 = the last iteration's values
+    int memory;     // pairs of L-BFGS
     JobSchedule schedule;
 } JobOptimizer;
 
@@ -75,6 +88,8 @@ typedef struct Job {
     int report_spp;                      // 0 = no report
     JobSpp *spp;
     int spp_count;
+    JobLevel *levels; // none = one level of full pictures
+    int level_count;
     JobView *views;
     int view_count;
     LossKind loss;
@@ -102,6 +117,7 @@ const char *rey_job_path(Job *job, const char *name);
 void *rey_job_alloc(Job *job, size_t count, size_t item_bytes);
 
 int rey_job_spp_at(const Job *job, int iteration);
+int rey_job_level_at(const Job *job, int iteration);
 
 // Names of the enumerations above.
 const char *rey_loss_name(int kind);

@@ -46,6 +46,12 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
     }
     line_text(t, KEY("parameterisation"), rey_parameterisation_name((int)p->parameterisation));
     line_text(t, KEY("moment"), rey_moment_name((int)p->moment));
+    if (p->parameterisation == PARAMETERISATION_LAPLACIAN) {
+        line_real(t, KEY("smoothness"), p->smoothness);
+        line_real(t, KEY("regularisers.laplacian"), p->regularisers.laplacian);
+        line_real(t, KEY("regularisers.edge_length"), p->regularisers.edge_length);
+        line_real(t, KEY("regularisers.normals"), p->regularisers.normals);
+    }
     if (p->start_file) {
         line_text(t, KEY("start"), p->start_file);
     } else if (p->start_count == 1) {
@@ -65,6 +71,8 @@ static void flat_optimizer(Text *t, const JobOptimizer *o) {
         line_real(t, "optimizer.beta1", o->beta1);
         line_real(t, "optimizer.beta2", o->beta2);
         line_real(t, "optimizer.epsilon", o->epsilon);
+    } else if (o->kind == OPTIMIZER_LBFGS) {
+        line_integer(t, "optimizer.memory", o->memory);
     } else {
         line_real(t, "optimizer.momentum", o->momentum);
     }
@@ -90,6 +98,8 @@ static void flat_views(Text *t, const Job *job) {
         line_text(t, key, v->target);
         snprintf(key, sizeof key, "views.%d.weight", i);
         line_real(t, key, v->weight);
+        snprintf(key, sizeof key, "views.%d.exposure", i);
+        line_real(t, key, v->exposure);
         if (v->mask) {
             snprintf(key, sizeof key, "views.%d.mask", i);
             line_text(t, key, v->mask);
@@ -115,6 +125,12 @@ static void flat_decisive(Text *t, const Job *job) {
         line_integer(t, key, job->spp[i].from);
         snprintf(key, sizeof key, "spp.%d.spp", i);
         line_integer(t, key, job->spp[i].spp);
+    }
+    for (int i = 0; i < job->level_count; i++) {
+        snprintf(key, sizeof key, "levels.%d.from", i);
+        line_integer(t, key, job->levels[i].from);
+        snprintf(key, sizeof key, "levels.%d.reduce", i);
+        line_integer(t, key, job->levels[i].reduce);
     }
     flat_views(t, job);
     line_text(t, "loss.type", rey_loss_name((int)job->loss));

@@ -1,12 +1,18 @@
 // optimizer.c: Adam [kingma2015 algorithm 1] and gradient descent with momentum, in double precision.
 #include "fit/optimizer.h"
 
+#include "fit/lbfgs.h"
 #include "fit/rigid.h"
 
 #include <math.h>
+#include <string.h>
 
 static const double PI_VALUE = 3.14159265358979323846;
 static const double LOGIT_MARGIN = 1e-6; // values stay this far, as a share of the range, inside their bounds
+
+static bool is_pose(const Unknown *p) {
+    return p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
+}
 
 static double to_value(const Unknown *p, double u) {
     switch (p->parameterisation) {
@@ -61,8 +67,12 @@ static float round_inside(const Unknown *p, double x) {
 void rey_unknowns_begin(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
-        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
-            if (p->parameterisation == PARAMETERISATION_RIGID) {
+        if (p->vertices) {
+            rey_vertices_begin(p->vertices, u->start + p->offset, u->variable + p->offset);
+            memcpy(u->value + p->offset, u->start + p->offset, (size_t)p->count * sizeof *u->value);
+        }
+        for (int64_t i = p->offset; i < p->offset + p->count && !p->vertices; i++) {
+            if (is_pose(p)) {
                 u->variable[i] = 0;
                 u->value[i] = u->start[i];
                 continue;
@@ -87,19 +97,24 @@ double rey_schedule_factor(const JobSchedule *s, int iteration) {
     }
 }
 
-// The change of each variable of one parameter; g is the gradient in the variables.
+// The change of each variable of one parameter; g is the gradient in the variables. Of uniform moments the largest of all
+// entries counts, which keeps the directions of steps and so their smoothness [nicolet2021 section 4.1].
 static void adam_step(const JobOptimizer *o, const Unknown *p, double *variable, double *m, double *v, const double *g,
                       double rate, int iteration) {
     double correct1 = 1 - pow(o->beta1, iteration + 1.0), correct2 = 1 - pow(o->beta2, iteration + 1.0);
-    double mean_square = 0;
+    double mean_square = 0, largest = 0;
     for (int64_t i = 0; i < p->count; i++) {
         mean_square += g[i] * g[i] / (double)p->count;
     }
     for (int64_t i = 0; i < p->count; i++) {
-        double square = p->shared_moment ? mean_square : g[i] * g[i];
+        double square = p->moment == MOMENT_SHARED ? mean_square : g[i] * g[i];
         m[i] = o->beta1 * m[i] + (1 - o->beta1) * g[i];
         v[i] = o->beta2 * v[i] + (1 - o->beta2) * square;
-        variable[i] -= rate * (m[i] / correct1) / (sqrt(v[i] / correct2) + o->epsilon);
+        largest = fmax(largest, v[i]);
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        double second = p->moment == MOMENT_UNIFORM ? largest : v[i];
+        variable[i] -= rate * (m[i] / correct1) / (sqrt(second / correct2) + o->epsilon);
     }
 }
 
@@ -116,7 +131,7 @@ static void average_values(const JobOptimizer *o, Unknowns *u, int iteration) {
     double weight = (o->average + 1) / (iteration + 1 + o->average);
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
-        bool rigid = p->parameterisation == PARAMETERISATION_RIGID; // means of rotations are none
+        bool rigid = is_pose(p); // means of rotations are none
         for (int64_t i = p->offset; i < p->offset + p->count; i++) {
             u->average[i] += weight * ((rigid ? u->variable[i] : (double)u->value[i]) - u->average[i]);
         }
@@ -126,8 +141,12 @@ static void average_values(const JobOptimizer *o, Unknowns *u, int iteration) {
 // Replaces the gradient in the values by that in the variables; returns the square of its length.
 static double to_variable_gradient(const Unknowns *u, const Unknown *p, double *g) {
     double square = 0;
-    if (p->parameterisation == PARAMETERISATION_RIGID) {
+    if (is_pose(p)) {
         rey_rigid_gradient(u->start + p->offset, u->variable + p->offset, g);
+        g[RIGID_VARIABLES] *= p->parameterisation == PARAMETERISATION_SIMILARITY;
+    }
+    if (p->vertices) {
+        rey_vertices_gradient(p->vertices, g);
     }
     for (int64_t i = 0; i < p->count; i++) {
         g[i] *= value_derivative(p, u->variable[p->offset + i]);
@@ -139,8 +158,12 @@ static double to_variable_gradient(const Unknowns *u, const Unknown *p, double *
 // The values of one parameter after its variables moved; variables stay where their values are within the bounds.
 static void follow_variables(Unknowns *u, const Unknown *p) {
     double *variable = u->variable + p->offset;
-    if (p->parameterisation == PARAMETERISATION_RIGID) {
+    if (is_pose(p)) {
         rey_rigid_pose(u->start + p->offset, variable, u->value + p->offset);
+        return;
+    }
+    if (p->vertices) {
+        rey_vertices_follow(p->vertices, variable, u->value + p->offset);
         return;
     }
     for (int64_t i = 0; i < p->count; i++) {
@@ -152,19 +175,88 @@ static void follow_variables(Unknowns *u, const Unknown *p) {
     }
 }
 
-double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
+double rey_unknowns_regularise(Unknowns *u) {
+    double sum = 0;
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        if (p->vertices) {
+            sum += rey_vertices_regularise(p->vertices, u->value + p->offset, u->gradient + p->offset);
+        }
+    }
+    return sum;
+}
+
+static double rate_of(const JobOptimizer *o, const Unknown *p) {
+    return p->learning_rate > 0 ? p->learning_rate : o->learning_rate;
+}
+
+// Scales all variables by their learning rates' power.
+static void scale_by_rates(const JobOptimizer *o, Unknowns *u, double *numbers, int power) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        double factor = power > 0 ? rate_of(o, p) : 1 / rate_of(o, p);
+        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            numbers[i] *= factor;
+        }
+    }
+}
+
+static void follow_all(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        follow_variables(u, &ARRAY_AT(u->items, Unknown, k));
+    }
+}
+
+// Entries that lie on a bound which the gradient pushes against do not take part.
+static void hold_bounds(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count && !is_pose(p) && !p->vertices; i++) {
+            double x = (double)u->value[i], g = u->gradient[i];
+            if ((g > 0 && x <= p->low) || (g < 0 && x >= p->high)) {
+                u->gradient[i] = 0;
+            }
+        }
+    }
+}
+
+// In variables divided by their rates, in which gradients are multiplied by them.
+static void lbfgs_step(const JobOptimizer *o, Unknowns *u, double loss) {
+    hold_bounds(u);
+    scale_by_rates(o, u, u->variable, -1);
+    scale_by_rates(o, u, u->gradient, 1);
+    rey_lbfgs_step(u->lbfgs, u->count, o->memory, loss, u->gradient, u->variable);
+    scale_by_rates(o, u, u->variable, 1);
+    follow_all(u);
+}
+
+void rey_optimizer_restart(const JobOptimizer *o, Unknowns *u) {
+    if (o->kind == OPTIMIZER_LBFGS) {
+        scale_by_rates(o, u, u->variable, -1);
+        rey_lbfgs_take_best(u->lbfgs, u->count, u->variable);
+        scale_by_rates(o, u, u->variable, 1);
+        rey_lbfgs_forget(u->lbfgs);
+        follow_all(u);
+    }
+}
+
+double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration, double loss) {
     double factor = rey_schedule_factor(&o->schedule, iteration), norm = 0;
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
         double *variable = u->variable + p->offset, *g = u->gradient + p->offset;
-        double rate = (p->learning_rate > 0 ? p->learning_rate : o->learning_rate) * factor;
+        double rate = rate_of(o, p) * factor;
         norm += to_variable_gradient(u, p, g);
         if (o->kind == OPTIMIZER_ADAM) {
             adam_step(o, p, variable, u->first + p->offset, u->second + p->offset, g, rate, iteration);
-        } else {
+        } else if (o->kind == OPTIMIZER_SGD) {
             sgd_step(o, p, variable, u->first + p->offset, g, rate);
         }
-        follow_variables(u, p);
+    }
+    if (o->kind == OPTIMIZER_LBFGS) {
+        lbfgs_step(o, u, loss);
+    } else {
+        follow_all(u);
     }
     average_values(o, u, iteration);
     return sqrt(norm);
@@ -173,7 +265,7 @@ double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration) {
 void rey_unknowns_take_average(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
-        if (p->parameterisation == PARAMETERISATION_RIGID) {
+        if (is_pose(p)) {
             rey_rigid_pose(u->start + p->offset, u->average + p->offset, u->value + p->offset);
             continue;
         }

@@ -3,8 +3,9 @@
 
 #include "fit/job.h"
 
-typedef struct Unknown { // one parameter of the scene
-    int param;           // its index
+typedef struct Unknown { // one parameter of the scene, or of a view
+    int param;           // its index; -1 = the exposure of a view
+    int view;            // that one
     const char *name;
     int64_t offset, count; // place in the arrays of Unknowns
     int dims;
@@ -12,19 +13,23 @@ typedef struct Unknown { // one parameter of the scene
     double learning_rate; // 0 = the optimizer's
     double low, high;
     Parameterisation parameterisation;
-    bool shared_moment;
+    MomentKind moment;
+    Vertices *vertices; // of laplacian, owned; else null
 } Unknown;
 
 typedef struct Unknowns {
     rey_context *ctx;
     Array items;            // Unknown
-    int *params;            // their indices, for rey_selection
+    int *params;            // indices of those that are the scene's, for rey_selection
+    int param_count;
     int64_t count;          // numbers in all
     float *start, *value;   // as the scene holds them
     double *variable;       // what the optimizer moves: x, log x, or logit of x's place within the bounds
     double *first, *second; // moments; SGD uses the first as its velocity
     double *average;        // of the values over the iterations, see JobOptimizer
     double *gradient;       // d loss / d value
+    double *lbfgs;          // its state, null for other optimizers
+    int64_t lbfgs_count;
 } Unknowns;
 
 // Finds the job's parameters in the scene, gives the scene their start values, and clears the moments.
@@ -37,7 +42,12 @@ rey_result rey_unknowns_apply(const Unknowns *u, rey_scene *scene, const float *
 
 double rey_schedule_factor(const JobSchedule *schedule, int iteration);
 
-// One step along u->gradient at iteration i (from 0); returns the gradient's Euclidean norm in the variables.
-double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration);
+// Adds the regularisers' gradients to u->gradient; returns their sum.
+double rey_unknowns_regularise(Unknowns *u);
+// One step along u->gradient at iteration i (from 0); loss: where the gradient was taken.
+// Returns the gradient's Euclidean norm in the variables.
+double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration, double loss);
+// The loss is another function from here on, or there are no more iterations: L-BFGS goes back to its best point.
+void rey_optimizer_restart(const JobOptimizer *optimizer, Unknowns *u);
 // Puts the average into value, for good: called when the optimisation is over.
 void rey_unknowns_take_average(Unknowns *u);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 static void put_head(Fit *fit, const FitResult *out, Text *html) {
+    static const char *const optimizers[] = {"Adam", "gradient descent with momentum", "L-BFGS"};
     const char *slash = strrchr(fit->job.path, '/'), *scene = strrchr(fit->job.scene, '/');
     rey_text_add(html, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
                        "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>");
@@ -18,7 +19,7 @@ static void put_head(Fit *fit, const FitResult *out, Text *html) {
                  "%d iterations of %s on the %s loss in %.1f seconds%s. Job ",
                  (long long)out->numbers, (int)out->rows.count, out->rows.count == 1 ? "" : "s", fit->job.view_count,
                  fit->job.view_count == 1 ? "" : "s", out->iterations,
-                 fit->job.optimizer.kind == OPTIMIZER_ADAM ? "Adam" : "gradient descent with momentum",
+                 optimizers[fit->job.optimizer.kind],
                  fit->job.loss == LOSS_L1            ? "L1"
                  : fit->job.loss == LOSS_L2          ? "L2"
                  : fit->job.loss == LOSS_RELATIVE_L2 ? "relative L2"

@@ -21,6 +21,11 @@ static void put_entries(Text *html, const FitRow *row, const float *values) {
         rey_text_add(html, "&ndash;");
         return;
     }
+    char pose[96];
+    if (rey_fit_pose_text(row, values, pose, sizeof pose)) {
+        rey_text_add(html, "%s", pose);
+        return;
+    }
     bool few = row->count <= SHOWN_ENTRIES, colours = row->count == 3 || (row->dims == 3 && row->shape[2] == 3);
     int64_t shown = few ? row->count : colours ? 3 : 1;
     double mean[SHOWN_ENTRIES] = {0};
@@ -78,5 +83,5 @@ void rey_report_table(Fit *fit, const FitResult *out, Text *html) {
         rey_text_add(html, " <sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the "
                            "pictures depend on it at the truth.");
     }
-    rey_text_add(html, " Dashed: the truth.</p>\n");
+    rey_text_add(html, " Poses: position, and the angle from the truth, or from the start where there is none. Dashed: the truth.</p>\n");
 }

@@ -124,6 +124,7 @@ static rey_result render_all(Fit *fit, const float *values, uint32_t set, float 
         const FitView *view = &fit->views[v];
         rey_render_def def = rey_fit_finishing_def(fit, view, set, fit->job.report_spp);
         result = rey_render(fit->scene, &def, images, NULL);
+        rey_exposure_scale(fit, v, rey_exposure_of(fit, v, values), images);
         images += (int64_t)view->width * view->height * 3;
     }
     return result;

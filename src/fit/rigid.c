@@ -31,11 +31,12 @@ static Rotation rotation_of(const double w[3]) {
 
 void rey_rigid_pose(const float *start, const double *variable, float *value) {
     Rotation q = rotation_of(variable);
+    double scale = exp(variable[RIGID_VARIABLES]);
     memcpy(value, start, RIGID_VALUES * sizeof *value);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
-            value[4 * i + k] = (float)(q.r[i][0] * (double)start[k] + q.r[i][1] * (double)start[4 + k] +
-                                       q.r[i][2] * (double)start[8 + k]);
+            value[4 * i + k] = (float)(scale * (q.r[i][0] * (double)start[k] + q.r[i][1] * (double)start[4 + k] +
+                                                q.r[i][2] * (double)start[8 + k]));
         }
         value[4 * i + 3] = (float)((double)start[4 * i + 3] + variable[3 + i]);
     }
@@ -46,9 +47,10 @@ void rey_rigid_gradient(const float *start, const double *variable, double *grad
     float value[RIGID_VALUES];
     double turn[3] = {0, 0, 0}, out[RIGID_VALUES] = {0};
     rey_rigid_pose(start, variable, value);
-    // dA = [u] A, u = J dw: the derivative in u is the sum over the columns of column x gradient.
+    // dA = A ds + [u] A, u = J dw: the derivative in u is the sum over the columns of column x gradient.
     for (int column = 0; column < 3; column++) {
         for (int i = 0; i < 3; i++) {
+            out[RIGID_VARIABLES] += (double)value[4 * i + column] * gradient[4 * i + column];
             int j = (i + 1) % 3, k = (i + 2) % 3;
             turn[i] += (double)value[4 * j + column] * gradient[4 * k + column] -
                        (double)value[4 * k + column] * gradient[4 * j + column];

@@ -5,6 +5,7 @@
 #include "render/update.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { LARGEST_SMALL = 64, WEIGHT_SPP = 64 }; // parameters up to this size are judged by their worst entry
@@ -59,6 +60,38 @@ static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t cou
     return result;
 }
 
+static bool is_pose(const FitRow *row) {
+    return row->dims == 2 && row->shape[0] == 4 && row->shape[1] == 4;
+}
+
+// Angle between the columns of two poses, stretched or not: of R = A B^T, cos = (trace R - 1) / 2 [degrees].
+static double turned(const float *a, const float *b) {
+    double trace = 0;
+    for (int column = 0; column < 3; column++) {
+        double ab = 0, aa = 0, bb = 0;
+        for (int k = 0; k < 3; k++) {
+            double x = (double)a[4 * k + column], y = (double)b[4 * k + column];
+            ab += x * y;
+            aa += x * x;
+            bb += y * y;
+        }
+        trace += aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
+    }
+    return acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / 3.14159265358979323846;
+}
+
+bool rey_fit_pose_text(const FitRow *row, const float *values, char *text, size_t size) {
+    const float *other = row->truth ? row->truth : row->start;
+    if (!is_pose(row)) {
+        return false;
+    }
+    int used = snprintf(text, size, "%.3g %.3g %.3g", (double)values[3], (double)values[7], (double)values[11]);
+    if (values != other && used > 0 && (size_t)used < size) {
+        snprintf(text + used, size - (size_t)used, ", %.3g deg", turned(values, other));
+    }
+    return true;
+}
+
 // Largest error of an entry over the largest entry: of poses, whose entries belong together.
 static double pose_error(const FitRow *row) {
     double worst = 0, largest = 0;
@@ -71,7 +104,7 @@ static double pose_error(const FitRow *row) {
 
 static double worst_error(const FitRow *row) {
     double worst = 0;
-    if (row->dims == 2 && row->shape[0] == 4 && row->shape[1] == 4) {
+    if (is_pose(row)) {
         return pose_error(row);
     }
     for (int64_t i = 0; i < row->count; i++) {
@@ -91,7 +124,7 @@ static double weighted_error(const FitRow *row, const double *weights) {
 }
 
 static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRow *row) {
-    int param = rey_param_find(truth, row->name);
+    int param = rey_param_find(truth, row->name); // none of an exposure's name
     rey_param_info info;
     if (param < 0 || rey_param_get_info(truth, param, &info) || info.count != row->count) {
         return REY_OK; // nothing to compare with

@@ -1,7 +1,9 @@
 // unknowns.c: the job's parameters found in the scene, with their bounds and start values.
 #include "fit/optimizer.h"
+#include "fit/lbfgs.h"
 #include "fit/rigid.h"
 #include "io/image.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -99,6 +101,10 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     if (p->start_file) {
         return start_from_file(job, p, unknown, start);
     }
+    if (p->start_count == 0 && unknown->param < 0) {
+        start[0] = (float)job->views[unknown->view].exposure;
+        return REY_OK;
+    }
     if (p->start_count == 0) {
         memcpy(start, rey_param_values(scene, unknown->param), (size_t)unknown->count * sizeof *start);
         return REY_OK;
@@ -131,6 +137,17 @@ static rey_result check_start(Job *job, const JobParameter *p, const Unknown *un
     return REY_OK;
 }
 
+static rey_result add_vertices(Job *job, const rey_scene *scene, const JobParameter *p, Unknown *unknown) {
+    const Param *param = &ARRAY_AT(scene->params, Param, unknown->param);
+    const ShapeRecord *shape = param->geometry >= 0 ? scene->view.shapes + param->geometry : NULL;
+    if (!shape || shape->triangle_count == 0 || param->theta != shape->positions) {
+        return fail_at(job, p, unknown->name, "parameterisation laplacian is for vertices of meshes, such as NAME.positions");
+    }
+    return rey_vertices_create(job->ctx, shape->vertex_count, scene->view.welded + shape->welded, shape->triangle_count,
+                               scene->view.triangles + 3 * (int64_t)shape->triangle, p->smoothness, p->regularisers,
+                               &unknown->vertices);
+}
+
 static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index,
                               Array *owners, Unknowns *u) {
     rey_param_info info;
@@ -142,8 +159,9 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (!info.terms || (info.terms & ~REY_TERM_TERMINATOR & ~known)) { // jumps are refused when a path meets one
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
-    if (p->parameterisation == PARAMETERISATION_RIGID && info.count != RIGID_VALUES) {
-        return fail_at(job, p, info.name, "parameterisation rigid is for poses, such as NAME.to_world");
+    bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
+    if (pose && info.count != RIGID_VALUES) {
+        return fail_at(job, p, info.name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
     }
     for (size_t i = 0; i < u->items.count; i++) {
         if (ARRAY_AT(u->items, Unknown, i).param == param) {
@@ -166,15 +184,64 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
                          .shape = {info.shape[0], info.shape[1], info.shape[2]},
                          .learning_rate = p->learning_rate,
                          .parameterisation = p->parameterisation,
-                         .shared_moment = p->moment == MOMENT_SHARED};
+                         .moment = p->moment};
     u->count += info.count;
+    if (p->parameterisation == PARAMETERISATION_LAPLACIAN) {
+        result = add_vertices(job, scene, p, unknown);
+    }
+    return result ? result : set_bounds(job, p, &info, unknown);
+}
+
+// views.I.exposure: one number, no parameter of the scene.
+static rey_result add_exposure(Job *job, int view, const char *name, int index, Array *owners, Unknowns *u) {
+    const JobParameter *p = &job->parameters[index];
+    const rey_param_info info = {.name = name, .low = 0, .high = INFINITY};
+    if (p->parameterisation >= PARAMETERISATION_RIGID) {
+        return fail_at(job, p, name, "an exposure is one number, of parameterisation identity, log or logit");
+    }
+    for (size_t i = 0; i < u->items.count; i++) {
+        const Unknown *other = &ARRAY_AT(u->items, Unknown, i);
+        if (other->param < 0 && other->view == view) {
+            return fail_at(job, p, name, "an earlier entry of 'parameters' names it already");
+        }
+    }
+    Unknown *unknown = rey_array_push(job->ctx, &u->items, sizeof *unknown, 1);
+    int *owner = unknown ? rey_array_push(job->ctx, owners, sizeof *owner, 1) : NULL;
+    if (!owner) {
+        return REY_ERROR_MEMORY;
+    }
+    *owner = index;
+    *unknown = (Unknown){.param = -1, .view = view, .name = name, .offset = u->count, .count = 1,
+                         .learning_rate = p->learning_rate, .parameterisation = p->parameterisation, .moment = p->moment};
+    u->count++;
     return set_bounds(job, p, &info, unknown);
+}
+
+// The exposures that a name matches; *found says whether there are any.
+static rey_result match_exposures(Job *job, int index, Array *owners, Unknowns *u, bool *found) {
+    rey_result result = REY_OK;
+    *found = false;
+    for (int v = 0; v < job->view_count && !result; v++) {
+        char name[40];
+        snprintf(name, sizeof name, "views.%d.exposure", v);
+        if (strncmp(job->parameters[index].name, "views.", 6) || !glob_match(job->parameters[index].name, name)) {
+            continue;
+        }
+        char *owned = rey_job_alloc(job, sizeof name, 1);
+        *found = true;
+        result = owned ? add_exposure(job, v, strcpy(owned, name), index, owners, u) : REY_ERROR_MEMORY;
+    }
+    return result;
 }
 
 static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
     const JobParameter *p = &job->parameters[index];
     size_t before = u->items.count;
-    rey_result result = REY_OK;
+    bool exposures;
+    rey_result result = match_exposures(job, index, owners, u, &exposures);
+    if (result || exposures) {
+        return result;
+    }
     if (!strchr(p->name, '*')) {
         int param = rey_param_find(scene, p->name);
         if (param < 0) {
@@ -199,7 +266,7 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
     return result;
 }
 
-static rey_result allocate(Unknowns *u) {
+static rey_result allocate(const Job *job, Unknowns *u) {
     size_t n = (size_t)u->count;
     u->params = rey_alloc_array(u->ctx, u->items.count, sizeof *u->params);
     u->start = rey_alloc_array(u->ctx, n, sizeof *u->start);
@@ -209,8 +276,12 @@ static rey_result allocate(Unknowns *u) {
     u->second = rey_alloc_array(u->ctx, n, sizeof *u->second);
     u->average = rey_alloc_array(u->ctx, n, sizeof *u->average);
     u->gradient = rey_alloc_array(u->ctx, n, sizeof *u->gradient);
+    if (job->optimizer.kind == OPTIMIZER_LBFGS) {
+        u->lbfgs_count = rey_lbfgs_numbers(u->count, job->optimizer.memory);
+    }
+    u->lbfgs = rey_alloc_array(u->ctx, (size_t)u->lbfgs_count, sizeof *u->lbfgs);
     bool had = u->params && u->start && u->value && u->variable && u->first && u->second && u->average &&
-               u->gradient;
+               u->gradient && u->lbfgs;
     return had ? REY_OK : REY_ERROR_MEMORY;
 }
 
@@ -222,11 +293,13 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
         result = match_parameter(job, scene, i, &owners, u);
     }
     if (!result) {
-        result = allocate(u);
+        result = allocate(job, u);
     }
     for (size_t i = 0; i < u->items.count && !result; i++) {
         const Unknown *unknown = &ARRAY_AT(u->items, Unknown, i);
-        u->params[i] = unknown->param;
+        if (unknown->param >= 0) {
+            u->params[u->param_count++] = unknown->param;
+        }
         const JobParameter *p = &job->parameters[ARRAY_AT(owners, int, i)];
         result = set_start(job, scene, p, unknown, u->start + unknown->offset);
         if (!result) {
@@ -243,9 +316,13 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
 
 void rey_unknowns_free(Unknowns *u) {
     if (u->ctx) {
-        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->average, u->gradient};
+        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->average, u->gradient,
+                          u->lbfgs};
         for (int i = 0; i < COUNT_OF(blocks); i++) {
             rey_free(u->ctx, blocks[i]);
+        }
+        for (size_t i = 0; i < u->items.count; i++) {
+            rey_vertices_free(u->ctx, ARRAY_AT(u->items, Unknown, i).vertices);
         }
         rey_array_free(u->ctx, &u->items);
         *u = (Unknowns){0};
@@ -256,7 +333,7 @@ rey_result rey_unknowns_apply(const Unknowns *u, rey_scene *scene, const float *
     rey_result result = REY_OK;
     for (size_t i = 0; i < u->items.count && !result; i++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, i);
-        result = rey_param_set(scene, p->param, values + p->offset, p->count);
+        result = p->param < 0 ? REY_OK : rey_param_set(scene, p->param, values + p->offset, p->count);
     }
     return result;
 }

@@ -53,6 +53,19 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
     return result;
 }
 
+// Room for the pictures of levels.
+static rey_result keep_full(Fit *fit, const JobView *job_view, FitView *view) {
+    size_t pixels = (size_t)view->width * (size_t)view->height;
+    view->full_width = view->width;
+    view->full_height = view->height;
+    view->full_sensor = fit->scene->view.sensors[view->sensor];
+    view->full_mask = view->mask;
+    view->mask = view->full_mask ? rey_alloc_array(fit->ctx, pixels, sizeof *view->mask) : NULL;
+    view->target = rey_alloc_array(fit->ctx, pixels, 3 * sizeof *view->target);
+    bool had = view->target && (view->mask || !view->full_mask);
+    return had ? rey_levels_check(fit, job_view, view) : REY_ERROR_MEMORY;
+}
+
 static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
     *view = (FitView){.sensor = job_view->sensor, .weight = job_view->weight};
     rey_result result = rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height);
@@ -79,8 +92,9 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
         }
     }
     if (!result) {
-        view->target = image.data; // from here on the view's
+        view->full_target = image.data; // from here on the view's
         image.data = NULL;
+        result = keep_full(fit, job_view, view);
         fit->largest = floats > fit->largest ? floats : fit->largest;
     }
     rey_image_free(fit->ctx, &image);
@@ -93,6 +107,9 @@ rey_result rey_views_load(Fit *fit) {
     for (int i = 0; i < fit->job.view_count && !result; i++) {
         result = load_view(fit, &fit->job.views[i], &fit->views[i]);
     }
+    if (!result) {
+        rey_levels_reduce(fit, 1);
+    }
     return result;
 }
 
@@ -100,6 +117,8 @@ void rey_views_free(Fit *fit) {
     for (int i = 0; fit->views && i < fit->job.view_count; i++) {
         rey_free(fit->ctx, fit->views[i].target);
         rey_free(fit->ctx, fit->views[i].mask);
+        rey_free(fit->ctx, fit->views[i].full_target);
+        rey_free(fit->ctx, fit->views[i].full_mask);
     }
     rey_free(fit->ctx, fit->views);
     fit->views = NULL;

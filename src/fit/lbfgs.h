@@ -1,0 +1,22 @@
+// lbfgs.h: limited-memory BFGS [nocedal1980] with a line search for the strong Wolfe conditions by bisection [burke2020
+// algorithm 2.6, with an upper bound for the slope]: one evaluation a call, so that a fit can stop between any two of them.
+// All of the state is one array of doubles, for checkpoints.
+//
+// Meant for functions with frozen noise: every iteration uses the same random numbers. What is left of it (derivatives of
+// moving silhouettes are estimated apart from the picture) is met with a slack in the condition of descent, and where a line
+// search fails all the same, with a forgotten memory and a shorter step along the gradient.
+#pragma once
+
+#include <stdint.h>
+
+enum { LBFGS_MOST_TRIALS = 8, LBFGS_LONGEST = 10 }; // of a step: change of a variable, in units
+
+// Numbers of the state for n variables and so many pairs.
+int64_t rey_lbfgs_numbers(int64_t n, int memory);
+// The value and gradient at x are given; x moves to where they are wanted next. Variables are scaled such that 1 is the
+// largest change in the first step. A zeroed state is a start.
+void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const double *gradient, double *x);
+// x becomes the best point so far; nothing before the first step.
+void rey_lbfgs_take_best(const double *state, int64_t n, double *x);
+// Forgets everything: the function is another one from here on.
+void rey_lbfgs_forget(double *state);

@@ -1,0 +1,99 @@
+// levels.c: from coarse to fine. On a level that reduces by r, targets are means over r x r pixels, weighted by their masks,
+// and the sensors' films shrink with them. Their filter is a box then: what a mean over pixels is, but for the blur of the
+// target's own filter, which is narrow against such pixels.
+#include "fit/fit.h"
+
+#include <string.h>
+
+int rey_job_level_at(const Job *job, int iteration) {
+    int level = 0;
+    for (int i = 1; i < job->level_count && job->levels[i].from <= iteration; i++) {
+        level = i;
+    }
+    return level;
+}
+
+rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *view) {
+    const SensorRecord *s = fit->scene->view.sensors + view->sensor;
+    for (int i = 0; i < fit->job.level_count; i++) {
+        int r = fit->job.levels[i].reduce;
+        if (s->width % r || s->height % r || s->crop_x % r || s->crop_y % r || view->width % r || view->height % r) {
+            return rey_fail(fit->ctx, REY_ERROR_FORMAT,
+                            "%s:%d: level %d reduces by %d, but sensor %d has %d x %d pixels, expected multiples of %d",
+                            fit->job.path, job_view->line, i, r, view->sensor, view->width, view->height, r);
+        }
+        if (r > 1 && s->batch_count) {
+            return rey_fail(fit->ctx, REY_ERROR_UNSUPPORTED, "%s:%d: sensor %d is a batch, which levels do not reduce",
+                            fit->job.path, job_view->line, view->sensor);
+        }
+    }
+    return REY_OK;
+}
+
+// One pixel of a reduced view from r x r of the full one, from (x, y) on.
+static void reduce_pixel(const FitView *view, int x, int y, int r, float *target, float *mask) {
+    double sum[3] = {0, 0, 0}, weight = 0;
+    for (int i = 0; i < r * r; i++) {
+        int64_t at = (int64_t)(y + i / r) * view->full_width + x + i % r;
+        double m = view->full_mask ? (double)view->full_mask[at] : 1;
+        weight += m;
+        for (int c = 0; c < 3 && m > 0; c++) { // behind a mask may stand anything
+            sum[c] += m * (double)view->full_target[3 * at + c];
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        target[c] = weight > 0 ? (float)(sum[c] / weight) : 0;
+    }
+    if (mask) {
+        *mask = (float)(weight / (r * r));
+    }
+}
+
+static void reduce_view(FitView *view, int r) {
+    view->width = view->full_width / r;
+    view->height = view->full_height / r;
+    if (r == 1) { // to the bit
+        size_t pixels = (size_t)view->width * (size_t)view->height;
+        memcpy(view->target, view->full_target, 3 * pixels * sizeof *view->target);
+    }
+    view->mask_sum = 0;
+    for (int64_t i = 0; i < (int64_t)view->width * view->height; i++) {
+        if (r > 1) {
+            reduce_pixel(view, (int)(i % view->width) * r, (int)(i / view->width) * r, r, view->target + 3 * i,
+                         view->mask ? view->mask + i : NULL);
+        } else if (view->mask) {
+            view->mask[i] = view->full_mask[i];
+        }
+        view->mask_sum += view->mask ? (double)view->mask[i] : 1;
+    }
+}
+
+static void reduce_sensor(SensorRecord *s, int r) {
+    s->width /= r;
+    s->height /= r;
+    s->crop_x /= r;
+    s->crop_y /= r;
+    s->crop_width /= r;
+    s->crop_height /= r;
+    if (r > 1) {
+        s->filter = FILM_BOX;
+        s->filter_radius = 0.5f;
+    }
+}
+
+void rey_levels_reduce(Fit *fit, int r) {
+    for (int v = 0; v < fit->job.view_count; v++) {
+        FitView *view = &fit->views[v];
+        SensorRecord *s = fit->scene->view.sensors + view->sensor;
+        *s = view->full_sensor;
+        reduce_sensor(s, r);
+        reduce_view(view, r);
+    }
+}
+
+rey_result rey_levels_enter(Fit *fit, int level) {
+    const JobLevel *l = fit->job.level_count ? &fit->job.levels[level] : NULL;
+    fit->level = level;
+    rey_levels_reduce(fit, l ? l->reduce : 1);
+    return REY_OK;
+}

@@ -1,0 +1,172 @@
+// test_optimizer.c: the steps of optimizers.
+#include "fit/lbfgs.h"
+#include "fit/optimizer.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Minimises (log x - log 0.3)^2-like bowls in every parameterisation; the gradient is that of (x - 0.3)^2.
+static void test_optimizers_find_minimum(void **state) {
+    UNUSED(state);
+    for (int kind = 0; kind < OPTIMIZER_COUNT; kind++) {
+        for (int p = 0; p < PARAMETERISATION_RIGID && kind != OPTIMIZER_LBFGS; p++) {
+            Unknown item = {.count = 1, .low = 0.01, .high = 1, .parameterisation = (Parameterisation)p};
+            float start = 0.8f, value = 0;
+            double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
+            Unknowns u = {.items = {&item, 1, 1},
+                          .count = 1,
+                          .start = &start,
+                          .value = &value,
+                          .variable = &variable,
+                          .first = &first,
+                          .second = &second,
+                          .average = &average,
+                          .gradient = &gradient};
+            JobOptimizer o = {.kind = (OptimizerKind)kind,
+                              .learning_rate = kind == OPTIMIZER_ADAM ? 0.05 : 0.1,
+                              .beta1 = 0.9,
+                              .beta2 = 0.99,
+                              .epsilon = 1e-12,
+                              .momentum = 0.8,
+                              .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 600}};
+            rey_unknowns_begin(&u);
+            assert_float_equal((double)value, 0.8, 1e-6);
+            for (int i = 0; i < 600; i++) {
+                gradient = 2 * ((double)value - 0.3);
+                rey_optimizer_step(&o, &u, i, 0);
+            }
+            assert_float_equal((double)value, 0.3, 2e-3);
+            gradient = 1e9; // far out of bounds
+            rey_optimizer_step(&(JobOptimizer){.kind = OPTIMIZER_SGD, .learning_rate = 1, .schedule = {.length = 1}},
+                               &u, 0, 0);
+            assert_true(value >= 0.01f && value <= 0.0101f);
+        }
+    }
+}
+
+// Steps that jump about 0.3 by +-0.1 average out, and the start at 0.8 is forgotten.
+static void test_average(void **state) {
+    UNUSED(state);
+    Unknown item = {.count = 1, .low = 0, .high = 1};
+    float start = 0.8f, value = 0;
+    double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
+    Unknowns u = {.items = {&item, 1, 1},
+                  .count = 1,
+                  .start = &start,
+                  .value = &value,
+                  .variable = &variable,
+                  .first = &first,
+                  .second = &second,
+                  .average = &average,
+                  .gradient = &gradient};
+    JobOptimizer o = {.kind = OPTIMIZER_SGD, .learning_rate = 1, .average = 4, .schedule = {.length = 1}};
+    rey_unknowns_begin(&u);
+    for (int i = 0; i < 100; i++) {
+        gradient = (double)value - (i % 2 ? 0.2 : 0.4);
+        rey_optimizer_step(&o, &u, i, 0);
+    }
+    assert_float_equal((double)value, 0.2, 1e-5);
+    rey_unknowns_take_average(&u);
+    assert_float_equal((double)value, 0.3, 0.004);
+}
+
+
+enum { WIDE = 6, PAIRS = 5 };
+
+// Chained Rosenbrock functions: a curved valley with its end at (1, 1, ...). noise: of the value, frozen, as high steps.
+static double valley(const double *x, double noise, double *gradient) {
+    double value = 0;
+    memset(gradient, 0, WIDE * sizeof *gradient);
+    for (int i = 0; i + 1 < WIDE; i++) {
+        double a = x[i + 1] - x[i] * x[i], b = 1 - x[i];
+        value += 100 * a * a + b * b;
+        gradient[i + 1] += 200 * a;
+        gradient[i] -= 400 * a * x[i] + 2 * b;
+    }
+    return value * (1 + noise * sin(1e6 * x[0]));
+}
+
+// Steps until all of x is within `off` of 1; -1 when that takes too many.
+static int steps_to_end(double *state, double noise, double off, double *x) {
+    double gradient[WIDE], best[WIDE];
+    for (int i = 0; i < 400; i++) {
+        double far = 0;
+        memcpy(best, x, sizeof best);
+        rey_lbfgs_take_best(state, WIDE, best);
+        for (int k = 0; k < WIDE; k++) {
+            far = fmax(far, fabs(best[k] - 1));
+        }
+        if (far < off) {
+            return i;
+        }
+        double value = valley(x, noise, gradient);
+        rey_lbfgs_step(state, WIDE, PAIRS, value, gradient, x);
+    }
+    return -1;
+}
+
+// L-BFGS comes through the valley, where gradient descent would need thousands of steps; a copied state goes on the same way.
+static void test_lbfgs_follows_valley(void **unused) {
+    UNUSED(unused);
+    size_t bytes = (size_t)rey_lbfgs_numbers(WIDE, PAIRS) * sizeof(double);
+    double *state = calloc(1, bytes), *copy = malloc(bytes), *noisy = calloc(1, bytes);
+    assert_true(state && copy && noisy);
+    double x[WIDE] = {-1.2, 1, -1.2, 1, -1.2, 1}, gradient[WIDE];
+    for (int i = 0; i < 7; i++) { // stop in the middle of things
+        double value = valley(x, 0, gradient);
+        rey_lbfgs_step(state, WIDE, PAIRS, value, gradient, x);
+    }
+    double y[WIDE];
+    memcpy(copy, state, bytes);
+    memcpy(y, x, sizeof y);
+    int steps = steps_to_end(state, 0, 1e-6, x);
+    assert_in_range(steps, 10, 200);
+    assert_int_equal(steps_to_end(copy, 0, 1e-6, y), steps);
+    assert_memory_equal(x, y, sizeof x);
+    double z[WIDE] = {-1.2, 1, -1.2, 1, -1.2, 1};
+    assert_in_range(steps_to_end(noisy, 1e-4, 0.02, z), 10, 400);
+    free(state);
+    free(copy);
+    free(noisy);
+}
+
+// Within bounds and with rates of their own; what is found is the best point, not the last trial.
+static void test_lbfgs_keeps_bounds(void **unused) {
+    UNUSED(unused);
+    Unknown items[2] = {{.count = 1, .low = 0.5, .high = 2, .learning_rate = 0.1},
+                        {.offset = 1, .count = 1, .low = 0.01, .high = 10, .parameterisation = PARAMETERISATION_LOG}};
+    float start[2] = {1.5f, 8}, value[2] = {0};
+    double variable[2] = {0}, first[2] = {0}, second[2] = {0}, average[2] = {0}, gradient[2] = {0};
+    double *state = calloc((size_t)rey_lbfgs_numbers(2, 4), sizeof *state);
+    assert_non_null(state);
+    Unknowns u = {.items = {items, 2, 2}, .count = 2, .start = start, .value = value, .variable = variable,
+                  .first = first, .second = second, .average = average, .gradient = gradient, .lbfgs = state};
+    JobOptimizer o = {.kind = OPTIMIZER_LBFGS, .learning_rate = 0.5, .memory = 4, .schedule = {.length = 1}};
+    rey_unknowns_begin(&u);
+    for (int i = 0; i < 60; i++) { // the least is at (0.3, 0.7), and 0.5 the lowest that is allowed
+        double a = (double)value[0] - 0.3, b = (double)value[1] - 0.7;
+        gradient[0] = 2 * a;
+        gradient[1] = 2 * b;
+        rey_optimizer_step(&o, &u, i, a * a + b * b);
+    }
+    rey_optimizer_restart(&o, &u);
+    assert_float_equal((double)value[0], 0.5, 1e-6);
+    assert_float_equal((double)value[1], 0.7, 1e-4);
+    free(state);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_optimizers_find_minimum),
+        cmocka_unit_test(test_average),
+        cmocka_unit_test(test_lbfgs_follows_valley),
+        cmocka_unit_test(test_lbfgs_keeps_bounds),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
