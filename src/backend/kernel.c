@@ -123,6 +123,9 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         return;
     }
     if (t->derivative) {
+        if (t->job->live_extinctions) {
+            probe_stage(t, begin, count);
+        }
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);
         }
@@ -147,7 +150,7 @@ size_t KNAME(rey_kernel_workspace_bytes)(int32_t mode) {
 
 // The groups' offsets lie behind the workspace proper; job->workspace_bytes has room for them.
 void KNAME(rey_kernel_run)(PathJob *job) {
-    Tracer t = {.job = job, .scene = job->scene, .sensor = job->scene->sensors + job->sensor};
+    Tracer t = {.job = job, .scene = job->scene, .deciding = job->scene, .sensor = job->scene->sensors + job->sensor};
     size_t bytes = workspace_layout(&t.ws, job->workspace, job->mode);
     int32_t *begin = (int32_t *)((char *)job->workspace + bytes);
     FilterTable filter;

@@ -52,7 +52,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     job.mode = MODE_PRIMAL;
     job.coverage = NULL;
     job.any_motion = false;
-    Tracer t = {.job = &job, .scene = job.scene, .sensor = job.scene->sensors + job.sensor};
+    Tracer t = {.job = &job, .scene = job.scene, .deciding = job.scene, .sensor = job.scene->sensors + job.sensor};
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
     Indirect in = {.t = &t, .b = b};
     bytes += segments_layout(&in.q, (char *)job.workspace + bytes);

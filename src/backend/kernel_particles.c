@@ -34,7 +34,7 @@ static void particle_chunk(Tracer *t, const ParticleJob *p, const Pinhole *pinho
 // The groups' offsets lie behind the workspace proper, as in kernel.c.
 void KNAME(rey_kernel_particles)(ParticleJob *p) {
     PathJob *job = &p->job;
-    Tracer t = {.job = job, .scene = job->scene, .sensor = job->scene->sensors + job->sensor};
+    Tracer t = {.job = job, .scene = job->scene, .deciding = job->scene, .sensor = job->scene->sensors + job->sensor};
     size_t bytes = workspace_layout(&t.ws, job->workspace, job->mode);
     int32_t *begin = (int32_t *)((char *)job->workspace + bytes);
     Pinhole pinhole = pinhole_make(t.scene, t.sensor);

@@ -11,8 +11,9 @@ static inline bool mode_records(int32_t mode) {
     return mode == MODE_REVERSE || mode == MODE_FORWARD || mode == MODE_REPLAY;
 }
 
-// What of a group depends on the selected parameters.
+// What of a group depends on the selected parameters; and what of a medium.
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
+enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8 };
 
 typedef struct PathJob {
     const SceneView *scene;
@@ -34,7 +35,8 @@ typedef struct PathJob {
     const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at, *place_at;
     const int32_t *points_at, *pose_at, *instance_at, *camera_at;
     bool any_normals, any_attributes, any_places, any_motion, any_camera;
-    const int32_t *live;          // per group: LIVE_ mask
+    const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
+    bool live_extinctions;        // that of some medium depends on the selection
     bool live_lights;             // some emitter depends on the selection
     bool watch_turned;            // the selection turns shading normals: note which way they face
     // Asked before each chunk of paths: false ends the job early. May be null.

@@ -222,7 +222,7 @@ static int32_t particle_batch(Tracer *t, const Pinhole *pinhole, int32_t group_i
     Landing at;
     at.v = vertex_load(t, order, count, bounce);
     if (t->derivative) {
-        record = record_claim(t, VERTEX_SURFACE, group_id, count);
+        record = record_claim(t, VERTEX_SURFACE, group_id, count, bounce);
         if (record < 0) {
             return next_count;
         }
@@ -240,7 +240,7 @@ static int32_t particle_batch(Tracer *t, const Pinhole *pinhole, int32_t group_i
 // The records of a chunk have room for its starts.
 KFN void record_start(Tracer *t, Int light, const ParticleStart *s, Float factor, Int slot, int32_t lanes) {
     Records *r = &t->ws.records;
-    int32_t at = record_claim(t, VERTEX_LIGHT, -1, lanes);
+    int32_t at = record_claim(t, VERTEX_LIGHT, -1, lanes, 0);
     i_store(r->light + at, light);
     i_store(r->lprim + at, s->prim);
     i_store(r->slot + at, slot);

@@ -4,101 +4,9 @@
 // for path_adj.h. Sampling, densities, MIS weights and roulette are detached.
 #pragma once
 
-#include "bsdf/bsdf.h"
-#include "emitter/choice.h"
-#include "integrator/split.h"
-#include "integrator/walk.h"
+#include "integrator/flight.h"
 
-// ---- vertices ----------------------------------------------------------------------------------------------------
-
-// One batch of lanes at a vertex: indices into the path arrays, and what was found there.
-typedef struct Vertex {
-    Int at;          // positions in the path arrays
-    Mask m;
-    Int slot;
-    Hit hit;
-    Vec3 d, origin;  // incoming ray's direction, and the previous vertex
-    Spec beta;
-    Float pdf;
-    Int depth;       // path segments behind it; the bounce, unless scene->through
-} Vertex;
-
-KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
-    const Workspace *ws = &t->ws;
-    const Paths *p = &ws->paths[t->current];
-    Vertex v;
-    v.m = m_first_n(count);
-    v.at = i_select(v.m, i_load(order), i_set(order[0]));
-    v.slot = i_gather(p->slot, v.at);
-    v.hit.shape = i_max(i_gather(ws->hit_shape, v.at), i_set(0));
-    v.hit.prim = i_gather(ws->hit_prim, v.at);
-    v.hit.instance = i_gather(ws->hit_instance, v.at);
-    v.hit.u = real_gather(ws->hit_u, v.at);
-    v.hit.v = real_gather(ws->hit_v, v.at);
-    v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
-    v.d = LOAD_V3(*p, dx, dy, dz, v.at);
-    v.origin = LOAD_V3(*p, px, py, pz, v.at);
-    v.beta = spec_gather(p->beta, v.at);
-    v.pdf = real_gather(p->pdf, v.at);
-    v.depth = t->scene->through ? i_gather(p->depth, v.at) : i_set(bounce);
-    return v;
-}
-
-// Adds radiance to the slots' sums. Slots are distinct within a batch.
-KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) { spec_scatter_add(t->ws.radiance, slot, l, m); }
-
-// Claims LANES record entries for a batch; -1 when there is no room.
-KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count) {
-    if (t->record_count + LANES > t->ws.record_capacity || t->batch_count == t->ws.batch_capacity) {
-        t->overflow = true;
-        return -1;
-    }
-    int32_t first = t->record_count;
-    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count, false, false};
-    t->record_count += LANES;
-    return first;
-}
-
-KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec emission) {
-    Records *r = &t->ws.records;
-    i_store(r->shape + at, v->hit.shape);
-    i_store(r->prim + at, v->hit.prim);
-    i_store(r->instance + at, v->hit.instance);
-    i_store(r->slot + at, v->slot);
-    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
-    f_store(r->u + at, v->hit.u);
-    f_store(r->v + at, v->hit.v);
-    f_store(r->px + at, v->hit.p.x);
-    f_store(r->py + at, v->hit.p.y);
-    f_store(r->pz + at, v->hit.p.z);
-    f_store(r->dx + at, v->d.x);
-    f_store(r->dy + at, v->d.y);
-    f_store(r->dz + at, v->d.z);
-    f_store(r->mis + at, mis);
-    spec_store(r->beta, at, v->beta);
-    spec_store(r->light_weight, at, spec_zero());
-    spec_store(r->local, at, emission);
-    spec_store(r->weight, at, spec_zero());
-    f_store(r->sw + at, f_set(0));
-}
-
-KFN Float power_heuristic(Float a, Float b) { return a * a * f_safe_rcp(a * a + b * b); }
-
-// Weight of what a scattered ray met, against having sampled it as a light with density light_pdf.
-KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
-    Float pdf = v->pdf;
-    if (t->scene->split) {
-        Split s = split_of(t->scene, (UInt)i_gather(t->ws.sample, v->slot));
-        light_pdf = light_pdf * s.light_pdf;
-        pdf = pdf * s.scatter_pdf;
-    }
-    return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(pdf, light_pdf));
-}
-
-// Alpha of a path is 1 where an environment shows, and where the path meets a surface that does not merely let it pass.
-KFN bool keeps_coverage(const Tracer *t) { return t->job->coverage || (t->scene->drops && !t->derivative); }
-
-KFN void cover(Tracer *t, Int slot, Mask m) { f_scatter(t->ws.coverage, slot, f_set(1), m); }
+// ---- surfaces ----------------------------------------------------------------------------------------------------
 
 // Paths that left the scene: the environment, weighed against having been sampled as a light.
 static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
@@ -118,7 +26,7 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
         slot_add(t, v.slot, spec_mul(v.beta, l), v.m);
         return;
     }
-    int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count);
+    int32_t at = record_claim(t, VERTEX_ESCAPED, -1, count, bounce);
     if (at >= 0) {
         record_vertex(t, at, &v, mis, l);
         t->ws.batches[t->batch_count - 1].first_vertex = bounce == 0;
@@ -130,46 +38,9 @@ KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex 
     return scattered_weight(t, v, surface_light_pdf(t->scene, e, v->origin, v->d, si) * e->weight);
 }
 
-// The ray to a light: it starts off the surface and aims at the same point, or it would pass or meet the light itself.
-KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
-    ray->o = interaction_offset(si, d);
-    Vec3 to_light = v3_sub(v3_madd(si->p, distance, d), ray->o);
-    Float length = f_sqrt(v3_dot(to_light, to_light));
-    ray->d = v3_scale(to_light, f_safe_rcp(length));
-    ray->tmax = length * (1.0f - 9e-4f);
-}
-
-// Appends the shadow rays of m: what they bring, and to whom.
-KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t record, Mask m) {
-    Shadows *q = &t->ws.shadows;
-    int32_t at = t->shadow_count;
-    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray->o, m);
-    v3_compress(q->dx + at, q->dy + at, q->dz + at, ray->d, m);
-    f_compress(q->tmax + at, ray->tmax, m);
-    spec_compress(q->radiance, at, l, m);
-    i_compress(q->slot + at, slot, m);
-    i_compress(q->record + at, i_iota() + record, m);
-    t->shadow_count += m_count(m);
-}
-
-// The light sample of a vertex; its weight is multiplied by the transmittance once that is known.
-KFN void record_light(Tracer *t, int32_t record, Int light, const LightSample *s, Float weight, Spec f) {
-    Records *r = &t->ws.records;
-    i_store(r->light + record, light);
-    i_store(r->lprim + record, s->prim);
-    f_store(r->ldx + record, s->d.x);
-    f_store(r->ldy + record, s->d.y);
-    f_store(r->ldz + record, s->d.z);
-    f_store(r->lu + record, s->uv.x);
-    f_store(r->lv + record, s->uv.y);
-    f_store(r->ldist + record, s->distance);
-    spec_store(r->light_weight, record, spec_set(weight));
-    spec_store(r->light_f, record, f);
-}
-
 // Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
-KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
-                        const SampleKey *key, int32_t bounce, int32_t record) {
+KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call,
+                        Vec3 wi, const SampleKey *key, int32_t bounce, int32_t record) {
     const SceneView *scene = t->scene;
     Float choice;
     SampleKey light_key = *key;
@@ -207,79 +78,15 @@ KFN void connect_lights(Tracer *t, const Vertex *v, const Interaction *si, const
     Mask m = drawn & s.valid & useful & m_gt(weight, f_set(0));
     Ray ray;
     shadow_ray(si, s.d, s.distance, &ray);
-    append_shadows(t, &ray, l, v->slot, record, m);
+    append_shadows(t, &ray, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
     if (record >= 0) {
         record_light(t, record, light, &s, f_zero_unless(m, weight), f);
     }
 }
 
-// How a batch of paths goes on from its vertices.
-typedef struct Onward {
-    Vec3 d;
-    BsdfSample sample;
-    Spec f, beta;                            // value of the scattering function; throughput
-    Float pdf, rcp, eta2, roulette;          // density; 1 / (density x survival)
-    Int depth;
-    Mask m, passed;                          // lanes that go on; that went through a surface undeviated
-} Onward;
-
-// Roulette from rr_depth on.
-KFN void play_roulette(const Tracer *t, const SampleKey *key, int32_t bounce, Onward *w) {
-    const SceneView *scene = t->scene;
-    if (bounce + 1 < scene->rr_depth) {
-        return;
-    }
-    Float q = f_min(w->roulette * w->eta2, f_set(0.95f));
-    if (scene->through) {
-        q = f_select(mi_lt(i_set(scene->rr_depth), w->depth), q, f_set(1));
-    }
-    w->m = w->m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
-    Float survival = f_safe_rcp(q);
-    w->beta = spec_scale(w->beta, survival);
-    w->roulette = w->roulette * survival;
-    w->rcp = w->rcp * survival;
-}
-
-KFN void append_paths(Tracer *t, const Vertex *v, const Interaction *si, const Onward *w, int32_t at) {
-    const Paths *p = &t->ws.paths[t->current];
-    Paths *next = &t->ws.paths[1 - t->current];
-    // Lights are weighed as seen from the last vertex that turned the path.
-    Vec3 origin = si->p;
-    Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(PDF_DELTA));
-    if (t->scene->hide_emitters && !t->scene->solid) {
-        Mask absent = mi_eq(w->sample.lobe & 3, i_set(LOBE_NULL)) & m_le(v->pdf, f_set(PDF_VIEWED));
-        density = f_select(absent, f_set(PDF_VIEWED), density);
-    }
-    if (t->scene->through) {
-        origin = v3_select(w->passed, v->origin, si->p);
-        density = f_select(w->passed, v->pdf, density);
-        i_compress(next->depth + at, w->depth, w->m);
-    }
-    v3_compress(next->ox + at, next->oy + at, next->oz + at, interaction_offset(si, w->d), w->m);
-    v3_compress(next->dx + at, next->dy + at, next->dz + at, w->d, w->m);
-    v3_compress(next->px + at, next->py + at, next->pz + at, origin, w->m);
-    f_compress(next->tmax + at, f_set(INFINITY), w->m);
-    spec_compress(next->beta, at, w->beta, w->m);
-    f_compress(next->eta2 + at, w->eta2, w->m);
-    f_compress(next->roulette + at, w->roulette, w->m);
-    f_compress(next->pdf + at, density, w->m);
-    i_compress(next->slot + at, v->slot, w->m);
-    i_compress(next->medium + at, i_gather(p->medium, v->at), w->m);
-}
-
-KFN void record_onward(Tracer *t, int32_t record, const Onward *w) {
-    Records *r = &t->ws.records;
-    f_store(r->wox + record, w->d.x);
-    f_store(r->woy + record, w->d.y);
-    f_store(r->woz + record, w->d.z);
-    f_store(r->sw + record, f_zero_unless(w->m, w->rcp));
-    spec_store(r->weight, record, spec_zero_unless(w->m, spec_scale(w->f, w->rcp)));
-    i_store(r->lobe + record, w->sample.lobe);
-}
-
 // Samples how the paths go on and appends the survivors to the next bounce's paths; returns their number.
-KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
-                          const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
+KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call,
+                          Vec3 wi, const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
     const SceneView *scene = t->scene;
     const Paths *p = &t->ws.paths[t->current];
     SampleKey scatter_key = *key;
@@ -317,7 +124,7 @@ KFN int32_t scatter_paths(Tracer *t, const Vertex *v, const Interaction *si, con
     }
     play_roulette(t, key, bounce, &w);
     w.d = frame_to_world(&si->sh, w.sample.wo);
-    append_paths(t, v, si, &w, next_count);
+    append_paths(t, v, si->p, interaction_offset(si, w.d), &w, medium_behind(group, si->ng, w.d, v->medium), next_count);
     if (keeps_coverage(t)) {
         Mask passes = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
         cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);
@@ -363,7 +170,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
     }
     int32_t record = -1;
     if (t->derivative) {
-        record = record_claim(t, VERTEX_SURFACE, group_id, count);
+        record = record_claim(t, VERTEX_SURFACE, group_id, count, bounce);
         if (record < 0) {
             return next_count;
         }
@@ -385,32 +192,21 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         call.surface = &surface;
     }
     if (scene->emitters_count > 0) {
-        connect_lights(t, &v, &si, &call, wi, &key, bounce, record);
+        connect_lights(t, group, &v, &si, &call, wi, &key, bounce, record);
     }
-    return scatter_paths(t, &v, &si, &call, wi, &key, bounce, record, next_count);
+    return scatter_paths(t, group, &v, &si, &call, wi, &key, bounce, record, next_count);
 }
 
 // ---- bounces -----------------------------------------------------------------------------------------------------
 
-// Counting sort of the bounce's rays by group (0 = escaped): fills ws.order, and where each group begins.
+// Sorts the bounce's rays by group (0 = escaped): fills ws.order, and where each group begins.
 static void sort_stage(Tracer *t, int32_t *begin, int32_t groups) {
-    const Workspace *ws = &t->ws;
-    memset(begin, 0, (size_t)(groups + 1) * sizeof *begin);
-    for (int32_t k = 0; k < t->active; k++) {
-        begin[ws->hit_group[k] + 1]++;
-    }
-    for (int32_t g = 0; g < groups; g++) {
-        begin[g + 1] += begin[g];
-    }
-    for (int32_t k = 0; k < t->active; k++) {
-        ws->order[begin[ws->hit_group[k]]++] = k;
-    }
-    memmove(begin + 1, begin, (size_t)groups * sizeof *begin);
-    begin[0] = 0;
+    counting_sort(t->ws.hit_group, 0, t->active, groups, t->ws.order, begin);
 }
 
-static void shadow_stage(Tracer *t) {
+static void shadow_stage(Tracer *t, int32_t bounce) {
     const Shadows *q = &t->ws.shadows;
+    const bool media = t->scene->has_media;
     double start = stage_seconds();
     for (int32_t k = 0; k < t->shadow_count; k += LANES) {
         Mask m = m_first_n(t->shadow_count - k);
@@ -419,7 +215,12 @@ static void shadow_stage(Tracer *t) {
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
         Mask blocked;
-        Spec transmittance = t->scene->through ? walk_transmittance(t, ray, m, &blocked, NULL)
+        Fog fog;
+        if (media) {
+            fog.medium = i_select(m, i_load(q->medium + k), i_set(-1));
+            fog.key = stream_key(t, i_select(m, i_load(q->slot + k), i_set(0)), bounce, STREAM_SHADOW);
+        }
+        Spec transmittance = t->scene->through ? walk_transmittance(t, ray, m, media ? &fog : NULL, &blocked, NULL)
                                                : trace_transmittance(t->scene, &ray, m);
         Spec l = spec_mul(spec_load(q->radiance, k), transmittance);
         Mask open = m & m_gt(spec_max(transmittance), f_set(0));
@@ -446,18 +247,22 @@ static void rung_store(Tracer *t, int32_t rung) {
     }
 }
 
-// Runs the chunk's paths to their ends. begin: scratch of group count + 2 entries.
+// Runs the chunk's paths to their ends. begin: scratch of the number of groups and media, and 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
     for (int32_t i = 0; keeps_coverage(t) && i < t->active; i++) {
         t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters;
     }
-    int32_t groups = (int32_t)scene->groups_count + 1;
+    const int32_t surfaces = (int32_t)scene->groups_count + 1;
+    const int32_t groups = surfaces + (scene->has_media ? (int32_t)scene->media_count : 0);
     for (int32_t bounce = t->first_bounce; t->active > 0 && !t->overflow && bounce < MAX_BOUNCES; bounce++) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
         trace_stage(t, bounce);
+        if (scene->has_media) {
+            flight_stage(t, begin, bounce);
+        }
         sort_stage(t, begin, groups);
         t->shadow_count = 0;
         int32_t next_count = 0;
@@ -466,6 +271,8 @@ static void path_forward(Tracer *t, int32_t *begin) {
                 int32_t count = begin[g + 1] - k < LANES ? begin[g + 1] - k : LANES;
                 if (g == 0) {
                     escape_batch(t, t->ws.order + k, count, bounce);
+                } else if (g >= surfaces) {
+                    next_count = collision_batch(t, g - surfaces, t->ws.order + k, count, bounce, next_count);
                 } else {
                     next_count = surface_batch(t, scene->groups + g - 1, g - 1, t->ws.order + k, count, bounce,
                                                next_count);
@@ -475,7 +282,7 @@ static void path_forward(Tracer *t, int32_t *begin) {
         if (t->rungs) {
             rung_store(t, bounce - t->first_bounce);
         }
-        shadow_stage(t);
+        shadow_stage(t, bounce);
         t->current = 1 - t->current;
         t->active = next_count;
     }

@@ -2,10 +2,11 @@
 // vertex k is  L_k = w_e Le + sum_lights f Le T w_l + f w_s L_(k+1),  so that its derivative with respect to anything
 // in f and Le at that vertex is weighted by delta x throughput, and L is summed from the end of the path: no
 // subtraction, and no division by f, so that nothing is lost where f = 0.
+// Vertices in media: collision_adj.h, the ways between: flight_adj.h.
 // NOT differentiated: visibility, sampling decisions. What moves: path_move.h.
 #pragma once
 
-#include "integrator/path_move.h"
+#include "integrator/collision_adj.h"
 
 static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     const Records *r = &t->ws.records;
@@ -113,62 +114,6 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     }
 }
 
-// Accumulates the adjoint dt of a walk's transmittance, the product of what its surfaces let through.
-static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *sink) {
-    const SceneView *scene = t->scene;
-    Spec behind[MOST_SURFACES_IN_A_ROW], after = spec_set(f_set(1)), before = after;
-    for (int32_t i = walk->count - 1; i >= 0; i--) {
-        behind[i] = after;
-        after = spec_select(walk->m[i], spec_mul(after, walk->pass[i]), after);
-    }
-    for (int32_t i = 0; i < walk->count; i++) {
-        // T = before pass behind
-        Spec dpass = spec_zero_unless(walk->m[i], spec_mul(dt, spec_mul(before, behind[i])));
-        Int groups = SHAPE_FIELD(scene, i_max(walk->hit[i].shape, i_set(0)), group);
-        before = spec_select(walk->m[i], spec_mul(before, walk->pass[i]), before);
-        for (Mask left = walk->m[i]; m_any(left);) {
-            int32_t id = i_lane(groups, m_first(left));
-            Mask mine = left & mi_eq(groups, i_set(id));
-            const Group *group = scene->groups + id;
-            left = left & ~mine;
-            if (!(t->job->live[id] & LIVE_SCATTERING)) {
-                continue;
-            }
-            Hit hit = walk_hit(&walk->hit[i], mine);
-            Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &hit);
-            BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &hit), t->floor, NULL, NULL};
-            Vec3 wo = frame_to_local(&si.sh, walk->d), dwi = v3_zero(), dwo = v3_zero(), unused = v3_zero();
-            Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
-            bsdf_adj(&call, v3_neg(wo), wo, i_set(LOBE_NULL), spec_zero_unless(mine, dpass), sink, mine, &dwi, &dwo,
-                     NULL);
-            if (sink->any_normals && group->shape_kind == SHAPE_MESH) {
-                frame_to_local_adj(&si.sh, walk->d, v3_sub(dwo, dwi), &dframe, &unused);
-                mesh_interaction_adj(scene, group->shape_flags, &hit, &si, &dframe, sink, mine);
-            }
-        }
-    }
-}
-
-// Finds the transmittance of the batch's shadow rays again.
-static NOINLINE Spec walk_again(Tracer *t, const SurfaceSweep *s, Walk *walk) {
-    Ray ray;
-    Mask blocked;
-    shadow_ray(&s->si, s->light_d, s->light_distance, &ray);
-    walk->count = 0;
-    walk->d = ray.d;
-    return walk_transmittance(t, ray, s->connected, &blocked, walk);
-}
-
-// Whether shadow rays pass surfaces whose transmittance depends on the selection.
-KFN bool passing_is_live(const Tracer *t) {
-    for (int64_t g = 0; g < t->scene->groups_count && t->scene->through; g++) {
-        if ((t->job->live[g] & LIVE_SCATTERING) && t->scene->bsdfs[t->scene->groups[g].bsdf].transmits) {
-            return true;
-        }
-    }
-    return false;
-}
-
 // Notes whether shading normals that depend on the selection face the viewer as the surface does. The picture jumps
 // where they begin to face the other way, which is somewhere if paths meet both; faces may also be wound the wrong way
 // round throughout. Where normals turn away from the light, the scattering function goes to 0 with the cosine, and
@@ -209,9 +154,13 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     if ((live & LIVE_SCATTERING) || live_passing) {
         s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
     }
-    Spec unshadowed = s.light_weight;
+    Spec unshadowed = s.light_weight, transmittance = spec_set(f_set(1));
     if (t->scene->through) {
-        s.light_weight = spec_mul(unshadowed, walk_again(t, &s, &walk));
+        Ray ray;
+        shadow_ray(&s.si, s.light_d, s.light_distance, &ray);
+        Int medium = medium_behind(s.group, s.si.ng, s.light_d, i_load(t->ws.records.medium + s.at));
+        transmittance = walk_again(t, &ray, slot, medium, batch->bounce, s.connected, &walk);
+        s.light_weight = spec_mul(unshadowed, transmittance);
     }
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
@@ -219,7 +168,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         if (live_passing) {
             // L += f Le w_l T
             Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
-            walk_adj(t, &walk, spec_zero_unless(s.connected, dt), sink);
+            passage_adj(t, &walk, transmittance, spec_zero_unless(s.connected, dt), slot, batch->bounce, sink);
         }
         forward_flush(t, sink, slot, c, s.m);
     }
@@ -258,6 +207,14 @@ static void path_backward(Tracer *t) {
         Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
         Mask finite = m & m_finite(spec_sum(l));
         spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
+        if (batch->tag == VERTEX_FLIGHT) {
+            flight_sweep(t, batch, slot, suffix, finite, &sink);
+            continue;
+        }
+        if (batch->tag == VERTEX_MEDIUM) {
+            collision_sweep(t, batch, slot, suffix, finite, live_passing, &sink);
+            continue;
+        }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
         if (job->live[batch->group] || job->live_lights || live_passing) {
             surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &sink);

@@ -32,7 +32,10 @@ static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec s
         Spec f = bsdf_eval(&s.call, s.wi, s.wl, i_set(LOBE_SMOOTH)), weight = s.light_weight;
         if (t->scene->through) {
             Walk walk;
-            weight = spec_mul(weight, walk_again(t, &s, &walk));
+            Ray ray;
+            shadow_ray(&s.si, s.light_d, s.light_distance, &ray);
+            Int medium = medium_behind(s.group, s.si.ng, s.light_d, i_load(t->ws.records.medium + s.at));
+            weight = spec_mul(weight, walk_again(t, &ray, slot, medium, batch->bounce, s.connected, &walk));
         }
         l = spec_add(l, spec_zero_unless(s.connected, spec_mul(spec_mul(f, value), weight)));
     }
@@ -44,17 +47,51 @@ static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec s
     return l;
 }
 
+// Radiance at the beginning of flights. Distances and collisions are the recording scene's.
+static Spec replay_flight(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
+    const Records *r = &t->ws.records;
+    const int32_t at = batch->first;
+    Track track = track_of(t, batch->group);
+    Flights f = {.medium = batch->group, .m = m_first_n(batch->count), .slot = slot};
+    f.o = record_v3(r->px, r->py, r->pz, at);
+    f.d = record_v3(r->dx, r->dy, r->dz, at);
+    f.shares = channel_shares(t, spec_load(r->beta, at));
+    f.key = stream_key(t, slot, batch->bounce, STREAM_FLIGHT);
+    f.flight = track_flight(&track, f.o, f.d, f_load(r->sw + at), f.shares, f.m, &f.key, 0);
+    Spec l = spec_mul(f.flight.weight, suffix);
+    return t->scene->media[batch->group].emission >= 0 ? spec_add(l, flight_emission(t, &f, batch->bounce)) : l;
+}
+
+static Spec replay_collision(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
+    Walk walk;
+    CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
+    Spec l = spec_zero_unless(s.connected, spec_scale(s.lit, s.light_phase));
+    return spec_mul(s.at.albedo, spec_add(l, spec_scale(s.onward, s.phase)));
+}
+
+static Spec replay_vertex(Tracer *t, const RecordBatch *batch, Int slot) {
+    Spec suffix = spec_gather(t->ws.suffix, slot);
+    switch (batch->tag) {
+    case VERTEX_ESCAPED:
+        return replay_escape(t, batch);
+    case VERTEX_FLIGHT:
+        return replay_flight(t, batch, slot, suffix);
+    case VERTEX_MEDIUM:
+        return replay_collision(t, batch, slot, suffix);
+    default:
+        return replay_surface(t, batch, slot, suffix);
+    }
+}
+
 static void path_replay(Tracer *t) {
     const SceneView *recorded = t->scene;
     const Records *r = &t->ws.records;
-    t->scene = t->job->moved;
+    t->scene = t->job->moved; // t->deciding stays
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
         Mask m = m_first_n(batch->count);
         Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
-        Spec l = batch->tag == VERTEX_ESCAPED
-                     ? replay_escape(t, batch)
-                     : replay_surface(t, batch, slot, spec_gather(t->ws.suffix, slot));
+        Spec l = replay_vertex(t, batch, slot);
         l = spec_zero_unless(m & m_finite(spec_sum(l)), l);
         spec_scatter(t->ws.suffix, slot, l, m);
         // The path's first vertex comes last.

@@ -27,6 +27,7 @@ KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)boun
 typedef struct Tracer {
     PathJob *job;
     const SceneView *scene;
+    const SceneView *deciding; // the scene by which media are tracked: `scene`, but where another one's paths are followed
     const SensorRecord *sensor;
     Workspace ws;
     bool derivative;
@@ -173,6 +174,22 @@ KFN Hit trace_past_emitters(Tracer *t, Ray ray, Mask m, Hit hit) {
         hit.p = v3_select(again, next.p, hit.p);
     }
     return hit;
+}
+
+// Counting sort of `count` entries by key + base, in [0, bins): fills `order`, and where each bin begins.
+static void counting_sort(const int32_t *key, int32_t base, int32_t count, int32_t bins, int32_t *order, int32_t *begin) {
+    memset(begin, 0, (size_t)(bins + 1) * sizeof *begin);
+    for (int32_t k = 0; k < count; k++) {
+        begin[key[k] + base + 1]++;
+    }
+    for (int32_t g = 0; g < bins; g++) {
+        begin[g + 1] += begin[g];
+    }
+    for (int32_t k = 0; k < count; k++) {
+        order[begin[key[k] + base]++] = k;
+    }
+    memmove(begin + 1, begin, (size_t)bins * sizeof *begin);
+    begin[0] = 0;
 }
 
 static void trace_stage(Tracer *t, int32_t bounce) {

@@ -22,7 +22,7 @@ enum {
 // A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom.
 #define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)
 #define SHADOW_SPECS(S) S(radiance)
-#define SHADOW_INTS(I) I(slot) I(record)
+#define SHADOW_INTS(I) I(slot) I(record) I(medium)
 
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
 // the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the
@@ -34,7 +34,7 @@ enum {
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw)
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
-#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides)
+#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium)
 
 // Of a camera sample: where it lies on the film, and its alpha.
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
@@ -55,11 +55,12 @@ typedef struct Records {
 } Records;
 
 // Tags of path vertices.
-enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL, VERTEX_LIGHT };
+enum { VERTEX_SURFACE, VERTEX_ESCAPED, VERTEX_MEDIUM, VERTEX_NULL, VERTEX_LIGHT, VERTEX_FLIGHT };
 
 // A run of recorded vertices that share tag and group; `count` lanes of the LANES from `first` on are alive.
 typedef struct RecordBatch {
-    int32_t tag, group, first, count;
+    int32_t tag, group, first, count; // group: that of surfaces, else the medium
+    int32_t bounce;
     bool ends;         // the paths end here: their depth is reached
     bool first_vertex; // these are what the camera sees
 } RecordBatch;
@@ -91,6 +92,11 @@ typedef struct Workspace {
     MOVE_FLOATS(DECLARE_FLOAT)
     SpecRows attached;
     ChannelRows back, drag, turn;
+    // per slot, of the flight that has the path's probe (probe.h): its record (-1: none) and medium, what all flights
+    // together and this one are worth, where along it the probe is, and what is scattered there
+    int32_t *probe, *probe_medium;
+    real *probe_total, *probe_worth, *probe_at;
+    SpecRows scattered;
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
@@ -117,6 +123,17 @@ static inline size_t workspace_layout_moves(Workspace *ws, char *block, size_t a
         CARVE_SPEC(rows[i]->y, n)
         CARVE_SPEC(rows[i]->z, n)
     }
+    return at;
+}
+
+// What derivatives with respect to media keep per slot.
+static inline size_t workspace_layout_probes(Workspace *ws, char *block, size_t at, size_t n) {
+    CARVE(ws->probe, n)
+    CARVE(ws->probe_medium, n)
+    CARVE(ws->probe_total, n)
+    CARVE(ws->probe_worth, n)
+    CARVE(ws->probe_at, n)
+    CARVE_SPEC(ws->scattered, n)
     return at;
 }
 
@@ -166,6 +183,7 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE(ws->pixel, n)
     CARVE(ws->sample, n)
     at = derivative ? workspace_layout_moves(ws, block, at, n) : at;
+    at = derivative ? workspace_layout_probes(ws, block, at, n) : at;
     for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {
         CARVE(ws->channel[c], n)
     }

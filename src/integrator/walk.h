@@ -1,9 +1,9 @@
 // walk.h: shadow rays that surfaces may let through undeviated (holes, absent surfaces, thin glass): the transmittance
-// is the product of the pass-through lobes on the way, found surface by surface, and its adjoint.
+// is the product of the pass-through lobes on the way, found surface by surface, and of the media between them.
 #pragma once
 
 #include "bsdf/bsdf.h"
-#include "integrator/stages.h"
+#include "integrator/fog.h"
 
 enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be blocked
 
@@ -13,6 +13,11 @@ typedef struct Walk {
     Hit hit[MOST_SURFACES_IN_A_ROW];
     Mask m[MOST_SURFACES_IN_A_ROW];    // lanes that met a surface that may let light through
     Spec pass[MOST_SURFACES_IN_A_ROW]; // and the share that it lets through
+    int32_t segments;                  // with media: the pieces in front of, between and behind the surfaces
+    Vec3 o[MOST_SURFACES_IN_A_ROW + 1];
+    Float length[MOST_SURFACES_IN_A_ROW + 1];
+    Int medium[MOST_SURFACES_IN_A_ROW + 1]; // -1: vacuum, or a surface blocks the way
+    Spec clear;                        // what the media let through
 } Walk;
 
 // The hit, with a shape of this group also in the lanes that hit another one.
@@ -26,8 +31,8 @@ KFN Hit walk_hit(const Hit *hit, Mask mine) {
 }
 
 // What the surfaces that the lanes of m hit do to light that passes along d, and where the ray goes on behind them.
-// `may` becomes the lanes whose surface could let light through.
-static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Mask *may) {
+// `may` becomes the lanes whose surface could let light through, *medium what they go on in (null: there are no media).
+static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Mask *may, Int *medium) {
     const SceneView *scene = t->scene;
     Int groups = SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group);
     Spec pass = spec_zero();
@@ -47,30 +52,52 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
         *o = v3_select(mine, interaction_offset(&si, d), *o);
         *may = *may | mine;
+        if (medium) {
+            *medium = i_select(mine, medium_behind(group, si.ng, d, *medium), *medium);
+        }
     }
     return pass;
 }
 
-// Transmittance of the rays of m. blocked becomes the lanes that no choice of parameters would open; walk may be null.
-static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Mask *blocked, Walk *walk) {
+// Shadow rays end a little before their lights; the media do not. By what part of the ray's length.
+#define SHADOW_SHORT 9e-4f
+
+// Transmittance of the rays of m. blocked becomes the lanes that no choice of parameters would open; walk may be null, and
+// so is fog where there are no media.
+static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Mask *blocked, Walk *walk) {
     Spec transmittance = spec_set(f_zero_unless(m, f_set(1)));
+    const Float beyond = ray.tmax * (SHADOW_SHORT / (1.0f - SHADOW_SHORT));
     Mask left = m;
     *blocked = m_set(false);
     for (int32_t i = 0; m_any(left); i++) {
         Hit hit = trace_closest(t->scene, &ray, left, false);
         t->job->rays += m_count(left);
         Vec3 o = ray.o;
-        Mask found = left & mi_lt(i_set(-1), hit.shape), may;
-        if (!m_any(found)) {
+        Mask found = left & mi_lt(i_set(-1), hit.shape), may = m_set(false);
+        Int medium = fog ? fog->medium : i_set(-1);
+        if (!m_any(found) && !fog) {
             break;
         }
-        Spec pass = walk_pass(t, &hit, ray.d, found, &o, &may);
+        Spec pass = walk_pass(t, &hit, ray.d, found, &o, &may, fog ? &fog->medium : NULL);
         may = may & m_set(i < MOST_SURFACES_IN_A_ROW);
         if (walk && i < MOST_SURFACES_IN_A_ROW) {
             walk->hit[i] = hit;
             walk->m[i] = may;
             walk->pass[i] = pass;
             walk->count = i + 1;
+        }
+        if (fog) {
+            Mask open = left & (may | ~found);
+            Float length = f_select(found, v3_dot(v3_sub(hit.p, ray.o), ray.d), ray.tmax + beyond);
+            Spec clear = fog_transmittance(t, fog, medium, &ray, length, i, open);
+            transmittance = spec_select(open, spec_mul(transmittance, clear), transmittance);
+            if (walk && i <= MOST_SURFACES_IN_A_ROW) {
+                walk->o[i] = ray.o;
+                walk->length[i] = length;
+                walk->medium[i] = i_select(open, medium, i_set(-1));
+                walk->clear = spec_select(open, spec_mul(walk->clear, clear), walk->clear);
+                walk->segments = i + 1;
+            }
         }
         *blocked = *blocked | (found & ~may);
         transmittance = spec_select(found, spec_zero_unless(may, spec_mul(transmittance, pass)), transmittance);

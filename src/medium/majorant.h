@@ -11,6 +11,7 @@ typedef struct MajorantWalk {
     Int cell[3];
     Float next[3], step[3]; // distances at which cells end along each axis, and between such ends
     Float majorant;   // of the cell that the walk stands in
+    Float least;      // bounds of cells count as at least this much
     Mask m;           // lanes that are still inside
 } MajorantWalk;
 
@@ -31,7 +32,7 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
     const Float p[3] = {w.o.x, w.o.y, w.o.z}, v[3] = {w.d.x, w.d.y, w.d.z};
     w.t = f_set(0);
     w.end = tmax;
-    w.majorant = f_set(0);
+    w.majorant = w.least = f_set(0);
     for (int k = 0; k < 3 && medium->bounded; k++) {
         slab(p[k], v[k], &w.t, &w.end);
     }
@@ -73,7 +74,7 @@ KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, Majoran
     Mask left = m & w->m, found = m_set(false);
     while (m_any(left)) {
         Int cell = (w->cell[2] * medium->ny + w->cell[1]) * medium->nx + w->cell[0];
-        Float majorant = table_at(scene, cell + medium->table);
+        Float majorant = f_max(table_at(scene, cell + medium->table), w->least);
         Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
         Float through = majorant * f_max(exit - w->t, f_set(0));
         Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);

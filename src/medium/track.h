@@ -1,18 +1,40 @@
-// track.h: free flights and transmittance through a medium by tracking tentative collisions under local majorants.
-// Colours are followed together: a collision is real with the mean of the channels' extinction over majorant, each counted
-// by its weight so far, so that the densities of a history are the mean of the channels' own and no weight exceeds their
-// number [miller2019; kutz2017 section 5].
+// track.h: free flights and transmittance through a medium: in closed form where it is homogeneous, else by tracking
+// tentative collisions under local majorants. Colours are followed together: a collision is real with the mean of the
+// channels' extinction over majorant, each counted by its importance and its weight so far, so that the density of a history
+// is the mean of the channels' own and no weight exceeds one over the channel's importance [miller2019; kutz2017 section 5].
 #pragma once
 
+#include "math/functions.h"
 #include "math/rng.h"
 #include "medium/majorant.h"
 
 // Tentative collisions of one walk; what is left is taken to be blocked.
 enum { MOST_COLLISIONS = 1 << 16 };
 
-KFN Spec medium_extinction(const SceneView *scene, const MediumNode *medium, const VolumeNode *sigma_t,
-                           const MajorantWalk *w) {
-    return spec_scale(volume_eval(scene, sigma_t, majorant_point(w)), f_set((real)scene->theta[medium->scale]));
+// Who is tracked through: `scene` decides where collisions happen, and `values` says what extinctions are there. They are the
+// same, but for pictures of one scene along the paths of another one; those are `padded`: there collisions happen where the
+// deciding scene is empty, too.
+typedef struct Track {
+    const SceneView *scene, *values;
+    const MediumNode *medium;
+    const VolumeNode *sigma_t;
+    bool padded;
+} Track;
+
+// Of padded walks: the optical depth of a whole walk, and the probability of real collisions, are at least this much.
+#define PADDED_DEPTH 0.5f
+#define PADDED_SHARE 0.05f
+
+KFN Spec medium_extinction(const SceneView *scene, const Track *t, Vec3 p) {
+    return spec_scale(volume_eval(scene, t->sigma_t, p), f_set((real)scene->theta[t->medium->scale]));
+}
+
+KFN MajorantWalk track_start(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m) {
+    MajorantWalk w = majorant_start(t->scene, t->medium, t->sigma_t, o, d, tmax, m);
+    if (t->padded) {
+        w.least = PADDED_DEPTH * f_safe_rcp(w.end - w.t);
+    }
+    return w;
 }
 
 // Optical depth to the next tentative collision.
@@ -20,48 +42,118 @@ KFN Float track_depth(const SampleKey *key, uint32_t dimension) {
     return -f_log(f_max(1.0f - rng_1d(key, dimension), f_set(1e-9f)));
 }
 
+// Homogeneous media.
+KFN bool track_is_uniform(const Track *t) { return !t->medium->bounded && t->sigma_t->kind == VOLUME_CONSTANT; }
+
+KFN Spec uniform_transmittance(Spec sigma, Float t) {
+    for (int c = 0; c < SPEC_N; c++) {
+        // The distance may be infinite where the extinction is 0.
+        Float depth = f_zero_unless(m_gt(sigma.c[c], f_set(0)), sigma.c[c] * t);
+        sigma.c[c] = f_exp(-depth);
+    }
+    return sigma;
+}
+
 // Ratio tracking: an unbiased estimate of the transmittance of each channel. Collision number i takes dimension + i.
-static NOINLINE Spec track_transmittance(const SceneView *scene, const MediumNode *medium, const VolumeNode *sigma_t, Vec3 o,
-                                         Vec3 d, Float tmax, Mask m, const SampleKey *key, uint32_t dimension) {
-    MajorantWalk w = majorant_start(scene, medium, sigma_t, o, d, tmax, m);
+static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m, const SampleKey *key,
+                                         uint32_t dimension) {
+    if (track_is_uniform(t)) {
+        return uniform_transmittance(medium_extinction(t->values, t, v3_zero()), tmax);
+    }
+    MajorantWalk w = track_start(t, o, d, tmax, m);
     Spec transmittance = spec_set(f_set(1));
+    SampleKey random = *key;
+    random.sobol = false;
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
-        Mask met = majorant_next(scene, medium, &w, track_depth(key, dimension + i), left);
-        Spec share = spec_scale(medium_extinction(scene, medium, sigma_t, &w), f_safe_rcp(w.majorant));
+        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(&random, dimension + i), left);
+        Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w)), f_safe_rcp(w.majorant));
         Spec passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
         transmittance = spec_select(met, passed, transmittance);
-        left = met & m_gt(spec_max(transmittance), f_set(0));
+        left = met & m_ne(spec_max(transmittance), f_set(0));
     }
     return transmittance;
 }
 
 typedef struct Flight {
-    Float t;     // distance to the collision
+    Float t;     // distance to the collision; of lanes that pass, tmax
     Spec weight; // of what happens: extinction is in it, albedo is not
-    Spec sigma;  // extinction at the collision
-    Mask real;   // lanes that collided; the others pass tmax
+    Mask real;   // lanes that collided
 } Flight;
 
-// Delta tracking to the next real collision. Collision number i takes dimension + 2 i and the next.
-static NOINLINE Flight track_flight(const SceneView *scene, const MediumNode *medium, const VolumeNode *sigma_t, Vec3 o, Vec3 d,
-                                    Float tmax, Mask m, const SampleKey *key, uint32_t dimension) {
-    MajorantWalk w = majorant_start(scene, medium, sigma_t, o, d, tmax, m);
-    Flight flight = {tmax, spec_set(f_set(1)), spec_zero(), m_set(false)};
+// A channel is chosen by importance, and the distance by its extinction; what happens is weighed against all channels.
+static NOINLINE Flight uniform_flight(const Track *track, Float tmax, Spec importance, Mask m, const SampleKey *key,
+                                      uint32_t dimension) {
+    Vec2 u = rng_2d(key, dimension);
+    Spec sigma = medium_extinction(track->scene, track, v3_zero()), value = medium_extinction(track->values, track, v3_zero());
+    Float chosen = sigma.c[0], sum = importance.c[0];
+    for (int c = 1; c < SPEC_N; c++) {
+        chosen = f_select(m_ge(u.y, sum), sigma.c[c], chosen);
+        sum = sum + importance.c[c];
+    }
+    Flight flight;
+    Float t = -f_log(1.0f - u.x) * f_safe_rcp(chosen);
+    flight.real = m & m_gt(chosen, f_set(0)) & m_lt(t, tmax);
+    flight.t = f_select(flight.real, t, tmax);
+    Spec passed = uniform_transmittance(sigma, flight.t), density = spec_select(flight.real, spec_mul(sigma, passed), passed);
+    passed = uniform_transmittance(value, flight.t);
+    Spec what = spec_select(flight.real, spec_mul(value, passed), passed);
+    flight.weight = spec_scale(what, f_safe_rcp(spec_dot(importance, density)));
+    return flight;
+}
+
+// A tentative collision turns out to be one or not, with probability p: what that makes of a weight, by channel.
+KFN Spec collision_weight(Spec weight, Spec sigma, Float majorant, Float p, Mask collided) {
+    Spec share = spec_scale(sigma, f_safe_rcp(majorant)), rest = spec_sub(spec_set(f_set(1)), share);
+    Float rcp = f_safe_rcp(f_select(collided, p, 1.0f - p));
+    return spec_mul(weight, spec_scale(spec_select(collided, share, rest), rcp));
+}
+
+// Delta tracking to the next real collision. Collision number i takes dimension + 2 i and the next. importance: shares of
+// the channels, which sum up to 1.
+static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
+                                    uint32_t dimension) {
+    if (track_is_uniform(t)) {
+        return uniform_flight(t, tmax, importance, m, key, dimension);
+    }
+    MajorantWalk w = track_start(t, o, d, tmax, m);
+    Flight flight = {tmax, spec_set(f_set(1)), m_set(false)};
+    Spec weight = flight.weight; // in the deciding scene
+    SampleKey random = *key;
+    random.sobol = false;
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
-        Mask met = majorant_next(scene, medium, &w, track_depth(key, dimension + 2 * i), left);
-        Spec sigma = medium_extinction(scene, medium, sigma_t, &w);
-        Spec share = spec_scale(sigma, f_safe_rcp(w.majorant)), rest = spec_sub(spec_set(f_set(1)), share);
-        Float p = f_clamp(spec_dot(flight.weight, share) * f_safe_rcp(spec_sum(flight.weight)), f_set(0), f_set(1));
-        Mask collided = met & m_lt(rng_1d(key, dimension + 2 * i + 1), p);
-        Spec hit = spec_scale(spec_mul(flight.weight, share), f_safe_rcp(p));
-        Spec missed = spec_scale(spec_mul(flight.weight, rest), f_safe_rcp(1.0f - p));
-        flight.weight = spec_select(collided, hit, spec_select(met, missed, flight.weight));
-        flight.sigma = spec_select(collided, sigma, flight.sigma);
+        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(&random, dimension + 2 * i), left);
+        Vec3 p = majorant_point(&w);
+        Spec sigma = medium_extinction(t->scene, t, p), counts = spec_mul(importance, weight);
+        Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
+        real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
+        Mask collided = met & m_lt(rng_1d(&random, dimension + 2 * i + 1), real_share);
+        weight = spec_select(met, collision_weight(weight, sigma, w.majorant, real_share, collided), weight);
+        if (t->values == t->scene) {
+            flight.weight = weight;
+        } else {
+            Spec value = medium_extinction(t->values, t, p);
+            Spec other = collision_weight(flight.weight, value, w.majorant, real_share, collided);
+            flight.weight = spec_select(met, other, flight.weight);
+        }
         flight.t = f_select(collided, w.t, flight.t);
         flight.real = flight.real | collided;
         left = met & ~collided;
     }
     return flight;
+}
+
+// What a flight that gets as far as `far` weighs there. It is the same flight: its random numbers are those of track_flight.
+static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Spec importance, Mask m, const SampleKey *key,
+                                  uint32_t dimension) {
+    if (track_is_uniform(t)) {
+        Spec density = uniform_transmittance(medium_extinction(t->scene, t, v3_zero()), far);
+        Spec passed = uniform_transmittance(medium_extinction(t->values, t, v3_zero()), far);
+        return spec_scale(passed, f_safe_rcp(spec_dot(importance, density)));
+    }
+    if (t->sigma_t->channels == 1 && t->values == t->scene && !t->padded) {
+        return spec_set(f_set(1));
+    }
+    return track_flight(t, o, d, far, importance, m, key, dimension).weight;
 }

@@ -37,6 +37,32 @@ static bool emitter_live(const SceneView *view, const PathJob *job, int32_t id) 
     return live;
 }
 
+static bool phase_live(const SceneView *view, const PathJob *job, int32_t id) {
+    if (id < 0) {
+        return false;
+    }
+    const PhaseNode *node = view->phases + id;
+    bool live = false;
+    for (int k = 0; k < MAX_PHASE_SLOTS; k++) {
+        live |= texture_live(view, job, node->slot[k]);
+    }
+    for (int k = 0; k < MAX_PHASE_CHILDREN; k++) {
+        live |= phase_live(view, job, node->child[k]);
+    }
+    return live;
+}
+
+static bool volume_live(const SceneView *view, const PathJob *job, int32_t id) {
+    return id >= 0 && texture_live(view, job, view->volumes[id].texture);
+}
+
+static int32_t medium_live(const SceneView *view, const PathJob *job, const MediumNode *medium) {
+    bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture);
+    return (extinction ? LIVE_EXTINCTION : 0) | (volume_live(view, job, medium->albedo) ? LIVE_ALBEDO : 0) |
+           (phase_live(view, job, medium->phase) ? LIVE_PHASE : 0) |
+           (volume_live(view, job, medium->emission) ? LIVE_GLOW : 0);
+}
+
 // Groups of surfaces of which something selected moves a point.
 static void moving_groups(const SceneView *view, const PathJob *job, int32_t *live) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
@@ -57,6 +83,10 @@ void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
         live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0);
     }
     moving_groups(view, job, live);
+    for (int64_t i = 0; i < view->media_count && view->has_media; i++) {
+        live[view->groups_count + i] = medium_live(view, job, view->media + i);
+        job->live_extinctions |= (live[view->groups_count + i] & LIVE_EXTINCTION) != 0;
+    }
     job->live = live;
     job->live_lights |= job->any_motion;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {

@@ -53,12 +53,12 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
         return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no integrator, expected one such as <integrator "
                                               "type=\"path\"/>");
     }
-    if (scene->view.has_media) {
-        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "participating media are missing yet: the scene can be read and "
-                                                    "converted, but not rendered");
-    }
     if (scene->view.sensors_count == 0) {
         return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
+    }
+    if (rey_traces_particles(scene) && scene->view.media_count > 0) {
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
+                        "'%s' knows no participating media, 'volpath' does", scene->integrator);
     }
     if (def->sensor < 0 || def->sensor >= scene->view.sensors_count) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", def->sensor,
@@ -116,7 +116,7 @@ rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *d
     rey_film_norms(&r->plan, r->columns, r->rows);
     size_t bytes = r->backend->workspace_bytes(mode), others = r->backend->boundary_bytes();
     bytes = mode == MODE_PRIMAL || bytes > others ? bytes : others;
-    r->job.workspace_bytes = bytes + ((size_t)scene->view.groups_count + 3) * sizeof(int32_t);
+    r->job.workspace_bytes = bytes + (size_t)(scene->view.groups_count + scene->view.media_count + 3) * sizeof(int32_t);
     for (int i = 0; i < ctx->def.threads && i < r->tiles; i++) {
         r->workspaces[i] = rey_alloc(ctx, r->job.workspace_bytes);
         if (!r->workspaces[i]) {
@@ -234,7 +234,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     enum { PAD = 16 };
     int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
     int64_t n = 2 * textures + 3 * shapes + view->instances_count + CAMERA_NUMBERS + view->attributes_count + places +
-                view->groups_count + PAD;
+                view->groups_count + view->media_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;

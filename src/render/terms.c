@@ -26,6 +26,12 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
     return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
 }
 
+// In media everything that moves changes the light on its way, and boundaries of shadows lie in the air.
+static bool moves(const Param *p) {
+    return p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || p->volume >= 0 ||
+           (p->terms & REY_TERM_SPECULAR);
+}
+
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
     if (scene->view.drops) {
@@ -42,7 +48,14 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         if (!info.terms) {
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
-        int known = terms_known(scene, def, &ARRAY_AT(scene->params, Param, selection.params[i]));
+        const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
+        if (scene->view.has_media && moves(p)) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "no term of the gradient of %s exists yet in scenes with participating media: what moves "
+                            "changes what they let through and scatter, and moves the shadows in them",
+                            info.name);
+        }
+        int known = terms_known(scene, def, p);
         int missing = info.terms & ~known;
         bool interior = known & REY_TERM_INTERIOR;
         if (missing && !def->terms) {

@@ -106,8 +106,10 @@ static void run_track(const MediaCase *c, int n, MediaRay *r) {
         }
         SampleKey key = {.pixel = u_set(0), .sample = (UInt)i_load(samples), .scramble = 7, .sobol = false};
         Mask m = m_first_n(n - first);
-        Spec transmittance = track_transmittance(&view.scene, &c->medium, &c->sigma_t, o, d, tmax, m, &key, 0);
-        Flight flight = track_flight(&view.scene, &c->medium, &c->sigma_t, o, d, tmax, m, &key, 1u << 20);
+        Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false};
+        Spec transmittance = track_transmittance(&track, o, d, tmax, m, &key, 0);
+        Spec even = spec_set(f_set((real)1 / SPEC_N));
+        Flight flight = track_flight(&track, o, d, tmax, even, m, &key, 1u << 20);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             MediaRay *to = r + first + lane;
             for (int k = 0; k < 3; k++) {

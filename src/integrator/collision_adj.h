@@ -1,0 +1,91 @@
+// collision_adj.h: the adjoint of vertices in media. What leaves a collision is
+//   albedo (sum_lights p Le T w_l + p w_s L_next),
+// p the phase function; the extinction is in the flight's weight.
+#pragma once
+
+#include "integrator/walk_adj.h"
+
+// What the sweep knows of a batch of collisions.
+typedef struct CollisionSweep {
+    Mask m, connected, scattered;
+    Int light, light_prim;
+    Spec beta, onward;                   // onward: w_s L_next
+    Spec unshadowed, transmittance, lit; // w_l, T and Le w_l T
+    Spec light_value;
+    Float light_phase, phase, light_distance;
+    Vec2 light_uv;
+    Vec3 light_d, wo;
+    Hit hit;
+    Collision at;
+} CollisionSweep;
+
+static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Walk *walk) {
+    const Records *r = &t->ws.records;
+    const int32_t at = batch->first;
+    CollisionSweep s = {.m = m_first_n(batch->count)};
+    s.hit = (Hit){.shape = i_set(0), .prim = i_set(0), .instance = i_set(0), .p = record_v3(r->px, r->py, r->pz, at)};
+    Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
+    s.beta = spec_load(r->beta, at);
+    s.unshadowed = spec_load(r->light_weight, at);
+    s.connected = s.m & m_gt(spec_max(s.unshadowed), f_set(0));
+    s.scattered = s.m & m_gt(f_load(r->sw + at), f_set(0));
+    s.light = i_load(r->light + at);
+    s.light_prim = i_load(r->lprim + at);
+    s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
+    s.light_distance = f_load(r->ldist + at);
+    s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), d);
+    s.wo = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), d);
+    s.onward = spec_zero_unless(s.scattered, spec_scale(suffix, f_load(r->sw + at)));
+    s.at = collision_look(t, batch->group, &s.hit, d);
+    s.light_phase = phase_eval(&s.at.call, s.at.wi, s.light_d);
+    s.phase = phase_eval(&s.at.call, s.at.wi, s.wo);
+    s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+    Ray ray;
+    collision_shadow_ray(s.hit.p, s.light_d, s.light_distance, &ray);
+    s.transmittance = walk_again(t, &ray, slot, i_set(batch->group), batch->bounce, s.connected, walk);
+    s.lit = spec_mul(s.light_value, spec_mul(s.unshadowed, s.transmittance));
+    return s;
+}
+
+static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int32_t live, Spec delta, Sink *sink) {
+    const SceneView *scene = t->scene;
+    Spec worth = spec_mul(delta, s->beta);
+    Spec lit = spec_zero_unless(s->connected, spec_mul(worth, s->lit)), onward = spec_mul(worth, s->onward);
+    if (t->job->live_lights && m_any(s->connected)) {
+        Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
+        lights_adj(scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
+                   spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), NULL, sink);
+    }
+    if (live & LIVE_ALBEDO) {
+        const VolumeNode *albedo = scene->volumes + s->at.medium->albedo;
+        Spec d = spec_add(spec_scale(lit, s->light_phase), spec_scale(onward, s->phase));
+        volume_adj(scene, albedo, volume_to_local(scene, albedo, s->hit.p, 1), spec_zero_unless(s->m, d),
+                   sink->texture_at[albedo->texture], NULL, sink, s->m);
+    }
+    if (live & LIVE_PHASE) {
+        Vec3 dwi = v3_zero(), dwo = v3_zero();
+        phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &dwo);
+        phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), sink, s->scattered, &dwi, &dwo);
+    }
+}
+
+static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
+                            Sink *sink) {
+    const int32_t live = t->job->live[t->scene->groups_count + batch->group];
+    if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing) {
+        return;
+    }
+    Walk walk;
+    CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
+    for (int c = 0; c < drives(t); c++) {
+        Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
+        collision_adj(t, &s, live, delta, sink);
+        if (live_passing) {
+            // L += albedo p Le w_l T
+            Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
+            passage_adj(t, &walk, s.transmittance, spec_zero_unless(s.connected, spec_scale(dt, s.light_phase)), slot,
+                        batch->bounce, sink);
+        }
+        forward_flush(t, sink, slot, c, s.m);
+    }
+}

@@ -1,0 +1,152 @@
+// flight_adj.h: adjoints of flights, collisions and transmittances. Along a flight that gets to t with weight w and finds L
+// there, the derivative with respect to the extinction at s < t is
+//   -w L + w(s) albedo(s) (what is scattered at s towards the path),
+// and the emission that is met behind s is lost as well. The first part is found at points of its own, the second one at
+// collisions and at the path's probe (probe.h). Nothing is divided by an extinction or a throughput.
+// NOT differentiated: the choice of distances, channels and real collisions; where media lie.
+#pragma once
+
+#include "integrator/probe.h"
+
+enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
+
+// Accumulates the adjoint d of the extinction at a point of the world.
+static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Spec d, Sink *sink, Mask m) {
+    const VolumeNode *v = scene->volumes + medium->sigma_t;
+    const int32_t at = sink->texture_at[v->texture], scale_at = sink->texture_at[medium->scale_texture];
+    Vec3 q = volume_to_local(scene, v, p, 1);
+    d = spec_zero_unless(m, d);
+    // extinction = scale sigma_t
+    if (at >= 0) {
+        volume_adj(scene, v, q, spec_scale(d, f_set((real)scene->theta[medium->scale])), at, NULL, sink, m);
+    }
+    if (scale_at >= 0) {
+        sink_add_uniform(sink, scale_at, spec_dot(d, volume_eval(scene, v, q)), m);
+    }
+}
+
+// Points spread evenly over [low, high], one in each of FLIGHT_POINTS parts of it.
+KFN Float flight_point(Float low, Float high, const SampleKey *key, uint32_t dimension, int k) {
+    return f_lerp(low, high, (rng_1d(key, dimension + (uint32_t)k) + (real)k) * ((real)1 / FLIGHT_POINTS));
+}
+
+// ---- flights -----------------------------------------------------------------------------------------------------
+
+// What the sweep of a batch of flights knows before it knows the adjoint.
+typedef struct FlightAdj {
+    FlightSweep f;
+    const MediumNode *medium;
+    Spec onward, emission;       // light from the flight's end, and from the way
+    Float emission_at;
+    Spec emission_weight;
+    Float point[FLIGHT_POINTS];
+    Mask probed, collided;       // lanes whose flight has the path's probe; that collide
+    Float end;
+    Spec gain, hit;              // what is scattered at the probe and at the collision, weighed
+} FlightAdj;
+
+static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *batch, Spec suffix) {
+    const SceneView *scene = t->scene;
+    const Workspace *ws = &t->ws;
+    const int32_t at = batch->first;
+    FlightAdj a = {.f = flight_load(t, batch), .medium = scene->media + batch->group};
+    a.onward = spec_mul(spec_load(ws->records.weight, at), suffix);
+    a.emission = spec_load(ws->records.local, at);
+    a.emission_at = f_load(ws->records.u + at);
+    a.emission_weight = spec_load(ws->records.light_weight, at);
+    a.probed = a.collided = m_set(false);
+    if (!extinction_is_live(t, batch->group)) {
+        return a;
+    }
+    SampleKey key = stream_key(t, a.f.slot, batch->bounce, STREAM_PROBE);
+    for (int k = 0; k < FLIGHT_POINTS; k++) {
+        a.point[k] = f_select(a.f.m, flight_point(a.f.low, a.f.high, &key, 2, k), f_set(0));
+    }
+    a.probed = a.f.m & mi_eq(i_gather(ws->probe, a.f.slot), i_iota() + at);
+    a.collided = m_first_n(batch->count) & (Mask)i_load(ws->records.prim + at);
+    a.end = f_select(a.collided, f_load(ws->records.ldist + at), f_set(0));
+    // Collisions have the density extinction, and the weight extinction / (extinction + sparse).
+    Track track = track_of(t, batch->group);
+    Vec3 p = volume_to_local(scene, track.sigma_t, v3_madd(a.f.o, a.end, a.f.d), 1);
+    a.hit = medium_extinction(scene, &track, p);
+    for (int c = 0; c < SPEC_N; c++) {
+        a.hit.c[c] = a.onward.c[c] * f_safe_rcp(a.hit.c[c] + a.f.sparse);
+    }
+    a.gain = spec_zero();
+    if (m_any(a.probed)) {
+        SampleKey own = stream_key(t, a.f.slot, batch->bounce, STREAM_FLIGHT);
+        Spec weight = track_weight(&track, a.f.o, a.f.d, a.f.probe, channel_shares(t, a.f.beta), a.probed, &own, 0);
+        // The flight was chosen with the probability worth / total.
+        Float one_over = real_gather(ws->probe_total, a.f.slot) * f_safe_rcp(real_gather(ws->probe_worth, a.f.slot));
+        Spec share = spec_scale(probe_share(t, batch->group, &a.f, a.f.probe), one_over * (a.f.high - a.f.low));
+        Spec scattered = spec_mul(spec_mul(weight, share), spec_gather(ws->scattered, a.f.slot));
+        a.gain = spec_zero_unless(a.probed & m_finite(spec_sum(scattered)), scattered);
+    }
+    return a;
+}
+
+static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Sink *sink) {
+    const SceneView *scene = t->scene;
+    Spec worth = spec_mul(delta, a->f.beta);
+    const Mask m = a->f.m;
+    if (live & LIVE_EXTINCTION) {
+        Float each = (a->f.high - a->f.low) * ((real)1 / FLIGHT_POINTS);
+        for (int k = 0; k < FLIGHT_POINTS; k++) {
+            Spec behind = spec_zero_unless(m_lt(a->point[k], a->emission_at), a->emission);
+            Spec lost = spec_scale(spec_mul(worth, spec_add(a->onward, behind)), -each);
+            extinction_adj(scene, a->medium, v3_madd(a->f.o, a->point[k], a->f.d), lost, sink, m);
+        }
+        extinction_adj(scene, a->medium, v3_madd(a->f.o, a->end, a->f.d), spec_mul(worth, a->hit), sink, a->collided);
+        if (m_any(a->probed)) {
+            extinction_adj(scene, a->medium, v3_madd(a->f.o, a->f.probe, a->f.d), spec_mul(worth, a->gain), sink, a->probed);
+        }
+    }
+    if (live & LIVE_GLOW) {
+        const VolumeNode *emission = scene->volumes + a->medium->emission;
+        Vec3 p = volume_to_local(scene, emission, v3_madd(a->f.o, a->emission_at, a->f.d), 1);
+        volume_adj(scene, emission, p, spec_zero_unless(m, spec_mul(worth, a->emission_weight)),
+                   sink->texture_at[emission->texture], NULL, sink, m);
+    }
+}
+
+static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Sink *sink) {
+    const int32_t live = t->job->live[t->scene->groups_count + batch->group];
+    if (!(live & (LIVE_EXTINCTION | LIVE_GLOW))) {
+        return;
+    }
+    FlightAdj a = flight_adj_load(t, batch, suffix);
+    a.f.m = a.f.m & finite;
+    a.probed = a.probed & finite;
+    a.collided = a.collided & finite;
+    for (int c = 0; c < drives(t); c++) {
+        flight_adj(t, &a, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), sink);
+        forward_flush(t, sink, slot, c, finite);
+    }
+}
+
+// ---- shadow rays -------------------------------------------------------------------------------------------------
+
+// Accumulates the adjoint dt of a walk's transmittance, whose value is `transmittance`, with respect to the extinctions on
+// its way: dT / d extinction(s) = -T.
+static NOINLINE void fog_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, const SampleKey *key, Sink *sink) {
+    const SceneView *scene = t->scene;
+    dt = spec_mul(dt, transmittance);
+    for (int32_t i = 0; i < walk->segments; i++) {
+        for (Mask left = mi_lt(i_set(-1), walk->medium[i]), mine; m_any(left); left = left & ~mine) {
+            int32_t id = i_lane(walk->medium[i], m_first(left));
+            const MediumNode *medium = scene->media + id;
+            mine = left & mi_eq(walk->medium[i], i_set(id));
+            if (!extinction_is_live(t, id)) {
+                continue;
+            }
+            Float low, high;
+            medium_span(scene, medium, walk->o[i], walk->d, walk->length[i], &low, &high);
+            Mask m = mine & m_gt(high, low) & m_finite(high);
+            Float each = (high - low) * ((real)-1 / FLIGHT_POINTS);
+            for (int k = 0; k < FLIGHT_POINTS; k++) {
+                Float at = f_select(m, flight_point(low, high, key, (uint32_t)(i * FLIGHT_POINTS), k), f_set(0));
+                extinction_adj(scene, medium, v3_madd(walk->o[i], at, walk->d), spec_scale(dt, each), sink, m);
+            }
+        }
+    }
+}

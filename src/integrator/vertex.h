@@ -1,0 +1,205 @@
+// vertex.h: what vertices of all kinds have in common: loading and recording them, weighing light against having sampled it
+// otherwise, shadow rays, roulette, and the paths that go on.
+#pragma once
+
+#include "emitter/choice.h"
+#include "integrator/split.h"
+#include "integrator/walk.h"
+
+// One batch of lanes at a vertex: indices into the path arrays, and what was found there.
+typedef struct Vertex {
+    Int at;          // positions in the path arrays
+    Mask m;
+    Int slot;
+    Hit hit;
+    Vec3 d, origin;  // incoming ray's direction, and the previous vertex
+    Spec beta;
+    Float pdf;
+    Int depth;       // path segments behind it; the bounce, unless scene->through
+    Int medium;      // that the ray came through
+} Vertex;
+
+KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
+    const Workspace *ws = &t->ws;
+    const Paths *p = &ws->paths[t->current];
+    Vertex v;
+    v.m = m_first_n(count);
+    v.at = i_select(v.m, i_load(order), i_set(order[0]));
+    v.slot = i_gather(p->slot, v.at);
+    v.hit.shape = i_max(i_gather(ws->hit_shape, v.at), i_set(0));
+    v.hit.prim = i_gather(ws->hit_prim, v.at);
+    v.hit.instance = i_gather(ws->hit_instance, v.at);
+    v.hit.u = real_gather(ws->hit_u, v.at);
+    v.hit.v = real_gather(ws->hit_v, v.at);
+    v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
+    v.d = LOAD_V3(*p, dx, dy, dz, v.at);
+    v.origin = LOAD_V3(*p, px, py, pz, v.at);
+    v.beta = spec_gather(p->beta, v.at);
+    v.pdf = real_gather(p->pdf, v.at);
+    v.depth = t->scene->through ? i_gather(p->depth, v.at) : i_set(bounce);
+    v.medium = t->scene->has_media ? i_gather(p->medium, v.at) : i_set(-1);
+    return v;
+}
+
+// Adds radiance to the slots' sums. Slots are distinct within a batch.
+KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) { spec_scatter_add(t->ws.radiance, slot, l, m); }
+
+// Claims LANES record entries for a batch; -1 when there is no room.
+KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count, int32_t bounce) {
+    if (t->record_count + LANES > t->ws.record_capacity || t->batch_count == t->ws.batch_capacity) {
+        t->overflow = true;
+        return -1;
+    }
+    int32_t first = t->record_count;
+    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count, bounce, false, false};
+    t->record_count += LANES;
+    return first;
+}
+
+KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec emission) {
+    Records *r = &t->ws.records;
+    i_store(r->shape + at, v->hit.shape);
+    i_store(r->prim + at, v->hit.prim);
+    i_store(r->instance + at, v->hit.instance);
+    i_store(r->slot + at, v->slot);
+    i_store(r->medium + at, v->medium);
+    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
+    f_store(r->u + at, v->hit.u);
+    f_store(r->v + at, v->hit.v);
+    f_store(r->px + at, v->hit.p.x);
+    f_store(r->py + at, v->hit.p.y);
+    f_store(r->pz + at, v->hit.p.z);
+    f_store(r->dx + at, v->d.x);
+    f_store(r->dy + at, v->d.y);
+    f_store(r->dz + at, v->d.z);
+    f_store(r->mis + at, mis);
+    spec_store(r->beta, at, v->beta);
+    spec_store(r->light_weight, at, spec_zero());
+    spec_store(r->local, at, emission);
+    spec_store(r->weight, at, spec_zero());
+    f_store(r->sw + at, f_set(0));
+}
+
+KFN Float power_heuristic(Float a, Float b) { return a * a * f_safe_rcp(a * a + b * b); }
+
+// Weight of what a scattered ray met, against having sampled it as a light with density light_pdf.
+KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
+    Float pdf = v->pdf;
+    if (t->scene->split) {
+        Split s = split_of(t->scene, (UInt)i_gather(t->ws.sample, v->slot));
+        light_pdf = light_pdf * s.light_pdf;
+        pdf = pdf * s.scatter_pdf;
+    }
+    return f_select(m_lt(v->pdf, f_set(0)), f_set(1), power_heuristic(pdf, light_pdf));
+}
+
+// Alpha of a path is 1 where an environment shows, and where the path meets a surface that does not merely let it pass.
+KFN bool keeps_coverage(const Tracer *t) { return t->job->coverage || (t->scene->drops && !t->derivative); }
+
+KFN void cover(Tracer *t, Int slot, Mask m) { f_scatter(t->ws.coverage, slot, f_set(1), m); }
+
+// The ray to a light: it starts off the surface and aims at the same point, or it would pass or meet the light itself.
+KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
+    ray->o = interaction_offset(si, d);
+    Vec3 to_light = v3_sub(v3_madd(si->p, distance, d), ray->o);
+    Float length = f_sqrt(v3_dot(to_light, to_light));
+    ray->d = v3_scale(to_light, f_safe_rcp(length));
+    ray->tmax = length * (1.0f - SHADOW_SHORT);
+}
+
+// Appends the shadow rays of m: what they bring, to whom, and the media that they start in.
+KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t record, Int medium, Mask m) {
+    Shadows *q = &t->ws.shadows;
+    int32_t at = t->shadow_count;
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray->o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, ray->d, m);
+    f_compress(q->tmax + at, ray->tmax, m);
+    spec_compress(q->radiance, at, l, m);
+    i_compress(q->slot + at, slot, m);
+    i_compress(q->record + at, i_iota() + record, m);
+    if (t->scene->has_media) {
+        i_compress(q->medium + at, medium, m);
+    }
+    t->shadow_count += m_count(m);
+}
+
+// The light sample of a vertex; its weight is multiplied by the transmittance once that is known.
+KFN void record_light(Tracer *t, int32_t record, Int light, const LightSample *s, Float weight, Spec f) {
+    Records *r = &t->ws.records;
+    i_store(r->light + record, light);
+    i_store(r->lprim + record, s->prim);
+    f_store(r->ldx + record, s->d.x);
+    f_store(r->ldy + record, s->d.y);
+    f_store(r->ldz + record, s->d.z);
+    f_store(r->lu + record, s->uv.x);
+    f_store(r->lv + record, s->uv.y);
+    f_store(r->ldist + record, s->distance);
+    spec_store(r->light_weight, record, spec_set(weight));
+    spec_store(r->light_f, record, f);
+}
+
+// How a batch of paths goes on from its vertices.
+typedef struct Onward {
+    Vec3 d;
+    BsdfSample sample;
+    Spec f, beta;                            // value of the scattering function; throughput
+    Float pdf, rcp, eta2, roulette;          // density; 1 / (density x survival)
+    Int depth;
+    Mask m, passed;                          // lanes that go on; that went through a surface undeviated
+} Onward;
+
+// Roulette from rr_depth on.
+KFN void play_roulette(const Tracer *t, const SampleKey *key, int32_t bounce, Onward *w) {
+    const SceneView *scene = t->scene;
+    if (bounce + 1 < scene->rr_depth) {
+        return;
+    }
+    Float q = f_min(w->roulette * w->eta2, f_set(0.95f));
+    if (scene->through) {
+        q = f_select(mi_lt(i_set(scene->rr_depth), w->depth), q, f_set(1));
+    }
+    w->m = w->m & m_lt(rng_1d(key, dimension(bounce, PURPOSE_ROULETTE)), q);
+    Float survival = f_safe_rcp(q);
+    w->beta = spec_scale(w->beta, survival);
+    w->roulette = w->roulette * survival;
+    w->rcp = w->rcp * survival;
+}
+
+// The paths of w->m go on from p, off which o lies, in their media.
+KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *w, Int medium, int32_t at) {
+    Paths *next = &t->ws.paths[1 - t->current];
+    // Lights are weighed as seen from the last vertex that turned the path.
+    Vec3 origin = p;
+    Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(PDF_DELTA));
+    if (t->scene->hide_emitters && !t->scene->solid) {
+        Mask absent = mi_eq(w->sample.lobe & 3, i_set(LOBE_NULL)) & m_le(v->pdf, f_set(PDF_VIEWED));
+        density = f_select(absent, f_set(PDF_VIEWED), density);
+    }
+    if (t->scene->through) {
+        origin = v3_select(w->passed, v->origin, p);
+        density = f_select(w->passed, v->pdf, density);
+        i_compress(next->depth + at, w->depth, w->m);
+    }
+    v3_compress(next->ox + at, next->oy + at, next->oz + at, o, w->m);
+    v3_compress(next->dx + at, next->dy + at, next->dz + at, w->d, w->m);
+    v3_compress(next->px + at, next->py + at, next->pz + at, origin, w->m);
+    f_compress(next->tmax + at, f_set(INFINITY), w->m);
+    spec_compress(next->beta, at, w->beta, w->m);
+    f_compress(next->eta2 + at, w->eta2, w->m);
+    f_compress(next->roulette + at, w->roulette, w->m);
+    f_compress(next->pdf + at, density, w->m);
+    i_compress(next->slot + at, v->slot, w->m);
+    if (t->scene->has_media) {
+        i_compress(next->medium + at, medium, w->m);
+    }
+}
+
+KFN void record_onward(Tracer *t, int32_t record, const Onward *w) {
+    Records *r = &t->ws.records;
+    f_store(r->wox + record, w->d.x);
+    f_store(r->woy + record, w->d.y);
+    f_store(r->woz + record, w->d.z);
+    f_store(r->sw + record, f_zero_unless(w->m, w->rcp));
+    spec_store(r->weight, record, spec_zero_unless(w->m, spec_scale(w->f, w->rcp)));
+    i_store(r->lobe + record, w->sample.lobe);
+}
