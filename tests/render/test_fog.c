@@ -1,0 +1,198 @@
+// Participating media in closed form: a slab's transmittance, single scattering and emission, a furnace, and the derivatives
+// of all of these, also where the slab is empty. What is refused.
+#include "rooms.h"
+
+#include <stdlib.h>
+
+enum { PIXELS = 16, SETS = 16, MOST_DEFINES = 10 };
+
+static const double pi = 3.14159265358979323846;
+
+typedef struct Case {
+    const char *text; // of the message
+    rey_define defines[MOST_DEFINES];
+    double value[3];
+    const char *param;
+    float tangent[3];
+    double derivative[3];
+} Case;
+
+static Room slab_open(const rey_define *defines, int threads) {
+    rey_context_def def = rey_default_context_def();
+    def.threads = threads;
+    Room room;
+    int count = 0;
+    while (count < MOST_DEFINES && defines[count].name) {
+        count++;
+    }
+    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
+    if (rey_scene_load(room.ctx, RENDER_DIR "/slab.xml", defines, count, &room.scene) != REY_OK) {
+        fail_msg("%s", rey_error(room.ctx));
+    }
+    return room;
+}
+
+// Mean over pixels and independent seeds, with its standard error; with tangent null of the picture.
+static void mean_of(Room room, int param, const float *tangent, int spp, double *mean, double *error) {
+    double sum[3] = {0}, squares[3] = {0};
+    for (int s = 0; s < SETS; s++) {
+        float image[3 * PIXELS];
+        rey_render_def def = def_make(spp, (uint32_t)s, 1);
+        ok(room, tangent ? rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL)
+                         : rey_render(room.scene, &def, image, NULL));
+        for (int c = 0; c < 3; c++) {
+            double one = 0;
+            for (int i = 0; i < PIXELS; i++) {
+                one += (double)image[3 * i + c] / PIXELS;
+            }
+            sum[c] += one;
+            squares[c] += one * one;
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        mean[c] = sum[c] / SETS;
+        error[c] = sqrt(fmax(squares[c] / SETS - mean[c] * mean[c], 0) / (SETS - 1));
+    }
+}
+
+static void expect(const Case *c, const char *what, const double *mean, const double *error, const double *expected,
+                   double scale) {
+    for (int k = 0; k < 3; k++) {
+        double off = fabs(mean[k] - expected[k]);
+        if (off > 4 * error[k] + 2e-4 * scale || error[k] > 0.02 * scale) {
+            fail_msg("%s, %s, channel %d: %.6g +- %.2g, expected %.6g", c->text, what, k, mean[k], error[k], expected[k]);
+        }
+    }
+}
+
+static double largest(const double *v) { return fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2])); }
+
+// The case in both kinds of medium: one is followed in closed form, the other is tracked.
+static void judge(Case c) {
+    static const char *const kinds[] = {"homogeneous", "heterogeneous"};
+    for (int k = 0; k < 2; k++) {
+        int count = 0;
+        while (c.defines[count].name && strcmp(c.defines[count].name, "kind") != 0) {
+            count++;
+        }
+        c.defines[count] = (rey_define){"kind", kinds[k]};
+        Room room = slab_open(c.defines, 2);
+        double mean[3], error[3];
+        mean_of(room, -1, NULL, 1024, mean, error);
+        expect(&c, kinds[k], mean, error, c.value, fmax(largest(c.value), 1e-3));
+        int param = rey_param_find(room.scene, c.param);
+        assert_true(param >= 0);
+        mean_of(room, param, c.tangent, 1024, mean, error);
+        expect(&c, c.param, mean, error, c.derivative, fmax(largest(c.derivative), largest(c.value)));
+        room_close(room);
+    }
+}
+
+static const double sigma[3] = {0.3, 0.6, 0.9};
+
+// I = exp(-2 sigma)
+static void test_transmittance(void **state) {
+    UNUSED(state);
+    Case c = {"transmittance", {{"sky", "1"}}, {0}, "fog.sigma_t.value.value", {1, 1, 1}, {0}};
+    for (int k = 0; k < 3; k++) {
+        c.value[k] = exp(-2 * sigma[k]);
+        c.derivative[k] = -2 * c.value[k];
+    }
+    judge(c);
+}
+
+// Of light that comes back, p the phase function there: I = a p E (1 - exp(-4 sigma)) / 2
+static void test_single_scattering(void **state) {
+    UNUSED(state);
+    const double albedo[3] = {0.9, 0.5, 0.2}, g = 0.3, p = (1 - g * g) / (4 * pi * pow(1 + g, 3)), light = 5;
+    const double dp = -2 * g / (4 * pi * pow(1 + g, 3)) - 3 * p / (1 + g);
+    Case by_density = {"scattering", {{"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}}, {0},
+                       "fog.sigma_t.value.value", {1, 1, 1}, {0}};
+    Case by_albedo = by_density, by_g = by_density;
+    by_albedo.param = "fog.albedo.value.value";
+    by_g.param = "fog.phase_function.g.value";
+    for (int k = 0; k < 3; k++) {
+        double once = (1 - exp(-4 * sigma[k])) / 2 * light;
+        by_density.value[k] = by_albedo.value[k] = by_g.value[k] = albedo[k] * p * once;
+        by_density.derivative[k] = albedo[k] * p * light * 2 * exp(-4 * sigma[k]);
+        by_albedo.derivative[k] = p * once;
+        by_g.derivative[k] = albedo[k] * dp * once;
+    }
+    judge(by_density);
+    judge(by_albedo);
+    judge(by_g);
+}
+
+// The same where there is nothing yet: dI / d scale = 2 sigma a p E at scale 0.
+static void test_empty(void **state) {
+    UNUSED(state);
+    const double albedo[3] = {0.9, 0.5, 0.2}, g = 0.3, p = (1 - g * g) / (4 * pi * pow(1 + g, 3));
+    Case c = {"empty", {{"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}, {"scale", "0"}}, {0},
+              "fog.scale.value", {1}, {0}};
+    Case dark = {"empty, before a sky", {{"sky", "1"}, {"scale", "0"}}, {1, 1, 1}, "fog.scale.value", {1}, {0}};
+    for (int k = 0; k < 3; k++) {
+        c.derivative[k] = 2 * sigma[k] * albedo[k] * p * 5;
+        dark.derivative[k] = -2 * sigma[k];
+    }
+    judge(c);
+    judge(dark);
+}
+
+// I = j (1 - exp(-2 sigma)) / sigma, and 2 j where the slab is empty; dI / d sigma = -2 j there.
+static void test_emission(void **state) {
+    UNUSED(state);
+    Case c = {"emission", {{"emission", "0.5"}}, {0}, "fog.emission.value.value", {1}, {0}}, dense = c;
+    dense.param = "fog.sigma_t.value.value";
+    dense.tangent[0] = dense.tangent[1] = dense.tangent[2] = 1;
+    for (int k = 0; k < 3; k++) {
+        double s = sigma[k], e = exp(-2 * s);
+        c.derivative[k] = (1 - e) / s;
+        c.value[k] = dense.value[k] = 0.5 * c.derivative[k];
+        dense.derivative[k] = 0.5 * (2 * e * s - (1 - e)) / (s * s);
+    }
+    judge(c);
+    judge(dense);
+    Case empty = {"emission of an empty slab", {{"emission", "0.5"}, {"scale", "0"}}, {1, 1, 1}, "fog.scale.value", {1}, {0}};
+    for (int k = 0; k < 3; k++) {
+        empty.derivative[k] = -sigma[k];
+    }
+    judge(empty);
+}
+
+// Light that is the same everywhere stays so where nothing is absorbed, however dense the fog is.
+static void test_furnace(void **state) {
+    UNUSED(state);
+    Case c = {"furnace", {{"albedo", "1, 1, 1"}, {"sky", "1"}, {"scale", "3"}}, {1, 1, 1}, "fog.sigma_t.value.value",
+              {1, 1, 1}, {0}};
+    judge(c);
+}
+
+static void refused(const rey_define *defines, const char *param, const char *why) {
+    float image[3 * PIXELS], tangent[64] = {1};
+    Room room = slab_open(defines, 1);
+    int id = rey_param_find(room.scene, param);
+    rey_render_def def = def_make(1, 0, 1);
+    def.terms = 0;
+    assert_true(id >= 0);
+    assert_int_not_equal(rey_jvp(room.scene, &def, (rey_selection){&id, 1}, tangent, image, NULL, NULL), REY_OK);
+    if (!strstr(rey_error(room.ctx), why)) {
+        fail_msg("%s", rey_error(room.ctx));
+    }
+    room_close(room);
+}
+
+static void test_refusals(void **state) {
+    UNUSED(state);
+    const rey_define fog[MOST_DEFINES] = {{"kind", "heterogeneous"}}, particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
+    refused(fog, "slab.to_world", "participating media");
+    refused(fog, "camera.to_world", "participating media");
+    refused(fog, "fog.sigma_t.to_world", "participating media");
+    refused(particles, "fog.scale.value", "'ptracer' knows no participating media");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
+                                       cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
+                                       cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
