@@ -1,6 +1,6 @@
 // facts.c: tabulated numbers: spectra, named materials, fields of view, filters, texture and environment lookups; and
 // the scenes that must load.
-#include "conformance.h"
+#include "facts.h"
 
 #include "base/context.h"
 #include "io/image.h"
@@ -15,14 +15,7 @@
 #include <string.h>
 #include <unistd.h>
 
-// How many numbers of one table agree.
-typedef struct Tally {
-    int tested, agreed;
-    double worst;    // largest error over its tolerance
-    char first[128]; // what disagreed first
-} Tally;
-
-static void tally(Tally *t, const char *what, double value, double expected, double tolerance) {
+void facts_tally(Tally *t, const char *what, double value, double expected, double tolerance) {
     double error = fabs(value - expected) / tolerance;
     bool good = error <= 1;
     t->tested++;
@@ -33,19 +26,19 @@ static void tally(Tally *t, const char *what, double value, double expected, dou
     }
 }
 
-static void report_tally(Suite *suite, const char *name, const Tally *t) {
+void facts_report(Suite *suite, const char *name, const Tally *t) {
     bool passed = t->tested > 0 && t->agreed == t->tested;
     suite_report(suite, name, passed ? VERDICT_PASS : VERDICT_FAIL, true,
                  "%d of %d numbers, worst error %.3g tolerances%s", t->agreed, t->tested, t->worst, t->first);
 }
 
-static JsonNode *read_facts(const Suite *suite, const char *name) {
+JsonNode *facts_read(const Suite *suite, const char *name) {
     char path[4096];
     snprintf(path, sizeof path, "%s/facts/%s", suite->folder, name);
     return access(path, R_OK) ? NULL : json_read(path);
 }
 
-static double item(const JsonNode *array, int i) {
+double facts_item(const JsonNode *array, int i) {
     const JsonNode *node = array ? array->first : NULL;
     for (; node && i > 0; i--) {
         node = node->next;
@@ -56,7 +49,7 @@ static double item(const JsonNode *array, int i) {
 /* ---- spectra and materials ----------------------------------------------------------------------------------- */
 
 static void run_named_ior(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "named_ior.json");
+    JsonNode *root = facts_read(suite, "named_ior.json");
     Tally t = {0};
     const JsonNode *table = json_get(root, "ior");
     for (const JsonNode *n = table ? table->first : NULL; n; n = n->next) {
@@ -64,53 +57,53 @@ static void run_named_ior(Suite *suite, const char *name) {
         char word[64];
         snprintf(word, sizeof word, "%s", n->key);
         word[0] = (char)toupper(word[0]); // names have no case
-        tally(&t, n->key, rey_named_ior(word, &ior) ? ior : NAN, n->number, 1e-6);
+        facts_tally(&t, n->key, rey_named_ior(word, &ior) ? ior : NAN, n->number, 1e-6);
     }
-    report_tally(suite, name, &t);
+    facts_report(suite, name, &t);
     json_free(root);
 }
 
 static void run_metals(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "rgb_from_spectra.json");
+    JsonNode *root = facts_read(suite, "rgb_from_spectra.json");
     Tally t = {0};
     const JsonNode *table = json_get(root, "metals");
     for (const JsonNode *n = table ? table->first : NULL; n; n = n->next) {
         double eta[3] = {NAN, NAN, NAN}, k[3] = {NAN, NAN, NAN};
         rey_named_metal(n->key, eta, k);
         for (int c = 0; c < 3; c++) {
-            double e = item(json_get(n, "eta"), c), f = item(json_get(n, "k"), c);
-            tally(&t, n->key, eta[c], e, 1e-5 * fabs(e) + 2e-6);
-            tally(&t, n->key, k[c], f, 1e-5 * fabs(f) + 2e-6);
+            double e = facts_item(json_get(n, "eta"), c), f = facts_item(json_get(n, "k"), c);
+            facts_tally(&t, n->key, eta[c], e, 1e-5 * fabs(e) + 2e-6);
+            facts_tally(&t, n->key, k[c], f, 1e-5 * fabs(f) + 2e-6);
         }
     }
-    report_tally(suite, name, &t);
+    facts_report(suite, name, &t);
     json_free(root);
 }
 
 static void run_spectra(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "spectra.json");
+    JsonNode *root = facts_read(suite, "spectra.json");
     Tally t = {0};
     double xyz[3], temperature = json_value(root, "blackbody.temperature", 0);
     rey_cie1931(json_value(root, "cie1931.wavelength", 0), xyz);
     for (int i = 0; i < 3; i++) {
-        tally(&t, "colour matching", xyz[i], item(json_path(root, "cie1931.xyz"), i),
+        facts_tally(&t, "colour matching", xyz[i], facts_item(json_path(root, "cie1931.xyz"), i),
               json_value(root, "cie1931.atol", 0));
     }
     for (int i = 0; i < 4; i++) {
-        double d65 = item(json_path(root, "d65.values"), i), black = item(json_path(root, "blackbody.values"), i);
-        tally(&t, "D65", rey_d65(item(json_path(root, "d65.wavelengths"), i)), d65, 1e-3 * fabs(d65) + 1e-5);
-        tally(&t, "black body", rey_blackbody(item(json_path(root, "blackbody.wavelengths"), i), temperature), black,
+        double d65 = facts_item(json_path(root, "d65.values"), i), black = facts_item(json_path(root, "blackbody.values"), i);
+        facts_tally(&t, "D65", rey_d65(facts_item(json_path(root, "d65.wavelengths"), i)), d65, 1e-3 * fabs(d65) + 1e-5);
+        facts_tally(&t, "black body", rey_blackbody(facts_item(json_path(root, "blackbody.wavelengths"), i), temperature), black,
               1e-3 * fabs(black) + 1e-5);
     }
-    tally(&t, "D65 normalisation", REY_D65_SCALE, json_value(root, "d65.normalisation", 0), 1e-9);
-    report_tally(suite, name, &t);
+    facts_tally(&t, "D65 normalisation", REY_D65_SCALE, json_value(root, "d65.normalisation", 0), 1e-9);
+    facts_report(suite, name, &t);
     json_free(root);
 }
 
 /* ---- small scenes ------------------------------------------------------------------------------------------- */
 
 // Loads a scene from text; folder is where its files are looked up.
-static rey_result load_text(Suite *suite, const char *text, rey_scene **scene) {
+rey_result facts_load(Suite *suite, const char *text, rey_scene **scene) {
     char path[] = "/tmp/reynolds-conformance-XXXXXX";
     int descriptor = mkstemp(path);
     FILE *file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
@@ -148,25 +141,25 @@ static double scene_fov(Suite *suite, const JsonNode *fact, rey_result *result) 
              "<integer name=\"width\" value=\"%d\"/><integer name=\"height\" value=\"%d\"/></film></sensor></scene>",
              fov, (int)(aspect * 64), 64);
     rey_scene *scene = NULL;
-    *result = load_text(suite, text, &scene);
+    *result = facts_load(suite, text, &scene);
     double value = *result ? NAN : param_value(scene, "camera.x_fov", 0);
     rey_scene_destroy(scene);
     return value;
 }
 
 static void run_fov(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "sensor.json");
+    JsonNode *root = facts_read(suite, "sensor.json");
     const JsonNode *list = json_get(root, "fov");
     Tally t = {0};
     rey_result result = REY_OK;
     for (const JsonNode *fact = list ? list->first : NULL; fact && !result; fact = fact->next) {
         double expected = json_value(fact, "x_fov", 0);
-        tally(&t, "x_fov", scene_fov(suite, fact, &result), expected, 1e-5 * expected);
+        facts_tally(&t, "x_fov", scene_fov(suite, fact, &result), expected, 1e-5 * expected);
     }
     if (result) {
         suite_report_failure(suite, name, result, true);
     } else {
-        report_tally(suite, name, &t);
+        facts_report(suite, name, &t);
     }
     json_free(root);
 }
@@ -180,11 +173,11 @@ static rey_result load_filter(Suite *suite, const char *type, const char *inside
              "type=\"%s\">%s</rfilter></film>"
              "</sensor></scene>",
              type, inside);
-    return load_text(suite, text, scene);
+    return facts_load(suite, text, scene);
 }
 
 static void run_filters(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "film.json");
+    JsonNode *root = facts_read(suite, "film.json");
     const JsonNode *list = json_get(root, "rfilter");
     Tally t = {0};
     rey_result result = REY_OK;
@@ -195,16 +188,16 @@ static void run_filters(Suite *suite, const char *name) {
         const JsonNode *at = json_get(fact, "at");
         for (const JsonNode *p = at ? at->first : NULL; p && !result; p = p->next) {
             const SensorRecord *sensor = scene->view.sensors;
-            double x = item(p, 0), tolerance = item(p, 2);
+            double x = facts_item(p, 0), tolerance = facts_item(p, 2);
             double value = x > (double)sensor->filter_radius ? 0 : (double)filter_eval(sensor, (float)x);
-            tally(&t, type, value, item(p, 1), isnan(tolerance) ? 1e-5 : tolerance);
+            facts_tally(&t, type, value, facts_item(p, 1), isnan(tolerance) ? 1e-5 : tolerance);
         }
         rey_scene_destroy(scene);
     }
     if (result) {
         suite_report_failure(suite, name, result, true);
     } else {
-        report_tally(suite, name, &t);
+        facts_report(suite, name, &t);
     }
     json_free(root);
 }
@@ -223,7 +216,7 @@ static rey_result test_bitmap(Suite *suite, const JsonNode *fact, Tally *t) {
         "value=\"%s\"/></texture></bsdf></shape></scene>",
         suite->folder, file);
     rey_scene *scene = NULL;
-    rey_result result = load_text(suite, text, &scene);
+    rey_result result = facts_load(suite, text, &scene);
     int param = result ? -1 : rey_param_find(scene, "b.reflectance.data");
     if (!result && param < 0) {
         result = rey_fail(suite->ctx, REY_ERROR_PARAM, "there is no parameter b.reflectance.data");
@@ -232,17 +225,17 @@ static rey_result test_bitmap(Suite *suite, const JsonNode *fact, Tally *t) {
         rey_param_info info;
         rey_param_get_info(scene, param, &info);
         int64_t channels = info.shape[2],
-                at = ((int64_t)item(pixel, 1) * info.shape[1] + (int64_t)item(pixel, 0)) * channels;
+                at = ((int64_t)facts_item(pixel, 1) * info.shape[1] + (int64_t)facts_item(pixel, 0)) * channels;
         double sum = 0;
         for (int64_t c = 0; c < channels && c < 3; c++) {
             double value = param_value(scene, "b.reflectance.data", at + c);
             sum += channels == 1 ? value : luminance[c] * value;
             if (rgb) {
-                tally(t, file, value, item(rgb, (int)c), json_value(fact, "atol", 1e-4));
+                facts_tally(t, file, value, facts_item(rgb, (int)c), json_value(fact, "atol", 1e-4));
             }
         }
         if (!rgb) {
-            tally(t, file, sum, json_value(fact, "eval_1", NAN), json_value(fact, "atol", 1e-4));
+            facts_tally(t, file, sum, json_value(fact, "eval_1", NAN), json_value(fact, "atol", 1e-4));
         }
     }
     rey_scene_destroy(scene);
@@ -250,7 +243,7 @@ static rey_result test_bitmap(Suite *suite, const JsonNode *fact, Tally *t) {
 }
 
 static void run_bitmaps(Suite *suite, const char *name) {
-    JsonNode *root = read_facts(suite, "textures_volumes_emitters.json");
+    JsonNode *root = facts_read(suite, "textures_volumes_emitters.json");
     const JsonNode *list = json_get(root, "bitmap");
     Tally t = {0};
     rey_result result = REY_OK;
@@ -270,7 +263,7 @@ static void run_bitmaps(Suite *suite, const char *name) {
     if (result) {
         suite_report_failure(suite, name, result, true);
     } else if (t.tested > 0) {
-        report_tally(suite, name, &t);
+        facts_report(suite, name, &t);
     }
     json_free(root);
 }
@@ -306,14 +299,14 @@ static rey_result look_at_envmap(Suite *suite, const char *file, const float *ma
         "value=\"%s\"/></emitter></scene>",
         sin(2 * pi * u) * sin(pi * v), cos(pi * v), -cos(2 * pi * u) * sin(pi * v), file);
     rey_scene *scene = NULL;
-    rey_result result = load_text(suite, text, &scene);
+    rey_result result = facts_load(suite, text, &scene);
     if (!result) {
         rey_render_def def = rey_default_render_def();
         def.spp = 16;
         result = rey_render(scene, &def, image, NULL);
     }
     if (!result) {
-        tally(t, "radiance", (double)image[0], envmap_at(map, u, v), 1e-3);
+        facts_tally(t, "radiance", (double)image[0], envmap_at(map, u, v), 1e-3);
     }
     rey_scene_destroy(scene);
     return result;
@@ -336,7 +329,7 @@ static void run_envmap(Suite *suite, const char *name) {
     if (result) {
         suite_report_failure(suite, name, result, true);
     } else {
-        report_tally(suite, name, &t);
+        facts_report(suite, name, &t);
     }
     if (descriptor >= 0) {
         close(descriptor);
@@ -398,6 +391,8 @@ void run_facts(Suite *suite) {
         {"facts/film filters", "film.json", run_filters},
         {"facts/textures bitmap", "textures_volumes_emitters.json", run_bitmaps},
         {"facts/emitters envmap", "", run_envmap},
+        {"facts/volumes", "textures_volumes_emitters.json", run_volume_facts},
+        {"facts/phases", "textures_volumes_emitters.json", run_phase_facts},
     };
     char folder[4096];
     snprintf(folder, sizeof folder, "%s/facts", suite->folder);
