@@ -15,7 +15,6 @@ import numpy as np
 import scenes
 
 REPEATS = 3
-SIZE = 512
 SPP = 16
 FOLDER = "build/bench"
 ROWS = ("primal", "equal_error", "gradients", "cold", "loading")
@@ -74,8 +73,8 @@ def process(command, kilobytes):
 
 
 def agree(ours, theirs):
-    """Means within 1 %, and most blocks of 16 x 16 pixels within 10 %."""
-    a, b = (x.reshape(32, 16, 32, 16, 3).mean((1, 3, 4)) for x in (ours, theirs))
+    """Means within 1 %, and most of 32 x 32 blocks of pixels within 10 %."""
+    a, b = (x.reshape(32, len(x) // 32, 32, len(x) // 32, 3).mean((1, 3, 4)) for x in (ours, theirs))
     near = np.abs(a - b) <= 0.1 * np.maximum(np.abs(b), 0.02)
     return abs(ours.mean() / theirs.mean() - 1) < 0.01 and near.mean() > 0.95
 
@@ -93,6 +92,7 @@ class Pair:
         self.mi, self.dr, self.name, self.scene = mi, dr, name, scene
         self.loaded = mi.load_file(scene.path, **scene.defines)
         self.out = os.path.join(FOLDER, "ours.npy")
+        self.pixels = scene.size ** 2
         self.same = True
 
     def row(self, what, theirs, ours):
@@ -122,9 +122,9 @@ class Pair:
     def primal(self):
         rate = 0
         for spp in (SPP, 4 * SPP):
-            rate = max(rate, SIZE * SIZE * spp / best(lambda s: self.render(spp, s)) / 1e6)
+            rate = max(rate, self.pixels * spp / best(lambda s: self.render(spp, s)) / 1e6)
             self.dr.flush_malloc_cache()
-        mine = statistics.median(SIZE * SIZE * SPP / self.ours(SPP, s)[0]["seconds"] / 1e6 for s in range(REPEATS))
+        mine = statistics.median(self.pixels * SPP / self.ours(SPP, s)[0]["seconds"] / 1e6 for s in range(REPEATS))
         self.same = agree(self.ours(64, 9)[1], np.array(self.render(64, 9))[..., :3])
         self.row("primal [Mpaths/s]", rate, mine)
 
@@ -141,11 +141,12 @@ class Pair:
         mi, dr = self.mi, self.dr
         parameters = mi.traverse(self.loaded)
         keys = [k for k in self.scene.parameters if k in parameters]
-        integrator = mi.load_dict({"type": "ptracer" if self.name == "particles" else "prb", "max_depth": 8, "rr_depth": 5})
+        kind = "ptracer" if self.name == "particles" else "prbvolpath" if self.name in ("cloud", "fog") else "prb"
+        integrator = mi.load_dict({"type": kind, "max_depth": self.scene.depth, "rr_depth": self.scene.rr_depth})
         for k in keys:
             dr.enable_grad(parameters[k])
         parameters.update()
-        ones = dr.ones(mi.TensorXf, (SIZE, SIZE, 3))
+        ones = dr.ones(mi.TensorXf, (self.scene.size, self.scene.size, 3))
 
         def finish():
             dr.eval(*[dr.grad(parameters[k]) for k in keys])
@@ -168,7 +169,7 @@ class Pair:
             dr.eval(integrator.render_forward(self.loaded, parameters, seed=seed, spp=SPP))
             dr.sync_thread()
 
-        paths = SIZE * SIZE * SPP / 1e6
+        paths = self.pixels * SPP / 1e6
         arguments = [x for k in keys for x in ("--param", k)] + ["--spp", str(SPP)] + defines(self.scene)
         grads = [reynolds("grad", self.scene.path, *arguments, "--mode", "reverse", "--adjoint", "1") for _ in range(REPEATS)]
         reverse = statistics.median(paths / g["seconds"] for g in grads)
@@ -190,7 +191,7 @@ class Pair:
             with open(self.scene.path) as f:
                 text = f.read()
             for side in ("width", "height"):
-                text = text.replace('name="%s" value="%d"' % (side, SIZE), 'name="%s" value="%d"' % (side, size))
+                text = text.replace('name="%s" value="%d"' % (side, self.scene.size), 'name="%s" value="%d"' % (side, size))
             with open(path, "w") as f:
                 f.write(text)
         code = COLD % (path, settings, os.path.join(FOLDER, "peer.exr"), SPP)

@@ -1,5 +1,6 @@
 """The benchmark scenes: Cornell box, the same by light tracing, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky, 16
-principled spheres under a sky, a forest of 100,000 instances, and the matpreview scene of the conformance folder."""
+principled spheres under a sky, a forest of 100,000 instances, a cloud of 64^3 cells, the box with fog in it, and the matpreview
+scene of the conformance folder."""
 import collections
 import importlib.util
 import math
@@ -13,7 +14,7 @@ assets = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(assets)
 
 HEAD = """<scene version="3.0.0">
-<integrator type="%(integrator)s"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="5"/></integrator>
+<integrator type="%(integrator)s"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="%(rr_depth)d"/></integrator>
 <sensor type="perspective"><float name="fov" value="39.3"/><float name="near_clip" value="%(near)g"/><float name="far_clip" value="5000"/>
 <transform name="to_world"><lookat origin="%(origin)s" target="%(target)s" up="%(up)s"/></transform>
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
@@ -104,8 +105,34 @@ def forest(count=100000):
     return "\n".join(text) + SKY_Z
 
 
-# path and definitions of a scene, and what its derivatives are taken with respect to.
-Scene = collections.namedtuple("Scene", "path defines parameters")
+def write_cloud(path, n=64):
+    """A VOL file of densities in [0, 1]: a ball of waves, empty towards the corners."""
+    values = []
+    for k in range(n):
+        for j in range(n):
+            for i in range(n):
+                x, y, z = (2 * (v + 0.5) / n - 1 for v in (i, j, k))
+                waves = math.sin(5 * x + 3 * y) * math.sin(4 * y - 5 * z) + 0.6 * math.sin(11 * z + 7 * x) * math.sin(9 * y)
+                values.append(min(1, max(0, 1.1 - 1.4 * (x * x + y * y + z * z) + 0.35 * waves)))
+    with open(path, "wb") as f:
+        f.write(struct.pack("<3sB5i6f", b"VOL", 3, 1, n, n, n, 1, 0, 0, 0, 1, 1, 1))
+        f.write(struct.pack("<%df" % len(values), *values))
+
+
+CLOUD = """<shape type="cube"><bsdf type="null"/><medium name="interior" type="heterogeneous" id="cloud">
+<volume name="sigma_t" type="gridvolume"><string name="filename" value="cloud.vol"/>
+<transform name="to_world"><scale value="2"/><translate value="-1"/></transform></volume>
+<rgb name="albedo" value="0.97 0.98 0.99"/><float name="scale" value="20"/><phase type="hg"><float name="g" value="0.5"/></phase></medium></shape>
+<emitter type="constant"><rgb name="radiance" value="0.4 0.5 0.7"/></emitter>
+<emitter type="directional"><vector name="direction" value="0.3 -1 0.5"/><rgb name="irradiance" value="3 2.8 2.5"/></emitter>
+"""
+# Between the walls, under the lamp.
+FOG = """<shape type="cube"><transform name="to_world"><scale x="270" y="270" z="274"/><translate x="277" y="273" z="279"/></transform>
+<bsdf type="null"/><medium name="interior" type="homogeneous" id="fog"><rgb name="sigma_t" value="0.003"/><rgb name="albedo" value="0.9"/></medium></shape>
+"""
+
+# path and definitions of a scene, what its derivatives are taken with respect to, its depths, and its width and height.
+Scene = collections.namedtuple("Scene", "path defines parameters depth rr_depth size", defaults=(8, 5, 512))
 
 
 def conformance():
@@ -125,9 +152,11 @@ def make(folder):
     if not os.path.exists(os.path.join(folder, "blob1m.ply")):
         write_blob(os.path.join(folder, "blob1m.ply"), 700, 714, (0, 0, 0), 1)
     write_tree(os.path.join(folder, "tree.obj"))
+    write_cloud(os.path.join(folder, "cloud.vol"))
     assets.write_exr(os.path.join(folder, "sky.exr"), 256, 512, assets.environment(random.Random(3)))
-    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "up": "0, 1, 0", "near": 10, "depth": 8, "size": 512,
-           "integrator": "path"}
+    box = {"origin": "278, 273, -800", "target": "278, 273, 0", "up": "0, 1, 0", "near": 10, "depth": 8, "rr_depth": 5,
+           "size": 512, "integrator": "path"}
+    air = dict(box, integrator="volpath", size=256, depth=64, rr_depth=64)
     board = dict(box, origin="0, -13, 9", target="0, 0, 0.3", up="0, 0, 1", near=0.01)
     cornell = (WALLS + '<shape type="obj"><string name="filename" value="block.obj"/><boolean name="face_normals" value="true"/>'
                '<ref id="white"/></shape>')
@@ -141,12 +170,14 @@ def make(folder):
                     '<string name="filename" value="blob1m.ply"/><ref id="metal"/></shape>' + SKY, ["metal.alpha.value"]),
         "spheres": (board, spheres(), ["ball%d.roughness.value" % i for i in range(16)]),
         "forest": (dict(board, origin="0, -60, 12", target="0, 0, 0"), forest(), ["leaf.reflectance.value"]),
+        "cloud": (dict(air, origin="0, 1, -4.5", target="0, 0, 0", near=0.01), CLOUD, ["cloud.sigma_t.data"]),
+        "fog": (dict(air, depth=16), cornell + FOG, ["fog.sigma_t.value.value"]),
     }
     made = {}
     for name, (head, body, parameters) in scenes.items():
         path = os.path.join(folder, name.replace("+", "_") + ".xml")
         with open(path, "w") as f:
             f.write(HEAD % head + body + "\n</scene>\n")
-        made[name] = Scene(path, {}, parameters)
+        made[name] = Scene(path, {}, parameters, head["depth"], head["rr_depth"], head["size"])
     made.update(conformance())
     return made
