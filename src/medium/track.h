@@ -19,7 +19,12 @@ typedef struct Track {
     const MediumNode *medium;
     const VolumeNode *sigma_t;
     bool padded;
+    bool roulette; // walks whose transmittance is small end by chance, and those that go on count more
 } Track;
+
+// Transmittances below this play roulette, with numbers of their own.
+#define DIM_TRANSMITTANCE 0.2f
+#define DIMENSION_ROULETTE 0x40000000u
 
 // Of padded walks: the optical depth of a whole walk, and the probability of real collisions, are at least this much.
 #define PADDED_DEPTH 0.5f
@@ -69,6 +74,11 @@ static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float t
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(&random, dimension + i), left);
         Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w)), f_safe_rcp(w.majorant));
         Spec passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
+        if (t->roulette) {
+            Float survival = f_min(spec_max(passed) * (1 / DIM_TRANSMITTANCE), f_set(1));
+            Mask survives = m_lt(rng_1d(&random, dimension + i + DIMENSION_ROULETTE), survival);
+            passed = spec_zero_unless(survives, spec_scale(passed, f_safe_rcp(survival)));
+        }
         transmittance = spec_select(met, passed, transmittance);
         left = met & m_ne(spec_max(transmittance), f_set(0));
     }
