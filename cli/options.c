@@ -2,6 +2,7 @@
 #include "cli.h"
 
 #include "base/context.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -127,24 +128,15 @@ void cli_terms_text(int terms, char *text, size_t size) {
 
 static bool parse_terms(Options *o, const char *text) {
     char all[128];
-    cli_terms_text(REY_TERM_ALL, all, sizeof all);
-    for (const char *s = text;; s++) {
-        size_t length = strcspn(s, ",");
-        int found = 0;
-        for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
-            const char *name = rey_term_name(bit);
-            found |= strlen(name) == length && !strncmp(name, s, length) ? bit : 0;
-        }
-        if (!found) {
-            cli_usage_error(o, "--terms: '%.*s' is none of %s", (int)length, s, all);
-            return false;
-        }
-        o->terms |= found;
-        s += length;
-        if (!*s) {
-            return true;
-        }
+    const char *wrong;
+    int terms = rey_terms_of(text, &wrong);
+    if (!terms) {
+        cli_terms_text(REY_TERM_ALL, all, sizeof all);
+        cli_usage_error(o, "--terms: '%.*s' is none of %s", (int)strcspn(wrong, ","), wrong, all);
+        return false;
     }
+    o->terms |= terms;
+    return true;
 }
 
 static bool parse_define(Options *o, const char *text) {

@@ -55,6 +55,7 @@ static rey_render_def view_def(const Fit *fit, const FitView *view, uint32_t set
     def.set = set;
     def.sampler = REY_SAMPLER_SOBOL;
     def.sets = 1;
+    def.terms = fit->job.terms;
     return def;
 }
 

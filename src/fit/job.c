@@ -2,6 +2,7 @@
 #include "fit/job_fields.h"
 
 #include "io/file.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <string.h>
@@ -294,6 +295,18 @@ static rey_result read_stop(Job *job, const YamlNode *node, void *target) {
     return rey_job_read_map(job, node, "stop", fields, job);
 }
 
+static rey_result read_terms(Job *job, const YamlNode *node, void *target) {
+    const char *text, *wrong;
+    rey_result result = rey_job_read_text(job, node, &text);
+    if (result) {
+        return result;
+    }
+    *(int *)target = rey_terms_of(text, &wrong);
+    return *(int *)target ? REY_OK
+                          : rey_job_fail(job, node, "'%.*s' is no term; expected some of interior,primary,indirect",
+                                         (int)strcspn(wrong, ","), wrong);
+}
+
 static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "scene", .type = FIELD_TEXT, .offset = offsetof(Job, truth_scene), .required = true},
@@ -316,6 +329,7 @@ static const Field job_fields[] = {
     {.key = "views", .type = FIELD_READER, .offset = offsetof(Job, views), .read = read_views, .required = true},
     {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
     {.key = "loss", .type = FIELD_READER, .read = read_loss},
+    {.key = "terms", .type = FIELD_READER, .offset = offsetof(Job, terms), .read = read_terms},
     {.key = "optimizer", .type = FIELD_READER, .offset = offsetof(Job, optimizer), .read = read_optimizer},
     {.key = "parameters",
      .type = FIELD_READER,

@@ -94,6 +94,7 @@ typedef struct Job {
     int view_count;
     LossKind loss;
     double loss_epsilon;
+    int terms; // REY_TERM_ bits that gradients may be made of; 0 = all that they need, or none at all
     JobOptimizer optimizer;
     JobParameter *parameters;
     int parameter_count;

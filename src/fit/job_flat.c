@@ -108,6 +108,17 @@ static void flat_views(Text *t, const Job *job) {
     line_integer(t, "views_per_iteration", job->views_per_iteration ? job->views_per_iteration : job->view_count);
 }
 
+static void flat_terms(Text *t, int terms) {
+    char names[128] = "";
+    for (int bit = 1; bit <= terms; bit <<= 1) {
+        size_t used = strlen(names);
+        if (terms & bit) {
+            snprintf(names + used, sizeof names - used, "%s%s", used ? "," : "", rey_term_name(bit));
+        }
+    }
+    line_text(t, "terms", names);
+}
+
 // What decides the numbers that the optimisation goes through.
 static void flat_decisive(Text *t, const Job *job) {
     char key[512];
@@ -136,6 +147,9 @@ static void flat_decisive(Text *t, const Job *job) {
     line_text(t, "loss.type", rey_loss_name((int)job->loss));
     if (job->loss == LOSS_RELATIVE_L2 || job->loss == LOSS_LOG_L2) {
         line_real(t, "loss.epsilon", job->loss_epsilon);
+    }
+    if (job->terms) {
+        flat_terms(t, job->terms);
     }
     flat_optimizer(t, &job->optimizer);
     for (int i = 0; i < job->parameter_count; i++) {

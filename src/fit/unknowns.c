@@ -156,7 +156,9 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
         return result;
     }
     const int known = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
-    if (!info.terms || (info.terms & ~REY_TERM_TERMINATOR & ~known)) { // jumps are refused when a path meets one
+    // Jumps are refused when a path meets one. A job may say that some of the terms will do.
+    bool enough = job->terms ? (info.terms & REY_TERM_INTERIOR) != 0 : !(info.terms & ~REY_TERM_TERMINATOR & ~known);
+    if (!info.terms || !enough) {
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
     bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;

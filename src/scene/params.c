@@ -224,3 +224,23 @@ const char *rey_term_name(int bit) {
         return NULL;
     }
 }
+
+int rey_terms_of(const char *text, const char **wrong) {
+    int terms = 0;
+    for (*wrong = text;; (*wrong)++) {
+        size_t length = strcspn(*wrong, ",");
+        int found = 0;
+        for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
+            const char *name = rey_term_name(bit);
+            found |= strlen(name) == length && !strncmp(name, *wrong, length) ? bit : 0;
+        }
+        if (!found) {
+            return 0;
+        }
+        terms |= found;
+        *wrong += length;
+        if (!**wrong) {
+            return terms;
+        }
+    }
+}

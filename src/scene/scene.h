@@ -278,6 +278,8 @@ int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int6
 rey_result rey_scene_freeze(rey_scene *scene);
 // Records something that a user should know about how the scene was read; once, however often it is said.
 rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Terms of a list of names with commas between them; 0, and *wrong at its first word that names none.
+int rey_terms_of(const char *text, const char **wrong);
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);
