@@ -37,12 +37,13 @@ static bool show_progress(void *user, const FitProgress *p) {
     return !cli_interrupted() && !terminated;
 }
 
-static void entries_text(const FitRow *row, const float *values, char *text, size_t size) {
+static void entries_text(const FitRow *row, int column, char *text, size_t size) {
+    const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
     text[0] = 0;
-    if (!values) {
-        snprintf(text, size, "-");
-    } else if (rey_fit_pose_text(row, values, text, size)) {
+    if (rey_fit_row_text(row, column, text, size)) {
         return;
+    } else if (!values) {
+        snprintf(text, size, "-");
     } else if (row->count > SHOWN_ENTRIES) {
         double mean = 0;
         for (int64_t i = 0; i < row->count; i++) {
@@ -67,10 +68,12 @@ static void print_table(const FitResult *result) {
     for (size_t i = 0; i < result->rows.count; i++) {
         const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
         char truth[128], start[128], found[128], error[32] = "-";
-        entries_text(row, row->truth, truth, sizeof truth);
-        entries_text(row, row->start, start, sizeof start);
-        entries_text(row, row->found, found, sizeof found);
-        if (row->truth) {
+        entries_text(row, COLUMN_TRUTH, truth, sizeof truth);
+        entries_text(row, COLUMN_START, start, sizeof start);
+        entries_text(row, COLUMN_FOUND, found, sizeof found);
+        if (row->points[COLUMN_TRUTH]) {
+            snprintf(error, sizeof error, "%.3f %% (Chamfer)", 100 * row->error);
+        } else if (row->truth) {
             snprintf(error, sizeof error, "%.2f %%%s", 100 * row->error, row->weighted ? " (weighted)" : "");
         }
         printf("%-*s  %-22s %-22s %-22s %s\n", width, row->name, truth, start, found, error);
@@ -110,8 +113,12 @@ static void print_json(const FitResult *result) {
         json_values(&json, "truth", row, row->truth);
         json_values(&json, "start", row, row->start);
         json_values(&json, "found", row, row->found);
-        json_number(&json, "error", row->truth ? row->error : (double)NAN);
-        json_string(&json, "measure", row->weighted ? "weighted_mean" : "largest_relative");
+        bool mesh = row->points[COLUMN_TRUTH] != 0;
+        json_number(&json, "error", row->truth || mesh ? row->error : (double)NAN);
+        json_string(&json, "measure", mesh ? "chamfer" : row->weighted ? "weighted_mean" : "largest_relative");
+        if (mesh) {
+            json_number(&json, "start_error", row->chamfer[COLUMN_START]);
+        }
         json_object_end(&json);
     }
     json_array_end(&json);

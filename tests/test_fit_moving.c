@@ -201,6 +201,36 @@ static void test_vertices_and_exposure(void **state) {
     rey_fit_result_free(&result);
 }
 
+// A ball without a seam, remeshed on its way, seen through another exposure: the state of what is no mesh goes on, and a fit
+// that is stopped just before or after the change finds the same bits.
+static void test_remeshed_on_the_way(void **state) {
+    Fixture *f = *state;
+    FitResult result;
+    char command[256];
+    snprintf(command, sizeof command, "sed -e '/^vt/d' -e 's|/[0-9]*||g' %s/ball.obj > %s/plain.obj && sed 's/ball.obj/plain.obj/' "
+             "%s/scene.xml > %s/plain.xml", f->folder, f->folder, f->folder, f->folder);
+    assert_int_equal(system(command), 0);
+    const char *text = "scene: plain.xml\nviews: [{target: target_0.exr}, {target: target_1.exr}]\nloss: l2\nreport_spp: 2\n"
+        "iterations: 60\nspp: 8\nlevels: [{from: 0, reduce: 2}, {from: 20, reduce: 2, edge_length: 0.35}, {from: 40}]\n"
+        "optimizer: {learning_rate: 0.06, beta2: 0.9, average: 4}\nparameters:\n"
+        "  - {name: ball.positions, parameterisation: laplacian, smoothness: 4}\n"
+        "  - {name: views.1.exposure, parameterisation: log, learning_rate: 0.05, start: 0.6}\ntruth: {scene: truth.xml}\n";
+    if (run_job(f, text, "remeshed", false, -1, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    const FitRow *ball = &ARRAY_AT(result.rows, FitRow, 0);
+    print_message("points %d to %d, %.2f %% to %.2f %%\n", (int)ball->points[COLUMN_START], (int)ball->points[COLUMN_FOUND],
+                  100 * ball->chamfer[COLUMN_START], 100 * ball->chamfer[COLUMN_FOUND]);
+    assert_true(ball->points[COLUMN_FOUND] > 1.5 * (double)ball->points[COLUMN_START]);
+    assert_true(ball->chamfer[COLUMN_FOUND] < 0.7 * ball->chamfer[COLUMN_START]);
+    assert_non_null(result.report);
+    const int stops[] = {20, 21, 43};
+    for (int i = 0; i < COUNT_OF(stops); i++) {
+        expect_same_when_resumed(f, text, stops[i], &result);
+    }
+    rey_fit_result_free(&result);
+}
+
 // L-BFGS ends at its best point, and goes on from a checkpoint with the same bits, in the middle of a search, too.
 static void test_lbfgs_recovers_light(void **state) {
     Fixture *f = *state;
@@ -230,6 +260,9 @@ static void test_level_errors(void **state) {
     static const char *const cases[][2] = {
         {"levels: [{from: 0, reduce: 5}]\nparameters: [{name: ball.positions}]\n", "expected multiples of 5"},
         {"levels: [{from: 1, reduce: 2}]\nparameters: [{name: ball.positions}]\n", "the first 'from' must be 0"},
+        {"levels: [{from: 0, edge_length: 1}]\nparameters: [{name: ball.positions}]\n", "the job has none"},
+        {"levels: [{from: 0, edge_length: 1}]\niterations: 1\nparameters: [{name: ball.positions, parameterisation: laplacian}]\n",
+         "cannot remesh what has uv coordinates"},
         {"parameters: [{name: views.2.exposure}]\n", "the scene has none of this name"},
         {"parameters: [{name: views.1.exposure, parameterisation: rigid}]\n", "an exposure is one number"},
         {"parameters: [{name: views.1.exposure}, {name: 'views.*'}]\n", "names it already"},
@@ -240,7 +273,8 @@ static void test_level_errors(void **state) {
     for (int i = 0; i < COUNT_OF(cases); i++) {
         char text[1024];
         FitResult result;
-        snprintf(text, sizeof text, VIEWS "iterations: 0\n%s", cases[i][0]);
+        snprintf(text, sizeof text, VIEWS "%s%s", strstr(cases[i][0], "iterations") ? "" : "iterations: 0\n",
+                 cases[i][0]);
         rey_result code = run_job(f, text, "errors", false, -1, &result);
         rey_fit_result_free(&result);
         if (!code || !strstr(rey_error(f->ctx), cases[i][1])) {
@@ -252,6 +286,7 @@ static void test_level_errors(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_vertices_and_exposure),
+        cmocka_unit_test(test_remeshed_on_the_way),
         cmocka_unit_test(test_lbfgs_recovers_light),
         cmocka_unit_test(test_level_errors),
     };

@@ -13,7 +13,7 @@ static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '3'};
 typedef struct CheckpointHeader {
     char magic[8];
     uint64_t job_bytes, numbers, extra, rows, width; // extra: numbers of L-BFGS
-    uint64_t iteration, converged;
+    uint64_t iteration, converged, meshed;
     uint64_t job_hash; // of the resolved job
     double seconds;
 } CheckpointHeader;
@@ -69,6 +69,7 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
                                .width = (uint64_t)state->history_width,
                                .iteration = (uint64_t)state->iteration,
                                .converged = state->converged,
+                               .meshed = (uint64_t)state->meshed,
                                .job_hash = hash_bytes(flat, job_bytes),
                                .seconds = state->seconds};
     memcpy(header.magic, MAGIC, sizeof MAGIC);
@@ -89,7 +90,7 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
 // Whether the sizes that the header claims make up the file's size exactly.
 static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     const uint64_t most = (uint64_t)1 << 40;
-    if (h->job_bytes > most || h->numbers > most || h->extra > most || h->rows > most || h->width > 1 << 20) {
+    if (h->job_bytes > most || h->numbers > most || h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
         return false;
     }
     uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);
@@ -188,6 +189,7 @@ static rey_result decode(const char *path, const char *flat, const unsigned char
     state->iteration = (int)header.iteration;
     state->seconds = header.seconds;
     state->converged = header.converged != 0;
+    state->meshed = (int)header.meshed;
     return REY_OK;
 }
 
@@ -214,7 +216,8 @@ rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *f
         result = check_job(ctx, path, &header, bytes, flat);
     }
     rey_free(ctx, bytes);
-    *state = (FitState){.iteration = (int)header.iteration, .seconds = header.seconds, .converged = header.converged};
+    *state = (FitState){.iteration = (int)header.iteration, .seconds = header.seconds, .converged = header.converged,
+                        .meshed = (int)header.meshed};
     return result;
 }
 

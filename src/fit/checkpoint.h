@@ -13,6 +13,7 @@ typedef struct FitState {
     double seconds; // spent so far, over all runs
     Array history;  // doubles, iteration x history_width
     int history_width;
+    int meshed;     // 1 + the level whose scene file holds the meshes, 0 = the job's scene does
     bool converged; // the stop rule has ended the fit
 } FitState;
 

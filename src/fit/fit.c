@@ -49,15 +49,28 @@ static rey_result keep_schedule(Fit *fit, const char *checkpoint) {
     return result;
 }
 
+// Which scene the checkpoint's numbers belong to.
+static rey_result look_at_checkpoint(Fit *fit) {
+    FitState state = {0};
+    char *path = rey_fit_output_path(fit, "checkpoint.bin");
+    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && access(path, F_OK) == 0) {
+        result = keep_schedule(fit, path);
+        if (!result) {
+            result = rey_checkpoint_look(fit->ctx, path, fit->flat, &state);
+        }
+    }
+    fit->state.meshed = state.meshed;
+    rey_free(fit->ctx, path);
+    return result;
+}
+
 // A fit that was killed before its first checkpoint goes on from its start.
 static rey_result resume(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin"), *job = rey_fit_output_path(fit, "job.resolved.yaml");
     rey_result result = path && job ? REY_OK : REY_ERROR_MEMORY;
     if (!result && (access(path, F_OK) == 0 || access(job, F_OK) != 0)) {
-        result = keep_schedule(fit, path);
-        if (!result) {
-            result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
-        }
+        result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
     }
     rey_free(fit->ctx, path);
     rey_free(fit->ctx, job);
@@ -89,14 +102,11 @@ static rey_result open_job(Fit *fit) {
     const char *folder = def->output ? def->output : rey_job_path(&fit->job, fit->job.output);
     fit->output = folder ? rey_strdup(fit->ctx, folder) : NULL;
     result = fit->output ? rey_job_flat(&fit->job, &fit->flat) : REY_ERROR_MEMORY;
-    const char *scene = result ? NULL : rey_job_path(&fit->job, fit->job.scene);
-    if (!result) {
-        result = scene ? rey_scene_load(fit->ctx, scene, fit->job.defines, fit->job.define_count, &fit->scene)
-                       : REY_ERROR_MEMORY;
+    if (!result && def->resume) {
+        result = look_at_checkpoint(fit);
     }
-    if (!result && fit->job.load) {
-        const char *values = rey_job_path(&fit->job, fit->job.load);
-        result = values ? rey_scene_load_values(fit->scene, values) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = rey_fit_load_scene(fit, fit->state.meshed, &fit->scene);
     }
     return result;
 }
@@ -107,7 +117,7 @@ static rey_result open_fit(Fit *fit) {
         result = rey_views_load(fit);
     }
     if (!result) {
-        result = rey_unknowns_create(&fit->job, fit->scene, &fit->unknowns);
+        result = rey_unknowns_create(&fit->job, fit->scene, fit->state.meshed != 0, &fit->unknowns);
     }
     if (!result) {
         result = allocate(fit);

@@ -28,6 +28,8 @@ typedef struct FitDef {
     void *user;
 } FitDef;
 
+enum { COLUMN_TRUTH, COLUMN_START, COLUMN_FOUND, COLUMN_COUNT }; // of the final table
+
 typedef struct FitRow { // one unknown, in the final table
     char *name;
     int64_t count;
@@ -35,6 +37,8 @@ typedef struct FitRow { // one unknown, in the final table
     int dims;
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
+    int64_t points[COLUMN_COUNT]; // of meshes whose vertices move as a surface, else 0; 0 also where a column has none
+    double chamfer[COLUMN_COUNT]; // their mean distances from the truth, over the diagonal of its bounding box
     bool weighted; // mean absolute error over mean, each entry weighted by |d sum(I) / d entry| at the truth
 } FitRow;
 
@@ -115,6 +119,10 @@ void rey_views_free(Fit *fit);
 rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *view);
 rey_result rey_levels_enter(Fit *fit, int level);
 void rey_levels_reduce(Fit *fit, int r);
+// Remeshes as the level says, and goes on in a scene that holds the new meshes (remesh_level.c).
+rey_result rey_levels_remesh(Fit *fit, int level);
+// The job's scene, or that of a level: see FitState.meshed.
+rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
 // back through that, with the gradient of an unknown exposure.
@@ -130,8 +138,10 @@ void rey_metrics_close(Fit *fit);
 
 // Fills result->rows with starts and found values.
 rey_result rey_fit_table(Fit *fit, FitResult *result);
-// A pose (4 x 4) in words: where it is, and how far it is turned from the truth, or from the start where that is not known.
-// False for other parameters.
-bool rey_fit_pose_text(const FitRow *row, const float *values, char *text, size_t size);
+// What a column of the table says of a pose (4 x 4): where it is, and how far it is turned from the truth, or from the start
+// where that is not known; and of a mesh. False for other parameters.
+bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size);
+// The scene and the values that the fit began with.
+rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns);
 // Adds truths and errors to the rows; opens the truth when the job names one, which nothing does before.
 rey_result rey_fit_judge(Fit *fit, FitResult *result);

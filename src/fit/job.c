@@ -79,6 +79,7 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
 static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "from", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, from), .high = 1e9, .required = true},
+        {.key = "edge_length", .type = FIELD_REAL, .offset = offsetof(JobLevel, edge_length), .low = 1e-12, .high = 1e12},
         {.key = "reduce", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, reduce), .low = 1, .high = 1024},
         {0},
     };
@@ -375,6 +376,20 @@ static rey_result set_defaults(Job *job) {
     return REY_OK;
 }
 
+static rey_result check_levels(Job *job) {
+    bool meshes = false;
+    for (int i = 0; i < job->parameter_count; i++) {
+        meshes = meshes || job->parameters[i].parameterisation == PARAMETERISATION_LAPLACIAN;
+    }
+    for (int i = 0; i < job->level_count && !meshes; i++) {
+        if (job->levels[i].edge_length > 0) {
+            return rey_job_fail(job, rey_yaml_find(job->tree, "levels"),
+                                "edge_length is for parameters of 'parameterisation: laplacian', and the job has none");
+        }
+    }
+    return REY_OK;
+}
+
 // L-BFGS needs one function, and takes its steps by itself.
 static rey_result check_lbfgs(Job *job) {
     const YamlNode *node = rey_yaml_find(job->tree, "optimizer");
@@ -406,6 +421,9 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     job->optimizer.schedule.length_given = job->optimizer.schedule.length != 0;
     if (!result && !job->optimizer.schedule.length) {
         job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
+    }
+    if (!result) {
+        result = check_levels(job);
     }
     if (!result && job->optimizer.kind == OPTIMIZER_LBFGS) {
         result = check_lbfgs(job);

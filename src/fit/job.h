@@ -53,7 +53,8 @@ typedef struct JobSpp { // samples per pixel from this iteration on
 
 typedef struct JobLevel { // from coarse to fine, from this iteration on
     int from;
-    int reduce; // every picture is so many times smaller in width and height
+    int reduce;         // every picture is so many times smaller in width and height
+    double edge_length; // to which meshes are remeshed as it begins [scene units], 0 = they stay
 } JobLevel;
 
 typedef struct JobSchedule { // factor of every learning rate at iteration i

@@ -142,6 +142,10 @@ static void flat_decisive(Text *t, const Job *job) {
         line_integer(t, key, job->levels[i].from);
         snprintf(key, sizeof key, "levels.%d.reduce", i);
         line_integer(t, key, job->levels[i].reduce);
+        if (job->levels[i].edge_length > 0) {
+            snprintf(key, sizeof key, "levels.%d.edge_length", i);
+            line_real(t, key, job->levels[i].edge_length);
+        }
     }
     flat_views(t, job);
     line_text(t, "loss.type", rey_loss_name((int)job->loss));

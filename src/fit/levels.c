@@ -93,7 +93,12 @@ void rey_levels_reduce(Fit *fit, int r) {
 
 rey_result rey_levels_enter(Fit *fit, int level) {
     const JobLevel *l = fit->job.level_count ? &fit->job.levels[level] : NULL;
+    rey_result result = REY_OK;
+    if (l && l->edge_length > 0 && fit->state.meshed != level + 1) {
+        rey_levels_reduce(fit, 1);
+        result = rey_levels_remesh(fit, level);
+    }
     fit->level = level;
     rey_levels_reduce(fit, l ? l->reduce : 1);
-    return REY_OK;
+    return result;
 }

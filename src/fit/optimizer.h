@@ -32,8 +32,9 @@ typedef struct Unknowns {
     int64_t lbfgs_count;
 } Unknowns;
 
-// Finds the job's parameters in the scene, gives the scene their start values, and clears the moments.
-rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *out);
+// Finds the job's parameters in the scene, gives the scene their start values, and clears the moments. keep: the start is
+// what the scene holds, whatever the job says.
+rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *out);
 // Fills variable and value from start, which moves inside its bounds.
 void rey_unknowns_begin(Unknowns *u);
 void rey_unknowns_free(Unknowns *u);

@@ -16,14 +16,15 @@ static void put_swatch(Text *html, const double rgb[3]) {
 }
 
 // Few entries one by one, of many the mean: of the channels where they are colours.
-static void put_entries(Text *html, const FitRow *row, const float *values) {
-    if (!values) {
-        rey_text_add(html, "&ndash;");
+static void put_entries(Text *html, const FitRow *row, int column) {
+    const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
+    char text[96];
+    if (rey_fit_row_text(row, column, text, sizeof text)) {
+        rey_text_html(html, text);
         return;
     }
-    char pose[96];
-    if (rey_fit_pose_text(row, values, pose, sizeof pose)) {
-        rey_text_add(html, "%s", pose);
+    if (!values) {
+        rey_text_add(html, "&ndash;");
         return;
     }
     bool few = row->count <= SHOWN_ENTRIES, colours = row->count == 3 || (row->dims == 3 && row->shape[2] == 3);
@@ -42,7 +43,6 @@ static void put_entries(Text *html, const FitRow *row, const float *values) {
 }
 
 static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
-    const float *columns[] = {row->truth, row->start, row->found};
     rey_text_add(html, "<tr><td><code>");
     rey_text_html(html, row->name);
     rey_text_add(html, "</code>");
@@ -50,14 +50,15 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
         rey_text_add(html, i ? " &times; %lld" : "<div class=\"note\">%lld", (long long)row->shape[i]);
     }
     rey_text_add(html, row->dims && row->count > HISTORY_LARGEST ? "</div></td>" : "</td>");
-    for (int i = 0; i < COUNT_OF(columns); i++) {
+    for (int i = 0; i < COLUMN_COUNT; i++) {
         rey_text_add(html, "<td>");
-        put_entries(html, row, columns[i]);
+        put_entries(html, row, i);
         rey_text_add(html, "</td>");
     }
-    if (row->truth) {
-        rey_text_add(html, "<td class=\"n\">%.2f&thinsp;%%%s</td><td>", 100 * row->error,
-                     row->weighted ? "<sup>w</sup>" : "");
+    if (row->truth || row->points[COLUMN_TRUTH]) {
+        rey_text_add(html, row->points[COLUMN_TRUTH] ? "<td class=\"n\">%.3f&thinsp;%%%s</td><td>"
+                                                     : "<td class=\"n\">%.2f&thinsp;%%%s</td><td>",
+                     100 * row->error, row->weighted ? "<sup>w</sup>" : row->points[COLUMN_TRUTH] ? "<sup>c</sup>" : "");
     } else {
         rey_text_add(html, "<td class=\"n\">&ndash;</td><td>");
     }
@@ -83,5 +84,6 @@ void rey_report_table(Fit *fit, const FitResult *out, Text *html) {
         rey_text_add(html, " <sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the "
                            "pictures depend on it at the truth.");
     }
-    rey_text_add(html, " Poses: position, and the angle from the truth, or from the start where there is none. Dashed: the truth.</p>\n");
+    rey_text_add(html, " Poses: position, and the angle from the truth, or from the start where there is none. <sup>c</sup>&thinsp;Meshes: the Chamfer distance from the truth (the mean of the mean "
+                       "distances from either surface to the other) over the diagonal of its bounding box. Dashed: the truth.</p>\n");
 }

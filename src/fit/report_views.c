@@ -130,6 +130,23 @@ static rey_result render_all(Fit *fit, const float *values, uint32_t set, float 
     return result;
 }
 
+// With the meshes that the fit began with.
+static rey_result render_start(Fit *fit, float *images) {
+    if (!fit->state.meshed) {
+        return render_all(fit, fit->unknowns.start, REPORT_SET, images);
+    }
+    Fit first = *fit;
+    first.scene = NULL;
+    first.unknowns = (Unknowns){0};
+    rey_result result = rey_fit_open_start(fit, &first.scene, &first.unknowns);
+    if (!result) {
+        result = render_all(&first, first.unknowns.value, REPORT_SET, images);
+    }
+    rey_unknowns_free(&first.unknowns);
+    rey_scene_destroy(first.scene);
+    return result;
+}
+
 rey_result rey_report_views(Fit *fit, Text *html) {
     int64_t floats = 0;
     for (int v = 0; v < fit->job.view_count; v++) {
@@ -139,7 +156,7 @@ rey_result rey_report_views(Fit *fit, Text *html) {
     float *found = rey_alloc_array(fit->ctx, (size_t)floats, sizeof *found);
     rey_result result = start && found ? REY_OK : REY_ERROR_MEMORY;
     if (!result) {
-        result = render_all(fit, fit->unknowns.start, REPORT_SET, start);
+        result = render_start(fit, start);
     }
     if (!result) {
         result = render_all(fit, fit->unknowns.value, REPORT_SET + 1, found);

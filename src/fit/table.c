@@ -1,5 +1,6 @@
 // table.c: the final table: truth, start, found and error of every unknown. The truth is opened here, after the
 // optimisation is over, and nowhere else.
+#include "fit/chamfer.h"
 #include "fit/fit.h"
 #include "io/mitsuba.h"
 #include "render/update.h"
@@ -29,11 +30,13 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
         *row = (FitRow){.count = p->count,
                         .dims = p->dims,
                         .shape = {p->shape[0], p->shape[1], p->shape[2]},
-                        .weighted = p->count > LARGEST_SMALL};
+                        .weighted = p->count > LARGEST_SMALL && !p->vertices};
+        row->points[COLUMN_FOUND] = p->vertices ? p->vertices->mesh.point_count : 0;
+        bool other = p->vertices && fit->state.meshed; // the start had other vertices
         row->name = rey_strdup(fit->ctx, p->name);
-        row->start = copy_floats(fit->ctx, u->start + p->offset, p->count);
+        row->start = other ? NULL : copy_floats(fit->ctx, u->start + p->offset, p->count);
         row->found = copy_floats(fit->ctx, u->value + p->offset, p->count);
-        if (!row->name || !row->start || !row->found) {
+        if (!row->name || (!row->start && !other) || !row->found) {
             return REY_ERROR_MEMORY;
         }
     }
@@ -80,9 +83,16 @@ static double turned(const float *a, const float *b) {
     return acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / 3.14159265358979323846;
 }
 
-bool rey_fit_pose_text(const FitRow *row, const float *values, char *text, size_t size) {
+bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size) {
+    const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
     const float *other = row->truth ? row->truth : row->start;
-    if (!is_pose(row)) {
+    if (row->points[column]) {
+        bool off = row->points[COLUMN_TRUTH] && column != COLUMN_TRUTH;
+        snprintf(text, size, off ? "%lld points, %.3g %%" : "%lld points", (long long)row->points[column],
+                 100 * row->chamfer[column]);
+        return true;
+    }
+    if (!is_pose(row) || !values) {
         return false;
     }
     int used = snprintf(text, size, "%.3g %.3g %.3g", (double)values[3], (double)values[7], (double)values[11]);
@@ -123,9 +133,51 @@ static double weighted_error(const FitRow *row, const double *weights) {
     return mean > 0 ? error / mean : 0;
 }
 
+static Triangles triangles_of(const rey_scene *scene, int param) {
+    const ShapeRecord *shape = scene->view.shapes + ARRAY_AT(scene->params, Param, param).geometry;
+    return (Triangles){scene->view.theta + shape->positions, scene->view.triangles + 3 * (int64_t)shape->triangle,
+                       shape->vertex_count, shape->triangle_count};
+}
+
+static bool has_mesh(const rey_scene *scene, int param) {
+    return param >= 0 && ARRAY_AT(scene->params, Param, param).geometry >= 0 &&
+           triangles_of(scene, param).triangle_count > 0;
+}
+
+// Start and result of a mesh against the truth's, whatever their vertices.
+static rey_result judge_mesh(Fit *fit, rey_scene *truth, FitRow *row) {
+    int param = rey_param_find(truth, row->name);
+    rey_scene *start = NULL;
+    Unknowns unknowns = {0};
+    rey_result result = rey_fit_open_start(fit, &start, &unknowns);
+    if (!result && has_mesh(truth, param)) {
+        const Triangles meshes[COLUMN_COUNT] = {triangles_of(truth, param),
+                                                triangles_of(start, rey_param_find(start, row->name)),
+                                                triangles_of(fit->scene, rey_param_find(fit->scene, row->name))};
+        double diagonal = rey_triangles_diagonal(&meshes[COLUMN_TRUTH]);
+        row->points[COLUMN_TRUTH] = meshes[COLUMN_TRUTH].vertex_count;
+        for (int c = COLUMN_START; c < COLUMN_COUNT && !result; c++) {
+            double distance;
+            result = rey_chamfer(fit->ctx, &meshes[COLUMN_TRUTH], &meshes[c], &distance);
+            row->chamfer[c] = diagonal > 0 ? distance / diagonal : distance;
+        }
+        row->error = row->chamfer[COLUMN_FOUND];
+    }
+    for (size_t k = 0; k < unknowns.items.count && !result; k++) {
+        const Unknown *p = &ARRAY_AT(unknowns.items, Unknown, k);
+        row->points[COLUMN_START] = strcmp(p->name, row->name) ? row->points[COLUMN_START] : p->vertices->mesh.point_count;
+    }
+    rey_unknowns_free(&unknowns);
+    rey_scene_destroy(start);
+    return result;
+}
+
 static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRow *row) {
     int param = rey_param_find(truth, row->name); // none of an exposure's name
     rey_param_info info;
+    if (row->points[COLUMN_FOUND]) {
+        return judge_mesh(fit, truth, row);
+    }
     if (param < 0 || rey_param_get_info(truth, param, &info) || info.count != row->count) {
         return REY_OK; // nothing to compare with
     }

@@ -98,14 +98,14 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
 
 static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter *p, const Unknown *unknown,
                             float *start) {
-    if (p->start_file) {
+    if (p && p->start_file) {
         return start_from_file(job, p, unknown, start);
     }
-    if (p->start_count == 0 && unknown->param < 0) {
+    if ((!p || p->start_count == 0) && unknown->param < 0) {
         start[0] = (float)job->views[unknown->view].exposure;
         return REY_OK;
     }
-    if (p->start_count == 0) {
+    if (!p || p->start_count == 0) {
         memcpy(start, rey_param_values(scene, unknown->param), (size_t)unknown->count * sizeof *start);
         return REY_OK;
     }
@@ -287,7 +287,7 @@ static rey_result allocate(const Job *job, Unknowns *u) {
     return had ? REY_OK : REY_ERROR_MEMORY;
 }
 
-rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
+rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *u) {
     Array owners = {0}; // for every unknown the index of the job's entry that chose it
     *u = (Unknowns){.ctx = job->ctx};
     rey_result result = REY_OK;
@@ -303,7 +303,7 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, Unknowns *u) {
             u->params[u->param_count++] = unknown->param;
         }
         const JobParameter *p = &job->parameters[ARRAY_AT(owners, int, i)];
-        result = set_start(job, scene, p, unknown, u->start + unknown->offset);
+        result = set_start(job, scene, keep ? NULL : p, unknown, u->start + unknown->offset);
         if (!result) {
             result = check_start(job, p, unknown, u->start + unknown->offset);
         }

@@ -50,6 +50,11 @@ static void scatter_points(const PointMesh *mesh, const double *points, float *v
     }
 }
 
+const double *rey_vertices_points(Vertices *v, const float *value) {
+    gather_points(&v->mesh, value, v->points);
+    return v->points;
+}
+
 static double edge_length(const PointEdge *e, const double *points, double d[3]) {
     for (int c = 0; c < 3; c++) {
         d[c] = points[3 * e->b + c] - points[3 * e->a + c];

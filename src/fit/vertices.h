@@ -29,6 +29,8 @@ void rey_vertices_free(rey_context *ctx, Vertices *vertices);
 
 // Variables of a start, whose welded vertices become equal.
 void rey_vertices_begin(Vertices *vertices, float *start, double *variable);
+// The points of these values; valid until the next call.
+const double *rey_vertices_points(Vertices *vertices, const float *value);
 void rey_vertices_follow(Vertices *vertices, const double *variable, float *value);
 // Replaces the gradient in the values by that in the variables.
 void rey_vertices_gradient(Vertices *vertices, double *gradient);

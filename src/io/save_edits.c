@@ -372,6 +372,11 @@ static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     if (shape->normals < 0) {
         rey_save_line(w, depth, "<boolean name=\"face_normals\" value=\"true\"/>");
     }
+    for (int i = 0; i < w->mesh_count; i++) {
+        if (w->meshes[i].shape == shape - view->shapes) {
+            return rey_mesh_write_ply(w->ctx, path, &w->meshes[i].mesh);
+        }
+    }
     rey_mesh mesh = {.vertex_count = shape->vertex_count, .face_count = shape->triangle_count};
     mesh.positions = view->theta + shape->positions;
     mesh.normals = shape->normals >= 0 ? view->theta + shape->normals : NULL;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/build.h"
+#include "io/save.h"
 
 #include <stdarg.h>
 
@@ -38,6 +39,8 @@ typedef struct Writer {
     const char *folder_name; // the same, as the XML names it
     Array files;             // DataFile
     Array edits;             // Edit
+    const SavedMesh *meshes; // in the place of shapes' own
+    int mesh_count;
     int32_t *first_edit;     // per node: entry of `edits`, -1 = none
     int32_t *texture_sources; // per texture: entry of the source's textures, -1 = none
     Names paths;             // of nodes, by number

@@ -1,0 +1,128 @@
+// remesh_level.c: levels with meshes of another fineness. What the scene's arrays hold cannot grow: the scene is saved with the
+// new meshes, and the fit goes on in what that file loads as; a resumed fit begins there.
+#include "fit/fit.h"
+#include "fit/remesh.h"
+#include "io/mitsuba.h"
+#include "io/save.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { ROUNDS = 5 };
+
+static char *level_path(const Fit *fit, int level) {
+    char name[32];
+    snprintf(name, sizeof name, "level_%d.xml", level);
+    return rey_fit_output_path(fit, name);
+}
+
+rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out) {
+    rey_context *ctx = fit->ctx;
+    if (meshed) {
+        char *path = level_path(fit, meshed - 1);
+        rey_result result = path ? rey_scene_load(ctx, path, NULL, 0, out) : REY_ERROR_MEMORY;
+        rey_free(ctx, path);
+        return result;
+    }
+    const char *scene = rey_job_path(&fit->job, fit->job.scene);
+    rey_result result =
+        scene ? rey_scene_load(ctx, scene, fit->job.defines, fit->job.define_count, out) : REY_ERROR_MEMORY;
+    if (!result && fit->job.load) {
+        const char *values = rey_job_path(&fit->job, fit->job.load);
+        result = values ? rey_scene_load_values(*out, values) : REY_ERROR_MEMORY;
+    }
+    return result;
+}
+
+rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns) {
+    rey_result result = rey_fit_load_scene(fit, 0, scene);
+    return result ? result : rey_unknowns_create(&fit->job, *scene, false, unknowns);
+}
+
+static rey_result remesh_all(Fit *fit, double edge_length, Array *meshes) {
+    rey_result result = REY_OK;
+    for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        if (!p->vertices) {
+            continue;
+        }
+        int32_t shape = ARRAY_AT(fit->scene->params, Param, p->param).geometry;
+        if (fit->scene->view.shapes[shape].uvs >= 0) {
+            return rey_fail(fit->ctx, REY_ERROR_UNSUPPORTED, "%s: levels cannot remesh what has uv coordinates", p->name);
+        }
+        SavedMesh *saved = rey_array_push(fit->ctx, meshes, sizeof *saved, 1);
+        if (!saved) {
+            return REY_ERROR_MEMORY;
+        }
+        saved->shape = shape;
+        const double *points = rey_vertices_points(p->vertices, fit->unknowns.value + p->offset);
+        result = rey_remesh(fit->ctx, &p->vertices->mesh, points, edge_length, ROUNDS, &saved->mesh);
+    }
+    return result;
+}
+
+// What the unknowns of the new scene share with those of the old one; vertices begin anew.
+static void take_state(const Unknowns *from, Unknowns *to) {
+    for (size_t k = 0; k < to->items.count; k++) {
+        const Unknown *a = &ARRAY_AT(from->items, Unknown, k), *b = &ARRAY_AT(to->items, Unknown, k);
+        size_t n = (size_t)b->count;
+        if (b->vertices) {
+            for (int64_t i = b->offset; i < b->offset + b->count; i++) {
+                to->average[i] = (double)to->value[i];
+            }
+            continue;
+        }
+        memcpy(to->start + b->offset, from->start + a->offset, n * sizeof *to->start);
+        memcpy(to->value + b->offset, from->value + a->offset, n * sizeof *to->value);
+        memcpy(to->variable + b->offset, from->variable + a->offset, n * sizeof *to->variable);
+        memcpy(to->first + b->offset, from->first + a->offset, n * sizeof *to->first);
+        memcpy(to->second + b->offset, from->second + a->offset, n * sizeof *to->second);
+        memcpy(to->average + b->offset, from->average + a->offset, n * sizeof *to->average);
+    }
+}
+
+// Goes on in the scene of a level.
+static rey_result change_scene(Fit *fit, int level) {
+    rey_scene *scene = NULL;
+    Unknowns unknowns = {0};
+    rey_result result = rey_fit_load_scene(fit, level + 1, &scene);
+    if (!result) {
+        result = rey_unknowns_create(&fit->job, scene, true, &unknowns);
+    }
+    double *gradient = result ? NULL : rey_alloc_array(fit->ctx, (size_t)unknowns.count, sizeof *gradient);
+    if (!gradient) {
+        rey_unknowns_free(&unknowns);
+        rey_scene_destroy(scene);
+        return result ? result : REY_ERROR_MEMORY;
+    }
+    take_state(&fit->unknowns, &unknowns);
+    rey_unknowns_free(&fit->unknowns);
+    rey_scene_destroy(fit->scene);
+    rey_free(fit->ctx, fit->gradient);
+    fit->scene = scene;
+    fit->unknowns = unknowns;
+    fit->gradient = gradient;
+    fit->state.meshed = level + 1;
+    for (int v = 0; v < fit->job.view_count; v++) {
+        fit->views[v].full_sensor = scene->view.sensors[fit->views[v].sensor];
+    }
+    return rey_unknowns_apply(&fit->unknowns, scene, fit->unknowns.value);
+}
+
+rey_result rey_levels_remesh(Fit *fit, int level) {
+    Array meshes = {0};
+    char *path = level_path(fit, level);
+    rey_result result = path ? remesh_all(fit, fit->job.levels[level].edge_length, &meshes) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = rey_mitsuba_save_meshes(fit->scene, path, meshes.data, (int)meshes.count);
+    }
+    if (!result) {
+        result = change_scene(fit, level);
+    }
+    for (size_t i = 0; i < meshes.count; i++) {
+        rey_mesh_free(fit->ctx, &ARRAY_AT(meshes, SavedMesh, i).mesh);
+    }
+    rey_array_free(fit->ctx, &meshes);
+    rey_free(fit->ctx, path);
+    return result;
+}
