@@ -118,6 +118,7 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
     if (t->overflow && count > LANES) {
         t->job->paths = before.paths;
         t->job->rays = before.rays;
+        t->most = count / 2; // so do the next ones, probably
         run_chunk(t, filter, first, count / 2, begin);
         run_chunk(t, filter, first + count / 2, count - count / 2, begin);
         return;
@@ -158,8 +159,9 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     t.derivative = mode_records(job->mode);
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     int64_t total = (int64_t)job->width * job->height * job->spp;
-    for (int64_t first = 0; first < total && (!job->go_on || job->go_on(job->user)); first += t.ws.chunk) {
-        int64_t left = total - first;
-        run_chunk(&t, &filter, first, left < t.ws.chunk ? (int32_t)left : t.ws.chunk, begin);
+    t.most = t.ws.chunk;
+    for (int64_t first = 0, count; first < total && (!job->go_on || job->go_on(job->user)); first += count) {
+        count = total - first < t.most ? total - first : t.most;
+        run_chunk(&t, &filter, first, (int32_t)count, begin);
     }
 }

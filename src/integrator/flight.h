@@ -55,20 +55,6 @@ KFN Flights flights_load(const Tracer *t, int32_t medium, const int32_t *order, 
     return f;
 }
 
-// Distances at which the part of a ray up to tmax begins and ends that lies in the medium.
-KFN void medium_span(const SceneView *scene, const MediumNode *medium, Vec3 o, Vec3 d, Float tmax, Float *low, Float *high) {
-    *low = f_set(0);
-    *high = tmax;
-    if (medium->bounded) {
-        const VolumeNode *v = scene->volumes + medium->sigma_t;
-        Vec3 p = volume_to_local(scene, v, o, 1), q = volume_to_local(scene, v, d, 0);
-        slab(p.x, q.x, low, high);
-        slab(p.y, q.y, low, high);
-        slab(p.z, q.z, low, high);
-        *high = f_max(*high, *low);
-    }
-}
-
 // Emission along the flights: the expectation of the distance that they get, at a uniform point of it, is the integral of
 // the transmittance, also where nothing collides.
 static NOINLINE Spec flight_emission(const Tracer *t, Flights *f, int32_t bounce) {
@@ -76,8 +62,8 @@ static NOINLINE Spec flight_emission(const Tracer *t, Flights *f, int32_t bounce
     const MediumNode *medium = scene->media + f->medium;
     const VolumeNode *emission = scene->volumes + medium->emission;
     Track track = track_of(t, f->medium);
-    Float low, high;
-    medium_span(scene, medium, f->o, f->d, f->flight.t, &low, &high);
+    Float low = f_set(0), high = f->flight.t;
+    medium_span(scene, medium, track.sigma_t, f->o, f->d, &low, &high);
     Mask m = f->m & m_gt(high, low) & m_finite(high);
     SampleKey key = stream_key(t, f->slot, bounce, STREAM_EMISSION);
     f->probe = f_select(m, f_lerp(low, high, rng_1d(&key, 0)), f_set(0));

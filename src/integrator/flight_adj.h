@@ -139,8 +139,8 @@ static NOINLINE void fog_adj(const Tracer *t, const Walk *walk, Spec transmittan
             if (!extinction_is_live(t, id)) {
                 continue;
             }
-            Float low, high;
-            medium_span(scene, medium, walk->o[i], walk->d, walk->length[i], &low, &high);
+            Float low = f_set(0), high = walk->length[i];
+            medium_span(scene, medium, scene->volumes + medium->sigma_t, walk->o[i], walk->d, &low, &high);
             Mask m = mine & m_gt(high, low) & m_finite(high);
             Float each = (high - low) * ((real)-1 / FLIGHT_POINTS);
             for (int k = 0; k < FLIGHT_POINTS; k++) {

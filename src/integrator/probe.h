@@ -31,8 +31,9 @@ KFN FlightSweep flight_load(const Tracer *t, const RecordBatch *batch) {
     f.d = record_v3(r->dx, r->dy, r->dz, batch->first);
     f.beta = spec_load(r->beta, batch->first);
     const MediumNode *medium = t->scene->media + batch->group;
-    Float end = f_load(r->ldist + batch->first), far;
-    medium_span(t->scene, medium, f.o, f.d, f_load(r->sw + batch->first), &f.low, &far);
+    Float end = f_load(r->ldist + batch->first), far = f_load(r->sw + batch->first);
+    f.low = f_set(0);
+    medium_span(t->scene, medium, t->scene->volumes + medium->sigma_t, f.o, f.d, &f.low, &far);
     f.sparse = SPARSE_DEPTH * f_safe_rcp(far - f.low);
     f.high = f_min(far, end);
     f.m = f.m & m_finite(f.high) & m_gt(f.high, f.low);
@@ -55,7 +56,8 @@ KFN bool extinction_is_live(const Tracer *t, int32_t medium) {
     return (t->job->live[t->scene->groups_count + medium] & LIVE_EXTINCTION) != 0;
 }
 
-// Chooses one flight of each path, by reservoirs over the flights in the order of the records.
+// Chooses one flight of each path, by reservoirs over the flights in the order of the records. All media count, so that the
+// samples of a derivative do not depend on what else is selected.
 static void probe_choose(Tracer *t, int32_t count) {
     Workspace *ws = &t->ws;
     for (int32_t i = 0; i < count; i++) {
@@ -64,7 +66,7 @@ static void probe_choose(Tracer *t, int32_t count) {
     }
     for (int32_t b = 0; b < t->batch_count; b++) {
         const RecordBatch *batch = ws->batches + b;
-        if (batch->tag != VERTEX_FLIGHT || !extinction_is_live(t, batch->group)) {
+        if (batch->tag != VERTEX_FLIGHT) {
             continue;
         }
         FlightSweep f = flight_load(t, batch);
@@ -81,7 +83,7 @@ static void probe_choose(Tracer *t, int32_t count) {
     }
 }
 
-// Starts a path at the point of each chosen flight, as if it had collided there.
+// Starts a path at the point of each chosen flight whose medium is asked for, as if it had collided there.
 static void probe_start(Tracer *t, int32_t count) {
     Workspace *ws = &t->ws;
     Paths *p = &ws->paths[0];
@@ -90,6 +92,9 @@ static void probe_start(Tracer *t, int32_t count) {
     for (int32_t k = 0; k < count; k += LANES) {
         Int slot = i_select(m_first_n(count - k), i_iota() + k, i_set(0)), record = i_gather(ws->probe, slot);
         Mask m = m_first_n(count - k) & mi_lt(i_set(-1), record);
+        Int medium = i_select(m, i_gather(ws->probe_medium, slot), i_set(0));
+        Int live = i_gather(t->job->live, medium + (int32_t)t->scene->groups_count);
+        m = m & mi_eq(live & LIVE_EXTINCTION, i_set(LIVE_EXTINCTION));
         record = i_max(record, i_set(0));
         Vec3 d = LOAD_V3(*r, dx, dy, dz, record);
         Vec3 o = v3_madd(LOAD_V3(*r, px, py, pz, record), real_gather(ws->probe_at, slot), d);
@@ -97,8 +102,8 @@ static void probe_start(Tracer *t, int32_t count) {
         v3_compress(p->px + n, p->py + n, p->pz + n, o, m);
         v3_compress(p->dx + n, p->dy + n, p->dz + n, d, m);
         v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, o, m);
-        i_compress(ws->hit_group + n, i_gather(ws->probe_medium, slot) + ((int32_t)t->scene->groups_count + 1), m);
-        i_compress(p->medium + n, i_gather(ws->probe_medium, slot), m);
+        i_compress(ws->hit_group + n, medium + ((int32_t)t->scene->groups_count + 1), m);
+        i_compress(p->medium + n, medium, m);
         i_compress(p->depth + n, i_gather(r->lobe, record), m);
         i_compress(p->slot + n, slot, m);
         n += m_count(m);

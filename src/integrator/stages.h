@@ -39,6 +39,7 @@ typedef struct Tracer {
     real **rungs;            // radiance by number of segments: rows of a colour per number; or null
     int32_t rung_count, rungs_kept;
     bool overflow;           // the chunk's vertices did not fit the records
+    int32_t most;            // paths of the next chunk
 } Tracer;
 
 KFN double stage_seconds(void) {

@@ -7,7 +7,7 @@
 
 typedef struct MajorantWalk {
     Vec3 o, d;        // in the space of sigma_t; d has the length that world distances give it
-    Float t, end;     // where the walk stands and where it leaves the cube [world distance]
+    Float t, end;     // where the walk stands and where it leaves the medium [world distance]
     Int cell[3];
     Float next[3], step[3]; // distances at which cells end along each axis, and between such ends
     Float majorant;   // of the cell that the walk stands in
@@ -24,6 +24,32 @@ KFN void slab(Float o, Float d, Float *low, Float *high) {
     *high = f_min(*high, f_select(parallel, never, f_max(a, b)));
 }
 
+// Narrows [low, high] down to the part of a ray that lies in the medium: in the box along the world's axes around the cube of
+// its extinction, as the format has it. Voxels at the cube's border reach to that box; volumes that repeat end with the cube.
+KFN void medium_span(const SceneView *scene, const MediumNode *medium, const VolumeNode *v, Vec3 o, Vec3 d, Float *low,
+                     Float *high) {
+    if (!medium->bounded) {
+        return;
+    }
+    bool placed = v->table >= 0, reaches = v->kind == VOLUME_CONSTANT || v->wrap == WRAP_CLAMP;
+    if (placed && !reaches) {
+        o = volume_to_local(scene, v, o, 1);
+        d = volume_to_local(scene, v, d, 0);
+    }
+    const Float p[3] = {o.x, o.y, o.z}, q[3] = {d.x, d.y, d.z};
+    for (int k = 0; k < 3; k++) {
+        real corner = 0, size = 1;
+        if (placed && reaches) {
+            const float *row = scene->theta + v->to_world + 4 * k;
+            real x = (real)row[0], y = (real)row[1], z = (real)row[2];
+            size = (x < 0 ? -x : x) + (y < 0 ? -y : y) + (z < 0 ? -z : z);
+            corner = (real)0.5 * (x + y + z - size) + (real)row[3];
+        }
+        slab((p[k] - corner) * (1 / size), q[k] * (1 / size), low, high);
+    }
+    *high = f_max(*high, *low);
+}
+
 // From world point o along the unit direction d, for the distance tmax.
 KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium, const VolumeNode *sigma_t, Vec3 o, Vec3 d,
                                 Float tmax, Mask m) {
@@ -33,9 +59,7 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
     w.t = f_set(0);
     w.end = tmax;
     w.majorant = w.least = f_set(0);
-    for (int k = 0; k < 3 && medium->bounded; k++) {
-        slab(p[k], v[k], &w.t, &w.end);
-    }
+    medium_span(scene, medium, sigma_t, o, d, &w.t, &w.end);
     w.m = m & m_lt(w.t, w.end);
     w.t = f_select(w.m, w.t, f_set(0));
     for (int k = 0; k < 3; k++) {
@@ -44,25 +68,25 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
         Float at = f_clamp((p[k] + w.t * v[k]) * (real)n[k], f_set(0), f_set((real)n[k]));
         w.cell[k] = i_min(i_from_f(at), i_set(n[k] - 1));
         Float border = f_from_i(w.cell[k] + i_select(up, i_set(1), i_set(0))) * (1 / (real)n[k]);
-        w.next[k] = f_select(still, f_set(INFINITY), (border - p[k]) * rcp);
+        Mask last = mi_eq(w.cell[k], i_select(up, i_set(n[k] - 1), i_set(0))); // it reaches as far as the medium
+        w.next[k] = f_select(still | last, f_set(INFINITY), (border - p[k]) * rcp);
         w.step[k] = f_select(still, f_set(INFINITY), f_abs(rcp) * (1 / (real)n[k]));
     }
     return w;
 }
 
-// One cell on: along the axis whose border comes first. Lanes of m that leave the cube leave the walk.
+// One cell on: along the axis whose border comes first. Lanes of m that leave the medium leave the walk.
 KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
     const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
     const Float v[3] = {w->d.x, w->d.y, w->d.z};
     Mask left = m;
     for (int k = 0; k < 3; k++) {
         Mask mine = left & m_le(w->next[k], border);
-        Int onward = i_select(m_gt(v[k], f_set(0)), i_set(1), i_set(-1));
-        w->cell[k] = i_select(mine, w->cell[k] + onward, w->cell[k]);
-        w->next[k] = f_select(mine, w->next[k] + w->step[k], w->next[k]);
-        Mask outside = mi_lt(w->cell[k], i_set(0)) | mi_lt(i_set(n[k] - 1), w->cell[k]);
-        w->m = w->m & ~(mine & outside);
-        w->cell[k] = i_max(i_min(w->cell[k], i_set(n[k] - 1)), i_set(0));
+        Mask up = m_gt(v[k], f_set(0));
+        Int cell = i_select(mine, w->cell[k] + i_select(up, i_set(1), i_set(-1)), w->cell[k]);
+        w->cell[k] = i_max(i_min(cell, i_set(n[k] - 1)), i_set(0));
+        Mask last = mi_eq(w->cell[k], i_select(up, i_set(n[k] - 1), i_set(0)));
+        w->next[k] = f_select(mine, f_select(last, f_set(INFINITY), w->next[k] + w->step[k]), w->next[k]);
         left = left & ~mine;
     }
     w->m = w->m & ~(m & m_ge(w->t, w->end));

@@ -22,9 +22,8 @@ typedef struct Track {
     bool roulette; // walks whose transmittance is small end by chance, and those that go on count more
 } Track;
 
-// Transmittances below this play roulette, with numbers of their own.
+// Transmittances below this play roulette.
 #define DIM_TRANSMITTANCE 0.2f
-#define DIMENSION_ROULETTE 0x40000000u
 
 // Of padded walks: the optical depth of a whole walk, and the probability of real collisions, are at least this much.
 #define PADDED_DEPTH 0.5f
@@ -43,8 +42,13 @@ KFN MajorantWalk track_start(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m)
 }
 
 // Optical depth to the next tentative collision.
-KFN Float track_depth(const SampleKey *key, uint32_t dimension) {
-    return -f_log(f_max(1.0f - rng_1d(key, dimension), f_set(1e-9f)));
+KFN Float track_depth(Float u) { return -f_log(f_max(1.0f - u, f_set(1e-9f))); }
+
+// Whether all channels are alike, so that weights stay 1.
+KFN bool track_is_grey(const Track *t) { return t->sigma_t->channels == 1 && t->values == t->scene && !t->padded; }
+
+KFN Float grey_extinction(const Track *t, const MajorantWalk *w) {
+    return volume_eval_real(t->scene, t->sigma_t, majorant_point(w)) * (real)t->scene->theta[t->medium->scale];
 }
 
 // Homogeneous media.
@@ -70,14 +74,21 @@ static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float t
     SampleKey random = *key;
     random.sobol = false;
     Mask left = w.m;
+    const bool grey = track_is_grey(t);
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
-        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(&random, dimension + i), left);
-        Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w)), f_safe_rcp(w.majorant));
-        Spec passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
+        Vec2 u = rng_2d(&random, dimension + i);
+        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
+        Float rcp = f_safe_rcp(w.majorant);
+        Spec passed;
+        if (grey) {
+            passed = spec_set(transmittance.c[0] * (1.0f - grey_extinction(t, &w) * rcp));
+        } else {
+            Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w)), rcp);
+            passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
+        }
         if (t->roulette) {
             Float survival = f_min(spec_max(passed) * (1 / DIM_TRANSMITTANCE), f_set(1));
-            Mask survives = m_lt(rng_1d(&random, dimension + i + DIMENSION_ROULETTE), survival);
-            passed = spec_zero_unless(survives, spec_scale(passed, f_safe_rcp(survival)));
+            passed = spec_zero_unless(m_lt(u.y, survival), spec_scale(passed, f_safe_rcp(survival)));
         }
         transmittance = spec_select(met, passed, transmittance);
         left = met & m_ne(spec_max(transmittance), f_set(0));
@@ -119,26 +130,47 @@ KFN Spec collision_weight(Spec weight, Spec sigma, Float majorant, Float p, Mask
     return spec_mul(weight, spec_scale(spec_select(collided, share, rest), rcp));
 }
 
-// Delta tracking to the next real collision. Collision number i takes dimension + 2 i and the next. importance: shares of
-// the channels, which sum up to 1.
+// Delta tracking where all channels are alike.
+static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m, const SampleKey *random,
+                                   uint32_t dimension) {
+    MajorantWalk w = track_start(t, o, d, tmax, m);
+    Flight flight = {tmax, spec_set(f_set(1)), m_set(false)};
+    Mask left = w.m;
+    for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
+        Vec2 u = rng_2d(random, dimension + i);
+        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
+        Mask collided = met & m_lt(u.y * w.majorant, grey_extinction(t, &w));
+        flight.t = f_select(collided, w.t, flight.t);
+        flight.real = flight.real | collided;
+        left = met & ~collided;
+    }
+    return flight;
+}
+
+// Delta tracking to the next real collision. Collision number i takes dimension + i. importance: shares of the channels,
+// which sum up to 1.
 static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                     uint32_t dimension) {
     if (track_is_uniform(t)) {
         return uniform_flight(t, tmax, importance, m, key, dimension);
     }
+    SampleKey random = *key;
+    random.sobol = false;
+    if (track_is_grey(t)) {
+        return grey_flight(t, o, d, tmax, m, &random, dimension);
+    }
     MajorantWalk w = track_start(t, o, d, tmax, m);
     Flight flight = {tmax, spec_set(f_set(1)), m_set(false)};
     Spec weight = flight.weight; // in the deciding scene
-    SampleKey random = *key;
-    random.sobol = false;
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
-        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(&random, dimension + 2 * i), left);
+        Vec2 u = rng_2d(&random, dimension + i);
+        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Vec3 p = majorant_point(&w);
         Spec sigma = medium_extinction(t->scene, t, p), counts = spec_mul(importance, weight);
         Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
         real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
-        Mask collided = met & m_lt(rng_1d(&random, dimension + 2 * i + 1), real_share);
+        Mask collided = met & m_lt(u.y, real_share);
         weight = spec_select(met, collision_weight(weight, sigma, w.majorant, real_share, collided), weight);
         if (t->values == t->scene) {
             flight.weight = weight;
@@ -162,7 +194,7 @@ static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Spe
         Spec passed = uniform_transmittance(medium_extinction(t->values, t, v3_zero()), far);
         return spec_scale(passed, f_safe_rcp(spec_dot(importance, density)));
     }
-    if (t->sigma_t->channels == 1 && t->values == t->scene && !t->padded) {
+    if (track_is_grey(t)) {
         return spec_set(f_set(1));
     }
     return track_flight(t, o, d, far, importance, m, key, dimension).weight;

@@ -65,11 +65,13 @@ KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spe
                         Mask m) {
     Voxels s = voxels_around(v, p);
     Float along[8];
+    const int channels = v->channels == 1 ? 1 : SPEC_N;
+    Spec each = v->channels == 1 ? spec_set(spec_sum(d)) : d;
     for (int k = 0; k < s.count; k++) {
         // value = sum_k w_k voxel_k
         Float w = voxel_weight(&s, k);
-        for (int c = 0; c < SPEC_N && at >= 0; c++) {
-            sink_add(sink, s.at[k] + (at + (v->channels == 1 ? 0 : c)), w * d.c[c], m);
+        for (int c = 0; c < channels && at >= 0; c++) {
+            sink_add(sink, s.at[k] + (at + c), w * each.c[c], m);
         }
         along[k] = dp ? spec_dot(d, voxel_value(scene, v, s.at[k])) : f_set(0);
     }
@@ -111,6 +113,19 @@ KFN Vec3 volume_to_local(const SceneView *scene, const VolumeNode *v, Vec3 p, re
     const float *r = scene->tables + v->table;
     return v3(r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3] * w, r[4] * p.x + r[5] * p.y + r[6] * p.z + r[7] * w,
               r[8] * p.x + r[9] * p.y + r[10] * p.z + r[11] * w);
+}
+
+// A volume of numbers at a point of its own space.
+KFN Float volume_eval_real(const SceneView *scene, const VolumeNode *v, Vec3 p) {
+    if (v->kind == VOLUME_CONSTANT) {
+        return f_set((real)scene->theta[v->theta]);
+    }
+    Voxels s = voxels_around(v, p);
+    Float value = f_set(0);
+    for (int k = 0; k < s.count; k++) {
+        value = value + voxel_weight(&s, k) * theta_at(scene, s.at[k] + v->theta);
+    }
+    return value;
 }
 
 // At a point of the volume's own space.

@@ -76,7 +76,7 @@ static void test_saved_renders_the_same(void **state) {
     ok(again, rey_render(again.scene, &def, image[1], NULL));
     room_close(again);
     room_close(room);
-    snprintf(command, sizeof command, "rm -r '%s' '%s'", path, data);
+    snprintf(command, sizeof command, "rm -rf '%s' '%s'", path, data);
     assert_int_equal(system(command), 0);
     assert_memory_equal(image[0], image[1], sizeof image[0]);
 }
@@ -263,7 +263,8 @@ static void test_difference_noise(void **state) {
     ONE_ROOM(test, "materials.xml"), ONE_ROOM(test, "shapes.xml"), ONE_ROOM(test, "principled.xml"),                 \
         ONE_ROOM(test, "layers.xml"), ONE_ROOM(test, "lights.xml"), ONE_ROOM(test, "tiles.xml"), \
         ONE_ROOM(test, "edges.xml"), ONE_ROOM(test, "moving_ball.xml"), ONE_ROOM(test, "moving_box.xml"), \
-        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml")
+        ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml"), ONE_ROOM(test, "fog.xml"), \
+        ONE_ROOM(test, "smoke.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
