@@ -24,7 +24,7 @@ demo: all
 test: all
 	@cd $(BUILD) && ctest --output-on-failure -LE slow
 
-# Half an hour and more: the demo's scene from ten seeds.
+# Half an hour and more: the demo's scene from ten seeds, and all jobs in examples/.
 test-slow: all
 	@cd $(BUILD) && ctest --verbose -L slow
 
