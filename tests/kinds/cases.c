@@ -59,7 +59,7 @@ int case_values(KindCase *c, Random *r, const ParamDesc *p, int n, int owner) {
     for (int i = at; i < at + n; i++) {
         c->theta[i] = (double)(float)random_value(r, p);
         c->low[i] = (double)p->low;
-        c->high[i] = (double)p->high;
+        c->high[i] = fmax((double)p->high, c->theta[i]); // an index in the place of a specular goes beyond its range
         c->owner[i] = owner;
     }
     return at;
