@@ -165,26 +165,34 @@ static bool texture_turns_mirror(const rey_scene *scene, int32_t texture) {
     return turns;
 }
 
+static bool turns_within(const rey_scene *scene, int32_t bsdf) {
+    const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
+    bool turns = node->turns;
+    for (int i = 0; i < MAX_CHILDREN && !turns; i++) {
+        turns = node->child[i] >= 0 && turns_within(scene, node->child[i]);
+    }
+    return turns;
+}
+
 // Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
-// what turns such mirrors' normals; what moves needs another where shading normals turn away from the viewer.
+// what turns such mirrors' normals; what moves needs another where shading normals turn away from the viewer. Scattering
+// functions that no shape has do not count.
 static void name_further_terms(Builder *b) {
     rey_scene *scene = b->scene;
     bool bends = false, turns = false;
-    for (size_t i = 0; i < scene->build.bsdfs.count; i++) {
-        bends |= rey_bsdf_bends(ARRAY_AT(scene->build.bsdfs, BsdfNode, i).kind);
-        turns |= ARRAY_AT(scene->build.bsdfs, BsdfNode, i).turns;
-    }
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
-        turns |= (ARRAY_AT(scene->build.shapes, ShapeRecord, i).flags & SHAPE_HAS_NORMALS) != 0;
+        const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
+        bends |= bends_within(scene, shape->bsdf);
+        turns |= turns_within(scene, shape->bsdf) || (shape->flags & SHAPE_HAS_NORMALS);
     }
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
-    for (size_t i = 0; i < scene->params.count && moving; i++) {
+    for (size_t i = 0; i < scene->params.count; i++) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
         p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
         bool mirror = p->normals >= 0
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);
-        p->terms |= bends && mirror ? REY_TERM_SPECULAR : 0;
+        p->terms |= mirror ? REY_TERM_SPECULAR : 0;
     }
 }
 
