@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum { MOST_SPP = 1 << 24 }; // the library's limit
 enum { EXIT_OK = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_INTERRUPTED = 130 };
 
 // Subcommands: main.c holds one row for each. A command gets its own name as argv[0] and returns the exit status.
@@ -164,6 +165,8 @@ typedef struct Direction {
 // Builds the sum of the directions of specs, each `NAME[:OP]`. On REY_ERROR_ARGUMENT the text itself is malformed.
 rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
                                Direction *direction);
+// Whether a spec without an operation names a pose, of which then all entries move.
+bool cli_direction_bare_pose(const rey_scene *scene, const char *spec);
 // The same for a session, with failures reported: returns the exit status.
 int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction);
 void cli_direction_free(rey_context *ctx, Direction *direction);

@@ -242,6 +242,14 @@ static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spe
     if (*param >= 0) {
         return REY_OK;
     }
+    if (ends_with(*name, ".to_world")) {
+        char mesh[256];
+        snprintf(mesh, sizeof mesh, "%.*s.positions", (int)(length - strlen(".to_world")), *name);
+        if (rey_param_find(scene, mesh) >= 0) {
+            return rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s': meshes have none, their vertices move: %s:%s",
+                            *name, mesh, spec[length] ? spec + length + 1 : "translate=1,0,0");
+        }
+    }
     const char *nearest = rey_param_nearest(scene, *name);
     return rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s'%s%s%s", *name, nearest ? ", did you mean '" : "",
                     nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
@@ -336,6 +344,12 @@ void cli_direction_free(rey_context *ctx, Direction *direction) {
 
 rey_selection cli_direction_selection(const Direction *direction) {
     return (rey_selection){.params = direction->params, .count = direction->count};
+}
+
+bool cli_direction_bare_pose(const rey_scene *scene, const char *spec) {
+    rey_param_info info;
+    int param = spec[name_length(spec)] ? -1 : rey_param_find(scene, spec);
+    return param >= 0 && rey_param_get_info(scene, param, &info) == REY_OK && geometry_of(&info) == GEOMETRY_TRANSFORM;
 }
 
 int cli_direction_terms(const rey_scene *scene, const Direction *direction) {

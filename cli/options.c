@@ -19,7 +19,6 @@ enum {
     EVERY = (1 << COMMAND_COUNT) - 1
 };
 
-enum { MOST_SPP = 1 << 24 }; // the library's limit
 
 typedef enum OptionId {
     OPTION_OUTPUT,

@@ -189,6 +189,16 @@ int cli_session_open(const Options *options, const char *label, Session *session
         return status;
     }
     rey_result result = load_scene(session);
+    rey_scene_info info = {0};
+    if (session->scene) {
+        rey_scene_get_info(session->scene, &info);
+    }
+    if (result && info.sensors > 0 && options->sensor >= info.sensors) {
+        status = cli_usage_error(options, "--sensor: the scene has the sensors 0 to %d, got %d", (int)info.sensors - 1,
+                                 options->sensor);
+        cli_session_close(session);
+        return status;
+    }
     if (result || cli_interrupted()) {
         status = cli_report_failure(options, session->ctx, cli_interrupted() ? REY_ERROR_CANCELLED : result);
         cli_session_close(session);
@@ -219,6 +229,12 @@ int cli_session_direction(Session *session, const char *const *specs, int spec_c
     if (result == REY_ERROR_ARGUMENT) { // the text, not the scene, is wrong
         cli_report_failure(session->options, session->ctx, result);
         return EXIT_USAGE;
+    }
+    for (int i = 0; i < spec_count && !result && !session->options->all; i++) {
+        if (cli_direction_bare_pose(session->scene, specs[i])) {
+            cli_note("%s moves all entries of the matrix; :translate=x,y,z, :rotate=ax,ay,az@cx,cy,cz and :scale=S@cx,cy,cz "
+                     "move what it places", specs[i]);
+        }
     }
     return result ? cli_report_failure(session->options, session->ctx, result) : EXIT_OK;
 }

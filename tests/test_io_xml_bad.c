@@ -91,7 +91,7 @@ static const BadCase bad_cases[] = {
     {REY_ERROR_SCENE, S " <film type='a$'/></scene>", ":2:8: undefined parameter '$'"},
     {REY_ERROR_IO, S " <include filename='none.xml'/></scene>", ":2:11: file 'none.xml' was not found, looked in '"},
     {REY_ERROR_IO, S " <include filename='/none.xml'/></scene>", ":2:11: there is no file '/none.xml'"},
-    {REY_ERROR_IO, S " <include filename='.'/></scene>", ":2:11: file '.' was not found"},
+    {REY_ERROR_IO, S " <include filename='.'/></scene>", ":2:11: '.' is a folder, expected a file"},
     {REY_ERROR_IO, S " <path value='none'/></scene>", ":2:8: '"},
     {REY_ERROR_SCENE, S " <film type='a'><path value='.'/></film></scene>", ":2:17: <path> must stand directly"},
     {REY_ERROR_SCENE,

@@ -78,9 +78,22 @@ static rey_result read_all(rey_context *ctx, const char *path, int file, size_t 
     return REY_OK;
 }
 
+// Opening a pipe that lies in a folder waits for somebody to write into it. Those of the shell (/dev/stdin, /dev/fd/63)
+// lie nowhere, and have a writer.
+static bool is_named_pipe(const char *path) {
+    struct stat status;
+    char *resolved = stat(path, &status) == 0 && S_ISFIFO(status.st_mode) ? realpath(path, NULL) : NULL;
+    bool named = resolved != NULL;
+    free(resolved);
+    return named;
+}
+
 rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size) {
     *bytes = NULL;
     *size = 0;
+    if (is_named_pipe(path)) {
+        return rey_fail(ctx, REY_ERROR_IO, "%s: cannot read: is a pipe, which may never end, expected a file", path);
+    }
     int file = open(path, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
         return fail_errno(ctx, path, "open");

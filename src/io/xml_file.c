@@ -80,8 +80,27 @@ static bool same_folder(const char *a, const char *b) { // as far as their names
     return n == length_without_dots(b) && memcmp(a, b, n) == 0;
 }
 
+// What stands in the place of a file, or null.
+static const char *what_else(rey_context *ctx, const char *folder, const char *path) {
+    struct stat info;
+    char *candidate = rey_xml_join(ctx, folder, path);
+    bool exists = candidate && stat(candidate, &info) == 0;
+    rey_free(ctx, candidate);
+    return !exists                                            ? NULL
+           : S_ISDIR(info.st_mode)                            ? "a folder"
+           : S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode) ? "a device"
+                                                              : "a pipe or socket";
+}
+
 rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document, rey_xml_position at,
                              const char *first_folder, const char *path) {
+    const char *searched, *other = NULL;
+    for (size_t i = 0; !other && (searched = search_folder(document, first_folder, i)); i++) {
+        other = what_else(ctx, searched, path);
+    }
+    if (other) {
+        return rey_xml_fail(ctx, at, REY_ERROR_IO, "'%.400s' is %s, expected a file", path, other);
+    }
     if (path[0] == '/') {
         return rey_xml_fail(ctx, at, REY_ERROR_IO, "there is no file '%.400s'", path);
     }

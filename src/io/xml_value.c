@@ -1,4 +1,5 @@
 // xml_value.c: numbers, lists of numbers and spectra in attributes.
+#define _GNU_SOURCE // strcasestr
 #include "io/xml_parts.h"
 
 #include "io/image.h"
@@ -28,8 +29,10 @@ static const char *skip_separators(const char *text) {
 
 // Numbers that are not finite, or not in the single precision that they end up in, are no numbers here.
 static rey_result fail_value(XmlReader *reader, const XmlAttribute *attribute, const char *expected) {
-    return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s', expected %s", attribute->name,
-                        attribute->value, strlen(attribute->value) > 60 ? "..." : "", expected);
+    bool endless = strcasestr(attribute->value, "inf") || strcasestr(attribute->value, "nan");
+    return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s'%s, expected %s", attribute->name,
+                        attribute->value, strlen(attribute->value) > 60 ? "..." : "",
+                        endless ? ": numbers are finite" : "", expected);
 }
 
 // Numbers separated by blanks and commas; *count becomes -1 when something else is in the list or there are more than

@@ -87,6 +87,13 @@ static void loaded_values_have_shapes(void **state) {
     expect_words(f, 2, "fit job.yaml --load a=b.npy", "a fit takes one saved scene");
 }
 
+static void write_words(const char *path, const char *words) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(words, file);
+    assert_int_equal(fclose(file), 0);
+}
+
 static void words_help(void **state) {
     Fixture *f = *state;
     expect_words(f, 2, "grad %s --param red.reflectance.value:add", "'add' needs a value, such as add=1");
@@ -94,8 +101,41 @@ static void words_help(void **state) {
     expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint inf", "not a finite number");
     expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint 1 -o d.exr", "folder");
     expect_words(f, 1, "render %s -o a.exr -D ball=", "attribute 'id' of <ref> is empty");
+    expect_words(f, 2, "render %s -o a.exr --sensor 3", "--sensor: the scene has the sensors 0 to 0, got 3");
+    write_words("endless.xml", "<scene version='3.0.0'><bsdf type='plastic'><float name='int_ior' value='inf'/></bsdf></scene>");
+    expect_words(f, 1, "info endless.xml", "bad value 'inf': numbers are finite, expected a number up to 3.4e38");
+    write_words("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write_words("mesh.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'/><shape type='obj' "
+                            "id='m'><string name='filename' value='mesh.obj'/></shape></scene>");
+    expect_words(f, 1, "grad mesh.xml --param m.to_world:rotate=0,1,0", "their vertices move: m.positions:rotate=0,1,0");
+    expect_words(f, 0, "grad %s --param ball.to_world --spp 1", "ball.to_world moves all entries of the matrix; :translate=");
+    expect(f, 0, "grad %s --param ball.to_world:add=1 --spp 1");
+    assert_null(strstr(f->words, "entries"));
     expect(f, 0, "doctor");
     assert_true(strstr(f->out, "compiler   gcc ") || strstr(f->out, "lang"));
+}
+
+// What is no file is called what it is, and nobody waits for a pipe that no one writes to.
+static void files_are_files(void **state) {
+    Fixture *f = *state;
+    static const char *const others[][2] = {{"folder", "'folder' is a folder, expected a file"},
+                                            {"/dev/null", "'/dev/null' is a device, expected a file"},
+                                            {"pipe", "'pipe' is a pipe or socket, expected a file"}};
+    assert_int_equal(system("mkfifo pipe && mkdir folder && ln -s pipe link"), 0);
+    expect_words(f, 1, "render pipe -o a.exr", "pipe: cannot read: is a pipe");
+    expect_words(f, 1, "info link", "link: cannot read: is a pipe");
+    expect_words(f, 1, "compare pipe pipe", "is a pipe");
+    expect_words(f, 1, "fit pipe", "is a pipe");
+    for (int i = 0; i < 3; i++) {
+        char scene[512];
+        snprintf(scene, sizeof scene, "<scene version='3.0.0'><shape type='ply'><string name='filename' value='%s'/></shape></scene>",
+                 others[i][0]);
+        write_words("mesh.xml", scene);
+        expect_words(f, 1, "info mesh.xml", others[i][1]);
+    }
+    char command[4096]; // a shell's pipe has a writer
+    snprintf(command, sizeof command, "cat '%s' | '%s' info /dev/stdin >out.txt 2>words.txt", TEST_SCENE, REYNOLDS_COMMAND);
+    assert_int_equal(system(command), 0);
 }
 
 // Every column of the table begins where its title does.
@@ -137,6 +177,24 @@ static void unequal_pictures(void **state) {
     json_free(node);
 }
 
+// All texels of a bump together move nothing: forward and reverse differ by the rounding of what cancels.
+static void cancelling_texels_are_no_error(void **state) {
+    Fixture *f = *state;
+    write_pfm("heights.pfm", 4, 0.3F);
+    write_words("bump.xml",
+                "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><transform name='to_world'>"
+                "<lookat origin='0,-1,3' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+                "value='16'/><integer name='height' value='16'/></film></sensor><shape type='rectangle'><bsdf "
+                "type='bumpmap' id='b'><texture type='bitmap'><string name='filename' value='heights.pfm'/><boolean "
+                "name='raw' value='true'/></texture><bsdf type='diffuse'/></bsdf></shape><emitter type='point'>"
+                "<point name='position' x='1' y='0' z='2'/><rgb name='intensity' value='9'/></emitter></scene>");
+    JsonNode *node = run_json(f, 0, "check bump.xml --param b.nested_texture.data --terms interior --spp 32 --json");
+    const JsonNode *row = json_get(node, "directions")->first;
+    assert_string_equal(json_text(row, "verdict", ""), "no effect");
+    assert_true(json_value(row, "reverse_error", 1) < 1e-5);
+    json_free(node);
+}
+
 // A light so strong that its picture overflows: the samples are dropped, and that is said.
 static void dropped_samples_are_told(void **state) {
     Fixture *f = *state;
@@ -162,8 +220,10 @@ int main(void) {
         cmocka_unit_test(saved_values_load_by_name),
         cmocka_unit_test(loaded_values_have_shapes),
         cmocka_unit_test(words_help),
+        cmocka_unit_test(files_are_files),
         cmocka_unit_test(tables_are_aligned),
         cmocka_unit_test(unequal_pictures),
+        cmocka_unit_test(cancelling_texels_are_no_error),
         cmocka_unit_test(dropped_samples_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
