@@ -31,10 +31,16 @@ typedef struct Check { // one direction
     CheckResult result;
     bool kink;            // the difference is that of one side
     double fresh_z;       // of that against the plain quotient of fresh paths; 0 where nothing is replayed
-    double reverse_error; // |reverse - forward| over the mean of |derivative|
+    double reverse_error; // |reverse - forward| over what is summed up
     Verdict verdict;
+    bool undecided;       // weak, and beyond the limits all the same
     char *refusal;        // why there is no complete derivative; owned
 } Check;
+
+Step check_central_step(double h);
+Step check_one_sided_step(double h, double sign);
+// The step to begin with; original: the values of the direction's parameters; asked: 0 = found by itself.
+Step check_choose_step(const rey_scene *scene, const float *original, const Check *check, double asked);
 
 // Largest difference between forward and reverse mode, which sum the same samples in float in another order.
 #define CHECK_REVERSE_TOLERANCE 1e-4
@@ -42,7 +48,11 @@ typedef struct Check { // one direction
 #define CHECK_WEAK 0.1
 // Fresh paths contradict replayed ones beyond this: a mean over few sets of heavy tails is skewed.
 #define CHECK_FRESH_Z 5
+// Limit of the sum of the blocks' z over its standard deviation.
+#define CHECK_SUM_Z 3
 
 const char *check_verdict_name(Verdict verdict);
+// Sets the verdict, unless it is a refusal. threshold: of |z|; partial: terms are left out on request.
+void check_judge(Check *check, double threshold, bool partial);
 void check_print_table(const Check *checks, int count, double threshold);
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold);

@@ -3,11 +3,6 @@
 
 #include <stdio.h>
 
-const char *check_verdict_name(Verdict verdict) {
-    static const char *const names[] = {"ok", "kink", "no effect", "weak", "WRONG", "partial", "refused"};
-    return names[verdict];
-}
-
 static int count_verdicts(const Check *checks, int count, Verdict verdict) {
     int n = 0;
     for (int i = 0; i < count; i++) {
@@ -36,11 +31,18 @@ void check_print_table(const Check *checks, int count, double threshold) {
         print_row(&checks[i]);
     }
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
+    int undecided = 0;
+    for (int i = 0; i < count; i++) {
+        undecided += checks[i].undecided;
+    }
     printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3, fresh z up to %d, reverse = forward to %g\n",
-           wrong ? "FAILED" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
+           wrong ? "FAILED" : undecided ? "undecided" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
     if (count_verdicts(checks, count, VERDICT_KINK)) {
         printf("%d of %d stand at a kink: the derivative is that of one side\n", count_verdicts(checks, count, VERDICT_KINK),
                count);
+    }
+    if (undecided) {
+        printf("%d of %d are beyond these limits, and too noisy to be called wrong\n", undecided, count);
     }
     if (weak) {
         printf("%d of %d are weak: noise is more than %g %% of the signal, so that they say little; raise --spp\n", weak,
@@ -51,7 +53,11 @@ void check_print_table(const Check *checks, int count, double threshold) {
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold) {
     Json json = json_begin(stdout);
     json_object(&json, NULL);
-    json_bool(&json, "passed", count_verdicts(checks, count, VERDICT_WRONG) == 0);
+    bool passed = count_verdicts(checks, count, VERDICT_WRONG) == 0;
+    for (int i = 0; i < count; i++) {
+        passed = passed && !checks[i].undecided;
+    }
+    json_bool(&json, "passed", passed);
     json_number(&json, "z_threshold", threshold);
     cli_json_stats(&json, session, stats);
     json_array(&json, "directions");
@@ -60,7 +66,7 @@ void check_print_json(const Session *session, const rey_stats *stats, const Chec
         json_object(&json, NULL);
         json_string(&json, "param", checks[i].spec);
         json_string(&json, "verdict", check_verdict_name(checks[i].verdict));
-        json_bool(&json, "passed", checks[i].verdict != VERDICT_WRONG);
+        json_bool(&json, "passed", checks[i].verdict != VERDICT_WRONG && !checks[i].undecided);
         if (checks[i].refusal) {
             json_string(&json, "why", checks[i].refusal);
         }

@@ -1,5 +1,5 @@
 // test_cli_parts.c: pieces of the command line by themselves: numbers, JSON, statistics, directions.
-#include "check_stats.h"
+#include "check.h"
 #include "cli.h"
 #include "json_read.h"
 
@@ -149,6 +149,31 @@ static void statistics_accept_noise_and_refuse_errors(void **state) {
     assert_true(fabs(check_z_threshold(100) - 3.8881) < 2e-3);
 }
 
+// Beyond the limits is wrong where noise is small, undecided where it is large, and wrong again where it is plain.
+static void verdicts_know_noise(void **state) {
+    (void)state;
+    static const struct {
+        double relative_error, worst_z, sum_z, reverse_error;
+        Verdict verdict;
+        bool undecided;
+    } cases[] = {{0.01, 3, 1, 0, VERDICT_OK, false},      {0.01, 5, 1, 0, VERDICT_WRONG, false},
+                 {0.01, 3, 4, 0, VERDICT_WRONG, false},   {0.5, 3, 1, 0, VERDICT_WEAK, false},
+                 {0.5, 5, 1, 0, VERDICT_WEAK, true},      {0.5, 3, -4, 0, VERDICT_WEAK, true},
+                 {0.5, -7, 1, 0, VERDICT_WRONG, false},   {0.5, NAN, 1, 0, VERDICT_WRONG, false},
+                 {NAN, 3, 1, 0, VERDICT_WEAK, false},     {0.5, 5, 1, 1e-3, VERDICT_WRONG, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        Check check = {.reverse_error = cases[i].reverse_error,
+                       .result = {.tests = 9, .relative_error = cases[i].relative_error, .worst_z = cases[i].worst_z,
+                                  .sum_z = cases[i].sum_z}};
+        check_judge(&check, 4, false);
+        assert_int_equal(check.verdict, cases[i].verdict);
+        assert_int_equal(check.undecided, cases[i].undecided);
+    }
+    Check refused = {.verdict = VERDICT_REFUSED, .result = {.tests = 9, .worst_z = 9}};
+    check_judge(&refused, 4, false);
+    assert_int_equal(refused.verdict, VERDICT_REFUSED);
+}
+
 static void blocks_are_means(void **state) {
     (void)state;
     Blocks blocks = check_blocks(21, 5);
@@ -288,7 +313,7 @@ int main(void) {
         cmocka_unit_test(json_is_escaped_and_exact),
         cmocka_unit_test(json_reader_refuses_broken_text),
         cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
-        cmocka_unit_test(blocks_are_means),
+        cmocka_unit_test(blocks_are_means), cmocka_unit_test(verdicts_know_noise),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(malformed_directions_are_refused, open_scene, close_scene),
