@@ -53,6 +53,7 @@ typedef struct Options {
     int lanes;           // 0 = the widest
     int sampler;         // REY_SAMPLER_*
     int terms;           // REY_TERM_* bits, 0 = all that are needed
+    int primary_spp, indirect_spp; // 0 = as fits spp
     bool reverse;        // --mode reverse
     const char *adjoint; // number or file name
     bool lenient;        // leave out what cannot be read

@@ -8,39 +8,59 @@
 #include "base/context.h"
 #include "io/file.h"
 #include "io/image.h"
+#include "render/term_request.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS = 16, PATH_BYTES = 4096 };
+enum { SETS = 16, PATH_BYTES = 4096, TERMS_ESTIMATED = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 typedef struct Grad {
     Session session;
     Direction direction;
     rey_stats stats;
     double value, standard_error;
+    TermRequest request;
+    double shares[SETS][TERM_COUNT]; // of each set's value
     int needed, used; // term bits
     float png_scale;  // of the signed picture, 0 when none was written
 } Grad;
 
-// Mean and standard error of the mean.
-static void summarize(const double *values, int count, double *mean, double *standard_error) {
+// Mean of the sets and its standard error; their values lie `stride` numbers apart.
+static void summarize(const double *values, int stride, double *mean, double *standard_error) {
     double sum = 0, squares = 0;
-    for (int i = 0; i < count; i++) {
-        sum += values[i];
+    for (int i = 0; i < SETS; i++) {
+        sum += values[i * stride];
     }
-    *mean = sum / count;
-    for (int i = 0; i < count; i++) {
-        squares += (values[i] - *mean) * (values[i] - *mean);
+    *mean = sum / SETS;
+    for (int i = 0; i < SETS; i++) {
+        squares += (values[i * stride] - *mean) * (values[i * stride] - *mean);
     }
-    *standard_error = sqrt(squares / (count - 1) / count);
+    *standard_error = sqrt(squares / (SETS - 1) / SETS);
 }
 
 // Terms that are missing. A jump that no path met is not needed.
 static int terms_left_out(const Grad *g) {
     return g->needed & ~g->used & (~REY_TERM_TERMINATOR | g->stats.missing_terms);
+}
+
+// The terms' shares of the value, and their standard errors.
+static void write_terms(Json *json, const Grad *g) {
+    static const char *const keys[] = {"terms", "terms_standard_error"};
+    int computed = g->used | (g->session.options->terms ? 0 : REY_TERM_INTERIOR);
+    for (int k = 0; k < 2; k++) {
+        json_object(json, keys[k]);
+        for (int i = 0; i < TERM_COUNT; i++) {
+            double numbers[2];
+            summarize(&g->shares[0][i], TERM_COUNT, &numbers[0], &numbers[1]);
+            if (computed & TERMS_ESTIMATED & 1 << i) {
+                json_number(json, rey_term_name(1 << i), numbers[k]);
+            }
+        }
+        json_object_end(json);
+    }
 }
 
 static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
@@ -51,14 +71,7 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     json_string(&json, "mode", o->reverse ? "reverse" : "forward");
     json_number(&json, "value", g->value);
     json_number(&json, "standard_error", g->standard_error);
-    json_object(&json, "terms"); // terms computed together have no values of their own
-    int computed = (g->used | (o->terms ? 0 : REY_TERM_INTERIOR)) & (REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
-    for (int bit = REY_TERM_INTERIOR; bit <= REY_TERM_INDIRECT; bit *= 2) {
-        if (computed & bit) {
-            json_number(&json, rey_term_name(bit), computed == bit ? g->value : NAN);
-        }
-    }
-    json_object_end(&json);
+    write_terms(&json, g);
     json_bool(&json, "complete", terms_left_out(g) == 0);
     cli_json_terms(&json, "needed_terms", g->needed & (~REY_TERM_TERMINATOR | g->stats.missing_terms));
     json_array(&json, "parameters");
@@ -94,11 +107,14 @@ static rey_result forward_with_variance(Grad *g, float *image, float *variance, 
     s->def.sets = 1;
     s->def.spp = (spp + SETS - 1) / SETS;
     s->progress.parts = SETS;
+    g->request.primary_spp = (g->request.primary_spp + SETS - 1) / SETS;
+    g->request.indirect_spp = (g->request.indirect_spp + SETS - 1) / SETS;
     for (uint32_t k = 0; k < SETS && !result; k++) {
         rey_stats stats = {0};
         s->def.set = k;
-        result = rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image, &sets[k],
-                         &stats);
+        g->request.values = g->shares + k;
+        result = rey_jvp_terms(s->scene, &s->def, g->request, cli_direction_selection(&g->direction),
+                               g->direction.tangent, image, &sets[k], &stats);
         cli_add_stats(&g->stats, &stats);
         s->progress.part++;
         for (size_t i = 0; i < count && !result; i++) {
@@ -142,12 +158,12 @@ static rey_result forward(Grad *g) {
     }
     if (!result) {
         result = variance ? forward_with_variance(g, image, variance, sets)
-                          : rey_jvp(s->scene, &s->def, cli_direction_selection(&g->direction), g->direction.tangent, image,
-                                    sets, &g->stats);
+                          : rey_jvp_terms(s->scene, &s->def, g->request, cli_direction_selection(&g->direction),
+                                          g->direction.tangent, image, sets, &g->stats);
         cli_progress_end(&s->progress);
     }
     if (!result) {
-        summarize(sets, SETS, &g->value, &g->standard_error);
+        summarize(sets, 1, &g->value, &g->standard_error);
         result = s->options->output ? write_forward(g, image, variance) : REY_OK;
     }
     rey_free(s->ctx, image);
@@ -254,8 +270,8 @@ static rey_result reverse(Grad *g) {
         result = read_adjoint(s, &adjoint);
     }
     if (!result) {
-        result = rey_vjp(s->scene, &s->def, cli_direction_selection(&g->direction), adjoint, gradient, set_gradients,
-                         &g->stats);
+        result = rey_vjp_terms(s->scene, &s->def, g->request, cli_direction_selection(&g->direction), adjoint, gradient,
+                               set_gradients, &g->stats);
         cli_progress_end(&s->progress);
     }
     if (!result) {
@@ -263,7 +279,7 @@ static rey_result reverse(Grad *g) {
         for (int i = 0; i < SETS; i++) {
             sets[i] = dot(set_gradients + i * size, g->direction.tangent, size);
         }
-        summarize(sets, SETS, &g->value, &g->standard_error);
+        summarize(sets, 1, &g->value, &g->standard_error);
         result = s->options->output ? write_gradient(g, gradient) : REY_OK;
     }
     rey_free(s->ctx, adjoint);
@@ -275,6 +291,7 @@ static rey_result reverse(Grad *g) {
 static rey_result differentiate(Grad *g) {
     Session *s = &g->session;
     s->def.sets = SETS;
+    g->request = (TermRequest){s->options->primary_spp, s->options->indirect_spp, g->shares, g->direction.tangent};
     g->needed = cli_direction_terms(s->scene, &g->direction);
     g->used = s->options->terms ? s->options->terms : g->needed;
     return s->options->reverse ? reverse(g) : forward(g);

@@ -33,6 +33,7 @@ typedef enum OptionId {
     OPTION_MODE,
     OPTION_ADJOINT,
     OPTION_TERMS,
+    OPTION_SPP_TERMS,
     OPTION_ALL,
     OPTION_STEP,
     OPTION_VARIANCE,
@@ -61,6 +62,7 @@ static const OptionRow option_rows[] = {
     {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
     {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or an EXR of the image's size"},
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior)"},
+    {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
     {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
     {OPTION_STEP, 0, "step", "H", CHECKS, "step of the differences along the direction (default: found by itself)"},
     {OPTION_VARIANCE, 0, "variance", NULL, GRADS, "forward mode: also write the variance of each pixel, to OUT_variance"},
@@ -184,6 +186,30 @@ static bool parse_count(const Options *o, const char *option, const char *value,
     return true;
 }
 
+static bool parse_spp_terms(Options *o, const char *text) {
+    for (const char *s = text;; s++) {
+        size_t name = strcspn(s, "=,"), length = strcspn(s, ",");
+        int *target = !strncmp(s, "primary", name) && name == 7    ? &o->primary_spp
+                      : !strncmp(s, "indirect", name) && name == 8 ? &o->indirect_spp
+                                                                   : NULL;
+        char number[32] = "";
+        if (s[name] == '=') {
+            snprintf(number, sizeof number, "%.*s", (int)(length - name - 1), s + name + 1);
+        }
+        if (!target) {
+            cli_usage_error(o, "--spp-terms: expected primary=N or indirect=N, got '%.*s'", (int)length, s);
+            return false;
+        }
+        if (!parse_count(o, "--spp-terms", number, 1, MOST_SPP, target)) {
+            return false;
+        }
+        s += length;
+        if (!*s) {
+            return true;
+        }
+    }
+}
+
 static bool parse_seed(Options *o, const char *value) {
     int64_t number;
     if (!cli_parse_integer(value, 0, UINT32_MAX, &number)) {
@@ -290,6 +316,8 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
         return true;
     case OPTION_TERMS:
         return parse_terms(o, value);
+    case OPTION_SPP_TERMS:
+        return parse_spp_terms(o, value);
     case OPTION_STEP:
         return parse_step(o, value);
     case OPTION_LOAD:

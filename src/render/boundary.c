@@ -86,8 +86,11 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     }
     int32_t edge_count = plan->job.edge_count;
     // A sample of the primary term is two paths, and on a large mesh a fiftieth as noisy as one of the interior.
-    plan->samples = (int64_t)r->plan.width * r->plan.height * r->job.spp / (term == REY_TERM_PRIMARY ? 4 : 1);
-    plan->samples = plan->samples < LEAST_SAMPLES ? LEAST_SAMPLES : plan->samples;
+    int32_t asked = term == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
+    plan->samples = (int64_t)r->plan.width * r->plan.height * (asked ? asked : r->job.spp) /
+                    (asked ? r->def.sets : term == REY_TERM_PRIMARY ? 4 : 1);
+    int64_t least = asked ? 1 : LEAST_SAMPLES;
+    plan->samples = plan->samples < least ? least : plan->samples;
     plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges,
                               .fans = r->fans.data, .cdf = plan->cdf,
                               .edge_count = edge_count,

@@ -303,9 +303,10 @@ static bool selection_given(rey_selection selection) {
     return selection.count == 0 || (selection.count > 0 && selection.params);
 }
 
-static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, rey_selection selection,
-                                   int32_t mode) {
+static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, TermRequest request,
+                                   rey_selection selection, int32_t mode) {
     rey_result result = rey_render_begin(r, scene, def, mode, 3);
+    r->request = request;
     if (result == REY_OK && scene->view.colour_is_depth) {
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
                           "the integrator '%s' has no derivatives, 'path' has", scene->integrator);
@@ -340,6 +341,7 @@ static void run_boundaries(Render *r, int set, double *picture) {
     for (int i = 0; i < BOUNDARY_TERMS; i++) {
         if (r->terms & (REY_TERM_PRIMARY << i)) {
             rey_boundary_run(r, r->boundary + i, set_scramble(r, set, 3 + (uint32_t)i), picture);
+            rey_terms_book(r, set, REY_TERM_PRIMARY << i, picture);
         }
     }
 }
@@ -402,15 +404,15 @@ static rey_result prepare_tangent(Render *r, const float *tangent) {
     return rey_motion_tangent(r, r->tangent);
 }
 
-rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *adjoint,
-                   double *gradient, double *set_gradients, rey_stats *stats) {
+rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermRequest request, rey_selection selection,
+                         const float *adjoint, double *gradient, double *set_gradients, rey_stats *stats) {
     double start = rey_seconds();
     Render r;
     rey_result result = rey_begin(scene ? scene->ctx : NULL, adjoint && gradient && selection_given(selection));
     if (result != REY_OK) {
         return result;
     }
-    result = derivative_begin(&r, scene, def, selection, MODE_REVERSE);
+    result = derivative_begin(&r, scene, def, request, selection, MODE_REVERSE);
     if (result == REY_OK) {
         result = prepare_adjoint(&r, adjoint);
     }
@@ -418,6 +420,9 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
         r.shards = r.tiles < GRADIENT_SHARDS ? r.tiles : GRADIENT_SHARDS;
         r.gradients = rey_alloc_array(scene->ctx, (size_t)(r.gradient_size + 1) * (size_t)r.shards, sizeof(double));
         result = r.gradients ? REY_OK : REY_ERROR_MEMORY;
+    }
+    if (result == REY_OK && request.values) {
+        result = prepare_tangent(&r, request.direction);
     }
     if (result == REY_OK) {
         r.total = (r.tiles + (r.particles ? r.shards : 0.0)) * def->sets;
@@ -429,6 +434,7 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
                 rey_parallel_for(scene->ctx->def.threads, r.shards, gradient_unit, &r);
                 result = r.particles ? rey_particles_run(&r, NULL) : REY_OK;
             }
+            rey_terms_book(&r, set, REY_TERM_INTERIOR, NULL);
             run_boundaries(&r, set, NULL);
             result = result == REY_OK ? sum_shards(&r) : result;
             for (int64_t i = 0; i < r.selection_size && result == REY_OK; i++) {
@@ -443,8 +449,8 @@ rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection se
     return rey_render_end(&r, result, start, stats);
 }
 
-rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *tangent,
-                   float *derivative, double *set_values, rey_stats *stats) {
+rey_result rey_jvp_terms(rey_scene *scene, const rey_render_def *def, TermRequest request, rey_selection selection,
+                         const float *tangent, float *derivative, double *set_values, rey_stats *stats) {
     double start = rey_seconds();
     Render r;
     double *pictures = NULL;
@@ -452,7 +458,7 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
     if (result != REY_OK) {
         return result;
     }
-    result = derivative_begin(&r, scene, def, selection, MODE_FORWARD);
+    result = derivative_begin(&r, scene, def, request, selection, MODE_FORWARD);
     int64_t n = 0;
     if (result == REY_OK) {
         n = picture_floats(&r);
@@ -471,6 +477,7 @@ rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection se
             }
             collect_films(&r, r.job.spp, one);
             result = r.particles && (r.terms & REY_TERM_INTERIOR) ? rey_particles_run(&r, one) : result;
+            rey_terms_book(&r, set, REY_TERM_INTERIOR, one);
             run_boundaries(&r, set, one);
             double mean = 0;
             for (int64_t i = 0; i < n; i++) {

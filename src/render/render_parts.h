@@ -3,6 +3,7 @@
 
 #include "backend/backend.h"
 #include "render/film.h"
+#include "render/term_request.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -42,6 +43,8 @@ typedef struct Render {
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
     float *adjoint;
     int terms;             // REY_TERM_ bits that are computed
+    TermRequest request;
+    double booked;         // of a set's value: what its terms have brought so far
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
     BoundaryPlan boundary[BOUNDARY_TERMS];
     int32_t faces;         // which way shading normals were met: FACES_ bits

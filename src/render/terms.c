@@ -1,7 +1,9 @@
-// terms.c: which terms a selection needs, and which exist.
+// terms.c: which terms a selection needs, which exist, and what each brings.
 #include "render/terms.h"
 
 #include "render/motion.h"
+
+#include <string.h>
 
 // Why a parameter needs a term.
 static const char *term_reason(int bit, const rey_param_info *info) {
@@ -75,4 +77,41 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;
+}
+
+void rey_terms_book(Render *r, int set, int term, const double *picture) {
+    if (!r->request.values) {
+        return;
+    }
+    double sum = 0;
+    if (picture) {
+        int64_t n = (int64_t)r->plan.sensor->crop_width * r->plan.sensor->crop_height * 3;
+        for (int64_t i = 0; i < n; i++) {
+            sum += picture[i] / (double)n;
+        }
+    } else {
+        for (int64_t i = 0; i < r->shards * r->gradient_size; i++) {
+            sum += r->gradients[i] * (double)r->tangent[i % r->gradient_size];
+        }
+    }
+    double *values = r->request.values[set];
+    if (term == REY_TERM_INTERIOR) {
+        r->booked = 0;
+        memset(values, 0, TERM_COUNT * sizeof *values);
+    }
+    int index = 0;
+    for (; term >> index > 1; index++) {
+    }
+    values[index] = sum - r->booked;
+    r->booked = sum;
+}
+
+rey_result rey_jvp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *tangent,
+                   float *derivative, double *set_values, rey_stats *stats) {
+    return rey_jvp_terms(scene, def, (TermRequest){0}, selection, tangent, derivative, set_values, stats);
+}
+
+rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection, const float *adjoint,
+                   double *gradient, double *set_gradients, rey_stats *stats) {
+    return rey_vjp_terms(scene, def, (TermRequest){0}, selection, adjoint, gradient, set_gradients, stats);
 }

@@ -1,7 +1,11 @@
-// terms.h: which terms the gradient of a selection needs.
+// terms.h: which terms the gradient of a selection needs, and what each brings.
 #pragma once
 
-#include "scene/scene.h"
+#include "render/render_parts.h"
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed);
+
+// Books what has come together in a set since the last call, or since the set began where the term is `interior`, for a
+// term. picture: of the forward mode; in reverse mode the shards' gradients count.
+void rey_terms_book(Render *r, int set, int term, const double *picture);

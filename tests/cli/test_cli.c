@@ -39,6 +39,11 @@ static void usage_errors_exit_with_two(void **state) {
                                         "check %s",
                                         "render %s -o a.exr --sensor 1",
                                         "render %s -o a.exr --sensor 1 --json",
+                                        "grad %s --param x --spp-terms primary",
+                                        "grad %s --param x --spp-terms primary=0",
+                                        "grad %s --param x --spp-terms interior=4",
+                                        "grad %s --param x --spp-terms primary=4,",
+                                        "render %s -o a.exr --spp-terms primary=4",
                                         "compare a.exr",
                                         "doctor extra",
                                         "info %s --spp 4",
@@ -163,6 +168,56 @@ static void forward_and_reverse_agree(void **state) {
     assert_non_null(strstr(f->words, "blue"));
 }
 
+// Each term's share and its standard error; the shares sum up to the value, in both modes.
+static void terms_have_shares(void **state) {
+    Fixture *f = *state;
+    static const char *const names[] = {"interior", "primary", "indirect"};
+    static const char *const modes[] = {"", " --mode reverse --adjoint 0.00043402777777"};
+    double shares[2][3];
+    for (int mode = 0; mode < 2; mode++) {
+        char arguments[256], key[64];
+        snprintf(arguments, sizeof arguments, "grad %%s --param ball.to_world:translate=1,0.3,0 --spp 32 --json%s", modes[mode]);
+        JsonNode *node = run_json(f, 0, arguments);
+        double sum = 0, squares = 0;
+        for (int k = 0; k < 3; k++) {
+            snprintf(key, sizeof key, "terms.%s", names[k]);
+            shares[mode][k] = json_value(node, key, NAN);
+            snprintf(key, sizeof key, "terms_standard_error.%s", names[k]);
+            double error = json_value(node, key, NAN);
+            assert_true(shares[mode][k] != 0 && error > 0);
+            sum += shares[mode][k];
+            squares += error * error;
+        }
+        double value = json_value(node, "value", NAN), error = json_value(node, "standard_error", NAN);
+        assert_true(fabs(sum - value) <= 1e-9 * fabs(value));
+        assert_true(error < 2 * sqrt(squares));
+        json_free(node);
+    }
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs(shares[0][k] - shares[1][k]) <= 1e-4 * (fabs(shares[0][k]) + fabs(shares[0][0])));
+    }
+    // a term alone is what it is among others
+    JsonNode *node = run_json(f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --terms indirect");
+    assert_true(fabs(json_value(node, "value", NAN) - shares[0][2]) <= 1e-9 * fabs(shares[0][2]));
+    assert_true(json_get(node, "terms.interior") == NULL);
+    json_free(node);
+}
+
+// Samples of one term for its own noise; the others keep theirs.
+static void terms_have_budgets(void **state) {
+    Fixture *f = *state;
+    JsonNode *few = run_json(f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms primary=16,indirect=32");
+    JsonNode *many = run_json(f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms indirect=2048,primary=1024");
+    static const char *const bounded[] = {"terms_standard_error.primary", "terms_standard_error.indirect"};
+    for (int k = 0; k < 2; k++) {
+        double ratio = json_value(few, bounded[k], NAN) / json_value(many, bounded[k], NAN);
+        assert_true(ratio > 3 && ratio < 40); // 8 where noise is that of independent samples
+    }
+    assert_true(json_value(few, "terms.interior", 0) == json_value(many, "terms.interior", 1));
+    json_free(few);
+    json_free(many);
+}
+
 static void incomplete_gradients_are_refused(void **state) {
     Fixture *f = *state;
     expect(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16");
@@ -266,6 +321,7 @@ int main(void) {
         cmocka_unit_test(usage_errors_exit_with_two),     cmocka_unit_test(help_and_version),
         cmocka_unit_test(failures_exit_with_one),         cmocka_unit_test(rendering),
         cmocka_unit_test(forward_and_reverse_agree),      cmocka_unit_test(incomplete_gradients_are_refused),
+        cmocka_unit_test(terms_have_shares), cmocka_unit_test(terms_have_budgets),
         cmocka_unit_test(checks_pass_on_right_gradients), cmocka_unit_test(check_all_lists_every_parameter),
         cmocka_unit_test(variances_are_written), cmocka_unit_test(descriptions),
         cmocka_unit_test(interruption_exits_with_130),

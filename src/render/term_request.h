@@ -1,0 +1,18 @@
+// term_request.h: derivatives whose terms are told apart, and have samples of their own.
+#pragma once
+
+#include "reynolds/reynolds.h"
+
+enum { TERM_COUNT = 6 }; // REY_TERM_ bits
+
+typedef struct TermRequest {
+    int primary_spp, indirect_spp; // samples per pixel of these terms, 0 = as fits def->spp
+    double (*values)[TERM_COUNT];  // null, or one row per set: what each term, in the order of its bit, adds to its value
+    const float *direction;        // of rey_vjp_terms, whose value is the gradient's product with it
+} TermRequest;
+
+// rey_jvp and rey_vjp with a request.
+rey_result rey_jvp_terms(rey_scene *scene, const rey_render_def *def, TermRequest request, rey_selection selection,
+                         const float *tangent, float *derivative, double *set_values, rey_stats *stats);
+rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermRequest request, rey_selection selection,
+                         const float *adjoint, double *gradient, double *set_gradients, rey_stats *stats);
