@@ -16,7 +16,7 @@ LIMITS = {
     "pose": {"bracket.to_world": 0.02},
     "camera": {"camera.to_world": 0.01, "camera.x_fov": 0.01},
     "glass": {"pebble.to_world": 0.02, "group.shape_0.bsdf.eta.value": 0.01},
-    "shape": {"creature.positions": 0.006},
+    "shape": {"creature.positions": 0.004},
 }
 LEAST_POINTS = {"shape": 5000}
 
