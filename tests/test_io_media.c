@@ -43,6 +43,7 @@ static int make_folder(void **state) {
     write_vol(ctx, "colours.vol", 2, 2, 2, 3, NULL);
     write_vol(ctx, "two.vol", 2, 2, 2, 2, NULL);
     write_vol(ctx, "flakes.vol", 1, 1, 1, 6, NULL);
+    write_vol(ctx, "bad_flakes.vol", 2, 1, 1, 6, NULL);
     assert_int_equal(rey_npy_write(ctx, "dense.npy", data, (const int64_t[3]){2, 2, 2}, 3), REY_OK);
     *state = ctx;
     return 0;
@@ -57,7 +58,7 @@ static int remove_folder(void **state) {
 
 #define SENSOR                                                                                                         \
     "<sensor type='perspective' id='eye'><film type='hdrfilm'><integer name='width' value='4'/>"                       \
-    "<integer name='height' value='4'/></film>%s</sensor>"
+    "<integer name='height' value='4'/><rfilter type='box'/></film>%s</sensor>"
 
 static rey_result load_with(rey_context *ctx, const char *integrator, const char *in_sensor, const char *text, rey_scene **scene) {
     FILE *f = fopen("scene.xml", "w");
@@ -81,56 +82,73 @@ static rey_scene *must_load(rey_context *ctx, const char *text) {
     "<volume type='gridvolume' name='" slot "'><string name='filename' value='" file "'/>" more "</volume>"
 #define MATRIX(value) "<transform name='to_world'><matrix value='" value "'/></transform>"
 
+static const struct {
+    const char *text, *words;
+} refused[] = {
+    {"<medium type='homogenous'/>", "there is no medium 'homogenous', did you mean 'homogeneous'?"},
+    {HOMO("<rgb name='sigma_t' value='2, 1, 1'/>"), "scene.xml:3"},
+    {HOMO("<float name='sigma_t' value='-1'/>"), "sigma_t is -1"},
+    {HOMO("<float name='albedo' value='1.5'/>"), "albedo is 1.5"},
+    {HOMO("<float name='scale' value='-2'/>"), "scale is -2"},
+    {HOMO("<float name='sigma_s' value='1'/><float name='albedo' value='1'/>"), "may be given, not both"},
+    {HOMO("<rgb name='sigma_s' value='1, -1, 1'/>"), "sigma_s is -1"},
+    {HOMO(GRID("sigma_s", "smoke.vol", "")), "'sigma_s' of medium 'homogeneous' is an object (volume)"},
+    {HOMO("<float name='sigma_x' value='1'/>"), "unknown property 'sigma_x'"},
+    {HOMO(GRID("sigma_t", "smoke.vol", "")), "'sigma_t' of a homogeneous medium is a grid"},
+    {HOMO(GRID("albedo", "dense.npy", "")), "the volume holds 2, expected numbers in [0, 1]: share of the extinction"},
+    {HOMO("<phase type='hg'/><phase type='hg'/>"), "a medium can have one phase function"},
+    {HOMO("<phase type='hgg'/>"), "there is no phase 'hgg', did you mean 'hg'?"},
+    {HOMO("<phase type='hg'><float name='g' value='1'/></phase>"), "g is 1"},
+    {HOMO("<phase type='blendphase'><phase type='hg'/><phase type='isotropic'/></phase>"), "lacks 'weight'"},
+    {HOMO("<phase type='blendphase'><float name='weight' value='0.5'/><phase type='hg'/></phase>"),
+     "'blendphase' takes 2 nested phase functions, found 1"},
+    {HOMO("<phase type='tabphase'/>"), "lacks 'values'"},
+    {HOMO("<phase type='tabphase'><string name='values' value='1'/></phase>"), "expected two or more"},
+    {HOMO("<phase type='tabphase'><string name='values' value='0, 0'/></phase>"), "not all 0"},
+    {HOMO("<phase type='tabphase'><string name='values' value='1, -1, 3'/></phase>"), "number 2 of 'values' is -1"},
+    {HOMO("<phase type='tabphase'><string name='values' value='1, b'/></phase>"), "must be numbers"},
+    {HOMO("<phase type='sggx'/>"), "lacks 'S'"},
+    {HOMO("<phase type='sggx'><string name='S' value='1, 1, 1, 0, 0'/></phase>"), "'S' holds 5 numbers, expected 6"},
+    {HOMO("<phase type='sggx'><string name='S' value='1, 1, 1, 2, 0, 0'/></phase>"), "not positive definite"},
+    {HOMO("<phase type='sggx'>" GRID("S", "smoke.vol", "") "</phase>"), "'S' has 1 channels, expected a grid of 6"},
+    {HOMO("<phase type='sggx'>" GRID("S", "bad_flakes.vol", "") "</phase>"), "'S' is not positive definite"},
+    {HOMO("<phase type='blendphase'>" GRID("weight", "colours.vol", "") "<phase type='hg'/><phase type='hg'/></phase>"),
+     "'weight' of a phase function must be a number or a volume of numbers"},
+    {HOMO("<phase type='dictionary'/>"), "lacks 'weights'"},
+    {HOMO("<phase type='dictionary'><string name='weights' value='1, 2'/><phase type='hg'/></phase>"),
+     "'dictionary' has 2 weights for 1 nested phase functions"},
+    {HOMO("<phase type='dictionary'><string name='weights' value='0'/><phase type='hg'/></phase>"), "not all 0"},
+    {"<bsdf type='diffuse'><texture type='volume' name='reflectance'/></bsdf>", "takes one nested volume, found none"},
+    {"<bsdf type='diffuse'><texture type='volume' name='reflectance'>" GRID("v", "dense.npy", "") "</texture></bsdf>",
+     "the volume holds 2, expected numbers in [0, 1]"},
+    {"<bsdf type='diffuse'><texture type='volume' name='reflectance'>" GRID("v", "flakes.vol", "") "</texture></bsdf>",
+     "the volume of a texture has 6 channels"},
+    {"<bsdf type='bumpmap'><texture type='volume'>" GRID("v", "smoke.vol", "") "</texture><bsdf type='diffuse'/></bsdf>",
+     "the texture of 'bumpmap' cannot be a volume"},
+    {"<shape type='rectangle'><emitter type='area'><texture type='volume' name='radiance'>" GRID("v", "smoke.vol", "")
+     "</texture></emitter></shape>", "'radiance' of a light cannot be a volume"},
+    {HETERO(GRID("sigma_t", "no.vol", "")), "no.vol"},
+    {HETERO(GRID("sigma_t", "scene.xml", "")), "scene.xml: byte 0: not a VOL file"},
+    {HETERO(GRID("sigma_t", "two.vol", "")), "the grid has 2 channels, expected 1, 3 or 6"},
+    {HETERO(GRID("sigma_t", "flakes.vol", "")), "'sigma_t' has 6 channels, expected 1 or 3"},
+    {HETERO(GRID("sigma_t", "smoke.vol", "<string name='filter_type' value='cubic'/>")), "'nearest', 'trilinear'"},
+    {HETERO(GRID("sigma_t", "smoke.vol", MATRIX("1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1"))), "to_world cannot be inverted"},
+    {HETERO(GRID("sigma_t", "flat.vol", "<boolean name='use_grid_bbox' value='true'/>")),
+     "to_world with the box of its file cannot be inverted"},
+    {HETERO("<volume type='gridvolume' name='sigma_t'/>"), "filename"},
+    {HETERO("<volume type='gridvolum' name='sigma_t'/>"), "did you mean 'gridvolume'?"},
+    {HETERO("<texture type='checkerboard' name='sigma_t'/>"), "the texture of a volume must be one value"},
+    {"<shape type='sphere'><medium type='homogeneous'/></shape>", "has no use for the medium 'homogeneous'"},
+    {"<bsdf type='null' id='b'/><shape type='sphere'><ref id='b' name='interior'/></shape>", "'interior' must be a medium, not a bsdf"},
+};
+
 static void test_refusals(void **state) {
-    static const struct {
-        const char *text, *words;
-    } cases[] = {
-        {"<medium type='homogenous'/>", "there is no medium 'homogenous', did you mean 'homogeneous'?"},
-        {HOMO("<rgb name='sigma_t' value='2, 1, 1'/>"), "scene.xml:3"},
-        {HOMO("<float name='sigma_t' value='-1'/>"), "sigma_t is -1"},
-        {HOMO("<float name='albedo' value='1.5'/>"), "albedo is 1.5"},
-        {HOMO("<float name='scale' value='-2'/>"), "scale is -2"},
-        {HOMO("<float name='sigma_s' value='1'/><float name='albedo' value='1'/>"), "may be given, not both"},
-        {HOMO("<rgb name='sigma_s' value='1, -1, 1'/>"), "sigma_s is -1"},
-        {HOMO(GRID("sigma_s", "smoke.vol", "")), "'sigma_s' of medium 'homogeneous' is an object (volume)"},
-        {HOMO("<float name='sigma_x' value='1'/>"), "unknown property 'sigma_x'"},
-        {HOMO(GRID("sigma_t", "smoke.vol", "")), "'sigma_t' of a homogeneous medium is a grid"},
-        {HOMO(GRID("albedo", "dense.npy", "")), "the volume holds 2, expected numbers in [0, 1]: share of the extinction"},
-        {HOMO("<phase type='hg'/><phase type='hg'/>"), "a medium can have one phase function"},
-        {HOMO("<phase type='hgg'/>"), "there is no phase 'hgg', did you mean 'hg'?"},
-        {HOMO("<phase type='hg'><float name='g' value='1'/></phase>"), "g is 1"},
-        {HOMO("<phase type='blendphase'><phase type='hg'/><phase type='isotropic'/></phase>"), "lacks 'weight'"},
-        {HOMO("<phase type='blendphase'><float name='weight' value='0.5'/><phase type='hg'/></phase>"),
-         "'blendphase' takes 2 nested phase functions, found 1"},
-        {HOMO("<phase type='tabphase'/>"), "lacks 'values'"},
-        {HOMO("<phase type='tabphase'><string name='values' value='1'/></phase>"), "expected two or more"},
-        {HOMO("<phase type='tabphase'><string name='values' value='0, 0'/></phase>"), "not all 0"},
-        {HOMO("<phase type='tabphase'><string name='values' value='1, -1, 3'/></phase>"), "number 2 of 'values' is -1"},
-        {HOMO("<phase type='tabphase'><string name='values' value='1, b'/></phase>"), "must be numbers"},
-        {HOMO("<phase type='sggx'/>"), "lacks 'S'"},
-        {HOMO("<phase type='sggx'><string name='S' value='1, 1, 1, 0, 0'/></phase>"), "'S' holds 5 numbers, expected 6"},
-        {HOMO("<phase type='sggx'><string name='S' value='1, 1, 1, 2, 0, 0'/></phase>"), "not positive definite"},
-        {HOMO("<phase type='sggx'>" GRID("S", "smoke.vol", "") "</phase>"), "expected one voxel of 6"},
-        {HETERO(GRID("sigma_t", "no.vol", "")), "no.vol"},
-        {HETERO(GRID("sigma_t", "scene.xml", "")), "scene.xml: byte 0: not a VOL file"},
-        {HETERO(GRID("sigma_t", "two.vol", "")), "the grid has 2 channels, expected 1, 3 or 6"},
-        {HETERO(GRID("sigma_t", "flakes.vol", "")), "'sigma_t' has 6 channels, expected 1 or 3"},
-        {HETERO(GRID("sigma_t", "smoke.vol", "<string name='filter_type' value='cubic'/>")), "'nearest', 'trilinear'"},
-        {HETERO(GRID("sigma_t", "smoke.vol", MATRIX("1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1"))), "to_world cannot be inverted"},
-        {HETERO(GRID("sigma_t", "flat.vol", "<boolean name='use_grid_bbox' value='true'/>")),
-         "to_world with the box of its file cannot be inverted"},
-        {HETERO("<volume type='gridvolume' name='sigma_t'/>"), "filename"},
-        {HETERO("<volume type='gridvolum' name='sigma_t'/>"), "did you mean 'gridvolume'?"},
-        {HETERO("<texture type='checkerboard' name='sigma_t'/>"), "the texture of a volume must be one value"},
-        {"<shape type='sphere'><medium type='homogeneous'/></shape>", "has no use for the medium 'homogeneous'"},
-        {"<bsdf type='null' id='b'/><shape type='sphere'><ref id='b' name='interior'/></shape>", "'interior' must be a medium, not a bsdf"},
-    };
-    for (int i = 0; i < COUNT_OF(cases); i++) {
+    for (int i = 0; i < COUNT_OF(refused); i++) {
         rey_scene *scene = NULL;
-        rey_result result = load_with(*state, "volpath", "", cases[i].text, &scene);
+        rey_result result = load_with(*state, "volpath", "", refused[i].text, &scene);
         rey_scene_destroy(scene);
-        if (result == REY_OK || !strstr(rey_error(*state), cases[i].words)) {
-            fail_msg("%s: \"%s\", expected \"%s\"", cases[i].text, result ? rey_error(*state) : "loaded", cases[i].words);
+        if (result == REY_OK || !strstr(rey_error(*state), refused[i].words)) {
+            fail_msg("%s: \"%s\", expected \"%s\"", refused[i].text, result ? rey_error(*state) : "loaded", refused[i].words);
         }
     }
 }
@@ -151,6 +169,10 @@ static const char *const everything =
            "<string name='values' value='1 2, 3'/></phase><phase type='blendphase'><float name='weight' value='0.5'/>"
            "<phase type='hg'><float name='g' value='-0.5'/></phase><phase type='sggx'>" GRID("S", "flakes.vol", "")
            "</phase></phase></phase>")
+    "<medium type='homogeneous' id='dust'><phase type='dictionary'><string name='weights' value='1, 2, 5'/>"
+    "<phase type='hg'/><phase type='rayleigh'/><phase type='blendphase'>" GRID("weight", "smoke.vol", "")
+    "<phase type='hg'/><phase type='isotropic'/></phase></phase></medium>"
+    "<bsdf type='diffuse' id='marble'><texture type='volume' name='reflectance'>" GRID("v", "colours.vol", "") "</texture></bsdf>"
     "<medium type='homogeneous' id='ink'><float name='sigma_s' value='6'/><rgb name='sigma_a' value='2, 6, 0'/></medium>"
     "<medium type='homogeneous' id='milk'><rgb name='sigma_t' value='0.5, 0.25, 1'/></medium>"
     "<shape type='sphere' id='ball'><bsdf type='null'/><ref name='interior' id='fog'/><ref name='exterior' id='milk'/></shape>"
@@ -161,7 +183,7 @@ static void test_records(void **state) {
     rey_scene *scene = NULL;
     assert_int_equal(load_with(*state, "volpath", "<ref id='milk'/>", everything, &scene), REY_OK);
     const SceneView *view = &scene->view;
-    assert_int_equal(view->media_count, 4);
+    assert_int_equal(view->media_count, 5);
     int milk = view->sensors[0].medium, fog = view->shapes[0].interior;
     assert_int_equal(view->shapes[0].exterior, milk);
     assert_int_equal(view->shapes[1].exterior, -1);
@@ -178,7 +200,11 @@ static void test_records(void **state) {
     assert_true(colour->kind == VOLUME_CONSTANT && colour->channels == 3 && view->theta[colour->theta + 1] == 0.25f);
     assert_true(grey->channels == 1 && view->theta[grey->theta] == 0.75f);
     assert_true(view->theta[view->volumes[m->emission].theta + 2] == 0.125f);
-    const MediumNode *ink = view->media + 2;
+    const PhaseNode *list = view->phases + view->media[2].phase, *second = view->phases + list->child[1];
+    const PhaseNode *third = view->phases + second->child[1];
+    assert_true(view->phases[list->child[0]].kind == 1 && view->phases[second->child[0]].kind == 2 && third->child[1] < 0);
+    assert_int_equal(view->textures[view->phases[third->child[0]].slot[0]].kind, TEXTURE_VOLUME);
+    const MediumNode *ink = view->media + 3;
     const float *sum = view->theta + view->volumes[ink->sigma_t].theta, *share = view->theta + view->volumes[ink->albedo].theta;
     assert_true(sum[0] == 8 && sum[1] == 12 && sum[2] == 6 && share[0] == 0.75f && share[1] == 0.5f && share[2] == 1);
     const PhaseNode *blend = view->phases + m->phase, *table = view->phases + blend->child[0];
@@ -225,6 +251,10 @@ static void test_parameters(void **state) {
         {"fog.phase_function.phase_0.values", 3},
         {"fog.phase_function.phase_1.phase_0.g", 1},
         {"fog.phase_function.phase_1.phase_1.S.data", 6},
+        {"dust.phase_function.weights", 3},
+        {"dust.phase_function.phase_2.weight.data", 60},
+        {"dust.phase_function.phase_0.g", 1},
+        {"marble.reflectance.volume.data", 24},
         {"milk.sigma_t.value.value", 3},
         {"milk.sigma_t", 3},
         {"milk.albedo.value.value", 1},
@@ -289,6 +319,50 @@ static void test_other_files(void **state) {
     rey_scene_destroy(scene);
 }
 
+// Under a white sky a diffuse surface shows its reflectance: of the voxels that it lies in. What moves it is refused.
+static void test_texture(void **state) {
+    static const char *const text =
+        "<emitter type='constant'><rgb name='radiance' value='1, 1, 1'/></emitter>"
+        "<shape type='rectangle' id='card'><transform name='to_world'><scale value='0.5'/><translate x='0.5' y='0.5' z='0.25'/>"
+        "</transform><bsdf type='diffuse'><texture type='volume' name='reflectance'>"
+        GRID("v", "colours.vol", "<string name='filter_type' value='nearest'/>") "</texture></bsdf></shape>";
+    static const char *const look = "<float name='fov' value='20.61'/><transform name='to_world'>"
+                                    "<lookat origin='0.5, 0.5, 3' target='0.5, 0.5, 0' up='0, 1, 0'/></transform>";
+    rey_scene *scene = NULL;
+    float image[4 * 4 * 3];
+    double gradient[24];
+    rey_render_def def = rey_default_render_def();
+    def.spp = 256;
+    assert_int_equal(load_with(*state, "path", look, text, &scene), REY_OK);
+    assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
+    for (int i = 0; i < 48; i++) {
+        int c = i % 3, x = i / 3 % 4, y = 3 - i / 12, voxel = y / 2 * 2 + x / 2;
+        float expected = 0.25f + 0.5f * (float)((3 * voxel + c) % 7) / 6;
+        if (!(fabsf(image[i] - expected) < 0.04f)) {
+            fail_msg("pixel %d, %d is %g, expected %g", x, y, (double)image[i], (double)expected);
+        }
+    }
+    int data = find(scene, "card.bsdf.reflectance.volume.data"), card = find(scene, "card.to_world");
+    int place = find(scene, "card.bsdf.reflectance.volume.to_world");
+    rey_selection selection = {&data, 1};
+    for (int i = 0; i < 48; i++) {
+        image[i] = 1;
+    }
+    assert_int_equal(rey_vjp(scene, &def, selection, image, gradient, NULL, NULL), REY_OK);
+    for (int i = 0; i < 24; i++) { // four pixels see each voxel of the lower layer
+        double expected = i < 12 ? 4 : 0;
+        if (!(fabs(gradient[i] - expected) <= 0.05 * expected)) {
+            fail_msg("the derivative by number %d is %g, expected %g", i, gradient[i], expected);
+        }
+    }
+    selection.params = &card;
+    assert_int_equal(rey_vjp(scene, &def, selection, image, gradient, NULL, NULL), REY_ERROR_INCOMPLETE);
+    assert_non_null(strstr(rey_error(*state), "where surfaces have volumes as textures"));
+    selection.params = &place;
+    assert_int_equal(rey_vjp(scene, &def, selection, image, gradient, NULL, NULL), REY_ERROR_INCOMPLETE);
+    rey_scene_destroy(scene);
+}
+
 static void assert_same(rey_scene *a, rey_scene *b) {
     assert_int_equal(rey_param_count(a), rey_param_count(b));
     for (int i = 0; i < rey_param_count(a); i++) {
@@ -335,6 +409,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_records),
                                        cmocka_unit_test(test_use),      cmocka_unit_test(test_parameters),
                                        cmocka_unit_test(test_update),   cmocka_unit_test(test_other_files),
+                                       cmocka_unit_test(test_texture),
                                        cmocka_unit_test(test_round_trip)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

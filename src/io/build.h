@@ -113,6 +113,7 @@ rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureU
                       const char *path, int32_t *out);
 // A texture object.
 rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
+bool build_is_volume(const Builder *b, int32_t texture); // itself or in a child
 // A constant with its parameter `path`.value (alias `path`). node and property say where it came from, may be null.
 rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, TextureUse use, const double *values,
                           int count, const char *path, int32_t *out);

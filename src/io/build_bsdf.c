@@ -111,12 +111,13 @@ static rey_result alpha_slot(Builder *b, rey_xml_node *node, const ParamDesc *p,
     return build_slot(b, node, "alpha", slot_use(p), &value, 1, name, out);
 }
 
-// Attributes know nothing of the terms that a shading normal needs.
+// Attributes know nothing of the terms that a shading normal needs, and volumes have no slope on a surface.
 static rey_result refuse_attribute(Builder *b, const rey_xml_node *node, int32_t texture) {
     bool attribute = ARRAY_AT(b->scene->build.textures, TextureNode, texture).kind == TEXTURE_ATTRIBUTE;
-    return !attribute ? REY_OK
-                      : rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED,
-                                     "the texture of '%s' cannot be a mesh attribute", node->type);
+    bool volume = build_is_volume(b, texture);
+    return !attribute && !volume ? REY_OK
+                                 : rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED, "the texture of '%s' cannot be a %s",
+                                                node->type, volume ? "volume" : "mesh attribute");
 }
 
 // The only texture of a bump map, under any name. Its slope jumps between texels, and the jumps move with to_uv.

@@ -22,7 +22,10 @@ static rey_result colour_slot(Builder *b, rey_xml_node *node, const EmitterParam
     rey_colour_use colour = p->type == EMITTER_PARAM_EMISSION ? REY_COLOUR_EMISSION : REY_COLOUR_UNBOUNDED;
     TextureUse use = {colour, false, p->low, p->high, p->unit, p->text, 0, NULL};
     double value = (double)p->value;
-    return build_slot(b, node, p->name, use, &value, 1, path, out);
+    TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
+    return !build_is_volume(b, *out) ? REY_OK
+                                     : rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED,
+                                                    "'%s' of a light cannot be a volume", p->name);
 }
 
 static rey_result number_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, double value, const char *path,

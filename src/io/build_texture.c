@@ -189,6 +189,29 @@ static rey_result build_attribute(Builder *b, rey_xml_node *node, const char *pa
     return build_note_source(b, node, NULL, *out);
 }
 
+// A field over space where a surface lies in it.
+static rey_result build_volume_texture(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
+    rey_xml_child *child = rey_xml_child_of(node, REY_XML_BIT(REY_XML_VOLUME), 0);
+    char name[MAX_PATH_NAME];
+    int32_t id;
+    if (!child) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a texture 'volume' takes one nested volume, found none");
+    }
+    build_join(name, path, "volume");
+    TRY(build_volume(b, child->node, use, name, &id));
+    const VolumeNode *v = &ARRAY_AT(b->scene->build.volumes, VolumeNode, id);
+    *out = v->texture;
+    return v->channels <= 3 ? REY_OK
+                            : rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "the volume of a texture has %d channels, expected 1 or 3",
+                                           v->channels);
+}
+
+bool build_is_volume(const Builder *b, int32_t texture) {
+    const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, texture);
+    return t->kind == TEXTURE_VOLUME || (t->child[0] >= 0 && build_is_volume(b, t->child[0])) ||
+           (t->child[1] >= 0 && build_is_volume(b, t->child[1]));
+}
+
 // A texture that several slots share needs the terms of all of them.
 static void add_terms(Builder *b, int32_t texture, const TextureUse *use) {
     Param *p;
@@ -218,6 +241,8 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
         TRY(build_checkerboard(b, node, use, path, out));
     } else if (strcmp(node->type, "mesh_attribute") == 0) {
         TRY(build_attribute(b, node, path, out));
+    } else if (strcmp(node->type, "volume") == 0) {
+        TRY(build_volume_texture(b, node, use, path, out));
     } else {
         TRY(build_spectrum(b, node, use, path, out));
     }

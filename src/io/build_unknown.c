@@ -29,7 +29,6 @@ static const struct {
                {"ellipsoidsmesh", no_splats},
                {"volprim_rf_basic", no_splats},
                {"specfilm", "there are no spectral films; 'hdrfilm' is the film"},
-               {"volume", missing},
                {"roughdiffuse", "'diffuse' is its limit of no roughness"},
                {"phong", two_lobes},
                {"ward", two_lobes},

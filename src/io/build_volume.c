@@ -90,6 +90,7 @@ static rey_result add_grid(Builder *b, rey_xml_node *node, const rey_grid *grid,
     TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, volume->texture);
     t->channels = grid->channels;
     t->volume = id;
+    t->filter = volume->filter;
     volume->theta = t->theta;
     volume->channels = grid->channels;
     volume->nx = grid->nx;

@@ -7,3 +7,4 @@ PHASE_LEAF(RAYLEIGH, rayleigh, Rayleigh, "rayleigh", NO_PHASE_PARAMS, "rayleigh1
 PHASE_LEAF(TABPHASE, tabphase, TabPhase, "tabphase", TABPHASE_PARAMS, "")
 PHASE_LEAF(SGGX, sggx, Sggx, "sggx", SGGX_PARAMS, "heitz2015")
 PHASE_ADAPTER(BLENDPHASE, blendphase, BlendPhase, "blendphase", BLENDPHASE_PARAMS, 2, "")
+PHASE_ADAPTER(DICTIONARY, dictionary, Dictionary, "dictionary", DICTIONARY_PARAMS, ANY_NUMBER, "")

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "medium/blendphase.h"
+#include "medium/dictionary.h"
 #include "medium/hg.h"
 #include "medium/isotropic.h"
 #include "medium/rayleigh.h"
@@ -46,9 +47,21 @@ KFN void phase_scatter_TABLE(const PhaseCall *call, int32_t slot, PhaseTable d, 
     }
 }
 
+// The grid of a matrix that differs from place to place; null = it is the same everywhere.
+KFN const VolumeNode *phase_matrix_grid(const PhaseCall *call, int32_t slot) {
+    const TextureNode *t = call->scene->textures + slot;
+    const VolumeNode *v = t->kind == TEXTURE_VOLUME && call->at.hit ? call->scene->volumes + t->volume : NULL;
+    return v && v->nx * v->ny * v->nz > 1 ? v : NULL;
+}
+
 KFN PhaseMatrix phase_fetch_MATRIX(const PhaseCall *call, int32_t slot) {
+    const VolumeNode *grid = phase_matrix_grid(call, slot);
     const float *s = call->scene->theta + call->scene->textures[slot].theta;
     PhaseMatrix matrix;
+    if (grid) {
+        gridvolume_eval_six(call->scene, grid, volume_to_local(call->scene, grid, call->at.hit->p, 1), matrix.m);
+        return matrix;
+    }
     for (int i = 0; i < 6; i++) {
         matrix.m[i] = f_set((real)s[i]);
     }
@@ -56,10 +69,24 @@ KFN PhaseMatrix phase_fetch_MATRIX(const PhaseCall *call, int32_t slot) {
 }
 
 KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d, Sink *sink, Mask m) {
-    UNUSED(call);
-    for (int i = 0; i < 6 && sink->texture_at[slot] >= 0; i++) {
-        sink_add_uniform(sink, sink->texture_at[slot] + i, d.m[i], m);
+    const VolumeNode *grid = phase_matrix_grid(call, slot);
+    int32_t at = sink->texture_at[slot];
+    if (grid && at >= 0) {
+        gridvolume_adj_six(grid, volume_to_local(call->scene, grid, call->at.hit->p, 1), d.m, at, sink, m);
+        return;
     }
+    for (int i = 0; i < 6 && at >= 0; i++) {
+        sink_add_uniform(sink, at + i, d.m[i], m);
+    }
+}
+
+KFN PhaseWeights phase_fetch_WEIGHTS(const PhaseCall *call, int32_t slot) {
+    const TextureNode *t = call->scene->textures + slot;
+    return (PhaseWeights){call->scene->theta + t->theta, t->width, slot};
+}
+
+KFN void phase_scatter_WEIGHTS(const PhaseCall *call, int32_t slot, PhaseWeights d, Sink *sink, Mask m) {
+    UNUSED(call), UNUSED(slot), UNUSED(d), UNUSED(sink), UNUSED(m);
 }
 
 #define FETCH_PHASE_FIELD(type, field, value, low, high, text)                                                         \

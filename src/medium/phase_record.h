@@ -20,13 +20,21 @@ typedef struct PhaseMatrix {
     Float m[6];
 } PhaseMatrix;
 
+// As many as there are functions; whoever reads them also hands out their adjoints.
+typedef struct PhaseWeights {
+    const float *values;
+    int32_t count, slot;
+} PhaseWeights;
+
 // A kind's parameters as rows P(type, field, default, low, high, description):
 //   NUMBER   number, or a texture of numbers
 //   TABLE    two or more numbers
-//   MATRIX   six numbers
+//   MATRIX   six numbers, or a grid of them
+//   WEIGHTS  a number for each of the functions that this one is made of
 #define FIELD_NUMBER Float
 #define FIELD_TABLE PhaseTable
 #define FIELD_MATRIX PhaseMatrix
+#define FIELD_WEIGHTS PhaseWeights
 #define PHASE_FIELD(type, field, value, low, high, text) FIELD_##type field;
 #define NO_PHASE_PARAMS(P)
 

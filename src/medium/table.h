@@ -3,7 +3,7 @@
 
 #include "scene/scene.h"
 
-typedef enum PhaseParamType { PHASE_PARAM_NUMBER, PHASE_PARAM_TABLE, PHASE_PARAM_MATRIX } PhaseParamType;
+typedef enum PhaseParamType { PHASE_PARAM_NUMBER, PHASE_PARAM_TABLE, PHASE_PARAM_MATRIX, PHASE_PARAM_WEIGHTS } PhaseParamType;
 
 typedef struct PhaseParam {
     PhaseParamType type;
@@ -12,10 +12,12 @@ typedef struct PhaseParam {
     const char *text;
 } PhaseParam;
 
+enum { ANY_NUMBER = -1 };
+
 typedef struct PhaseKind {
     const char *name;
     const PhaseParam *params;
-    int param_count, children;
+    int param_count, children; // children: how many functions it is made of, or ANY_NUMBER
     const char *reference;
 } PhaseKind;
 

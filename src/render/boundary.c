@@ -21,7 +21,7 @@ static bool has_steps(const SceneView *view) {
     for (int64_t i = 0; i < view->textures_count; i++) {
         const TextureNode *texture = view->textures + i;
         if (texture->kind == TEXTURE_CHECKERBOARD || (texture->kind == TEXTURE_ATTRIBUTE && texture->per_face) ||
-            (texture->kind == TEXTURE_BITMAP && texture->filter == FILTER_NEAREST)) {
+            ((texture->kind == TEXTURE_BITMAP || texture->kind == TEXTURE_VOLUME) && texture->filter == FILTER_NEAREST)) {
             return true;
         }
     }

@@ -25,6 +25,9 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
     }
+    if (p->volume >= 0) {
+        return 0;
+    }
     return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
 }
 
@@ -32,6 +35,26 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
 static bool moves(const Param *p) {
     return p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || p->volume >= 0 ||
            (p->terms & REY_TERM_SPECULAR);
+}
+
+static bool is_volume(const SceneView *view, int32_t texture) {
+    if (texture < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + texture;
+    return t->kind == TEXTURE_VOLUME || is_volume(view, t->child[0]) || is_volume(view, t->child[1]);
+}
+
+// Whether points of surfaces look up volumes: where points move, so does what they find.
+static bool surfaces_read_volumes(const SceneView *view) {
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        for (int k = 0; k < MAX_SLOTS; k++) {
+            if (is_volume(view, view->bsdfs[i].slot[k])) {
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
@@ -56,6 +79,12 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
                             "no term of the gradient of %s exists yet in scenes with participating media: what moves "
                             "changes what they let through and scatter, and moves the shadows in them",
                             info.name);
+        }
+        bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->terms & REY_TERM_SPECULAR);
+        if (points && surfaces_read_volumes(&scene->view)) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
+                            "move look them up elsewhere", info.name);
         }
         int known = terms_known(scene, def, p);
         int missing = info.terms & ~known;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scene/attribute.h"
+#include "scene/volume.h"
 
 KFN Vec2 texture_map_uv(const SceneView *scene, const TextureNode *t, Vec2 uv) {
     if (t->to_uv < 0) {
@@ -32,21 +33,6 @@ KFN void texture_map_uv_adj(const SceneView *scene, const TextureNode *t, Vec2 u
         sink_add_uniform(sink, to_uv_at + 4, d.y * uv.y, m);
         sink_add_uniform(sink, to_uv_at + 5, d.y, m);
     }
-}
-
-// Texel index under the wrap mode; n is the number of texels along the axis.
-KFN Int texture_wrap(Int i, int32_t n, int32_t wrap) {
-    if (wrap == WRAP_CLAMP) {
-        return i_max(i_min(i, i_set(n - 1)), i_set(0));
-    }
-    int32_t period = wrap == WRAP_MIRROR ? 2 * n : n;
-    Int q = i_from_f(f_floor(f_from_i(i) * (1.0f / (real)period) + 0.5f / (real)period));
-    i = i - q * period;
-    i = i_max(i_min(i, i_set(period - 1)), i_set(0)); // guards the rounding of q
-    if (wrap == WRAP_MIRROR) {
-        i = i_select(mi_lt(i, i_set(n)), i, 2 * n - 1 - i);
-    }
-    return i;
 }
 
 // The four texels around uv (nearest: all the same) and the bilinear weights.
@@ -160,6 +146,19 @@ KFN Spec luminance_adj(Float d) {
     return s;
 }
 
+// A field over space, looked up where the hit is; 0 where there is none. The point counts as fixed.
+KFN Spec volume_texture_eval(const SceneView *scene, const TextureNode *t, const Hit *hit) {
+    const VolumeNode *v = scene->volumes + t->volume;
+    return hit ? volume_eval(scene, v, volume_to_local(scene, v, hit->p, 1)) : spec_zero();
+}
+
+KFN void volume_texture_adj(const SceneView *scene, int32_t id, const Hit *hit, Spec d, Sink *sink, Mask m) {
+    const VolumeNode *v = scene->volumes + scene->textures[id].volume;
+    if (hit) {
+        volume_adj(scene, v, volume_to_local(scene, v, hit->p, 1), d, sink->texture_at[id], NULL, sink, m);
+    }
+}
+
 static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, TexCoord uv) {
     const TextureNode *t = scene->textures + id;
     if (t->kind == TEXTURE_CONSTANT || t->kind == TEXTURE_BLACKBODY) {
@@ -175,6 +174,9 @@ static NOINLINE Spec texture_eval_general(const SceneView *scene, int32_t id, Te
     }
     if (t->kind == TEXTURE_ATTRIBUTE) {
         return attribute_eval(scene, t, uv.hit);
+    }
+    if (t->kind == TEXTURE_VOLUME) {
+        return volume_texture_eval(scene, t, uv.hit);
     }
     return spec_select(checkerboard_first(scene, t, (Vec2){uv.x, uv.y}), texture_eval_general(scene, t->child[0], uv),
                        texture_eval_general(scene, t->child[1], uv));
@@ -244,6 +246,8 @@ static NOINLINE void texture_adj(const SceneView *scene, int32_t id, TexCoord uv
         attribute_adj(scene, id, uv.hit, d, sink, m);
     } else if (t->kind == TEXTURE_BLACKBODY) {
         blackbody_adj(scene, t, d, sink, m);
+    } else if (t->kind == TEXTURE_VOLUME) {
+        volume_texture_adj(scene, id, uv.hit, d, sink, m);
     } else {
         Mask first = checkerboard_first(scene, t, (Vec2){uv.x, uv.y});
         texture_adj(scene, t->child[0], uv, d, duv, sink, m & first);

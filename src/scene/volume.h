@@ -2,8 +2,9 @@
 // NOT differentiated: jumps of nearest voxels and of the cube's border under a point that moves.
 #pragma once
 
+#include "scene/hit.h"
 #include "scene/sink.h"
-#include "scene/texture.h"
+#include "scene/wrap.h"
 
 // Where a grid is read: the eight voxels around a point (nearest: the first), and the weights of the upper ones.
 typedef struct Voxels {
@@ -101,6 +102,28 @@ KFN void constvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Sp
     UNUSED(scene), UNUSED(p), UNUSED(dp);
     for (int c = 0; c < SPEC_N && at >= 0; c++) {
         sink_add_uniform(sink, at + (v->channels == 1 ? 0 : c), d.c[c], m);
+    }
+}
+
+// Six numbers at a point, and their adjoint.
+KFN void gridvolume_eval_six(const SceneView *scene, const VolumeNode *v, Vec3 p, Float *values) {
+    Voxels s = voxels_around(v, p);
+    for (int i = 0; i < 6; i++) {
+        values[i] = f_set(0);
+        for (int k = 0; k < s.count; k++) {
+            Float w = s.count == 1 ? f_set(1) : voxel_weight(&s, k);
+            values[i] = values[i] + w * theta_at(scene, s.at[k] + (v->theta + i));
+        }
+    }
+}
+
+KFN void gridvolume_adj_six(const VolumeNode *v, Vec3 p, const Float *d, int32_t at, Sink *sink, Mask m) {
+    Voxels s = voxels_around(v, p);
+    for (int k = 0; k < s.count; k++) {
+        Float w = s.count == 1 ? f_set(1) : voxel_weight(&s, k);
+        for (int i = 0; i < 6; i++) {
+            sink_add(sink, s.at[k] + (at + i), w * d[i], m);
+        }
     }
 }
 

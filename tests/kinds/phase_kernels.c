@@ -38,6 +38,7 @@ static void view_make(const PhaseCase *c, View *v) {
     v->scene.theta = v->theta;
     v->scene.tables = v->tables;
     v->scene.textures = (TextureNode *)(uintptr_t)c->textures;
+    v->scene.volumes = (VolumeNode *)(uintptr_t)c->volumes;
     v->scene.phases = (PhaseNode *)(uintptr_t)c->nodes;
 }
 
@@ -57,7 +58,8 @@ static void view_make(const PhaseCase *c, View *v) {
         GATHER((target).y, (field)[1]);                                                                                \
         GATHER((target).z, (field)[2]);                                                                                \
     } while (0)
-#define CALL(uv) {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor}
+#define CALL(uv) {&view.scene, c->root, texcoord(uv, &hit), (real)c->floor}
+#define HIT(uv) {.p = {(uv).x, (uv).y, f_set(0.3f)}}
 
 static void put3(double *to, Vec3 v, int lane) {
     to[0] = (double)f_lane(v.x, lane);
@@ -75,6 +77,7 @@ static void run_eval(const PhaseCase *c, int n, PhaseQuery *q) {
         GATHER3(wo, q[AT(lane)].wo);
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
+        Hit hit = HIT(uv);
         PhaseCall call = CALL(uv);
         Float f = phase_eval(&call, wi, wo), pdf = phase_pdf(&call, wi, wo);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
@@ -97,6 +100,7 @@ static void run_sample(const PhaseCase *c, int n, PhaseDraw *d) {
         GATHER(u1, d[AT(lane)].u1);
         GATHER(u2.x, d[AT(lane)].u2[0]);
         GATHER(u2.y, d[AT(lane)].u2[1]);
+        Hit hit = HIT(uv);
         PhaseCall call = CALL(uv);
         Vec3 wo = phase_sample(&call, wi, u1, u2);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
@@ -123,6 +127,7 @@ static void run_adj(const PhaseCase *c, int n, const PhaseQuery *q, PhaseAdjoint
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
         GATHER(df, a[AT(lane)].df);
+        Hit hit = HIT(uv);
         PhaseCall call = CALL(uv);
         sink.derivative = f_set(0);
         phase_adj(&call, wi, wo, df, &sink, m_first_n(n - first), &dwi, &dwo);

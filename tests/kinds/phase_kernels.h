@@ -4,12 +4,13 @@
 
 #include "scene/scene.h"
 
-enum { PHASE_NODES = 3, PHASE_TEXTURES = 4, PHASE_THETA = 64 };
+enum { PHASE_NODES = 8, PHASE_TEXTURES = 8, PHASE_THETA = 256 };
 
 typedef struct PhaseCase {
     int32_t root, node_count, texture_count, theta_count;
     PhaseNode nodes[PHASE_NODES];
     TextureNode textures[PHASE_TEXTURES];
+    VolumeNode volumes[PHASE_TEXTURES]; // of textures that are grids
     double theta[PHASE_THETA], tables[PHASE_THETA];
     double floor;
 } PhaseCase;

@@ -27,6 +27,23 @@ static int add_texture(PhaseCase *c, Random *r, const PhaseParam *p, int n) {
     return c->texture_count++;
 }
 
+// The numbers of a texture in each voxel of a grid of 2 x 2 x 2, of which the first is there.
+static void spread(PhaseCase *c, Random *r, int id, int channels) {
+    TextureNode *t = c->textures + id;
+    t->kind = TEXTURE_VOLUME;
+    t->volume = id;
+    t->width = t->height = 1;
+    c->volumes[id] = (VolumeNode){.kind = VOLUME_GRID, .theta = t->theta, .channels = channels, .nx = 2, .ny = 2, .nz = 2,
+                                  .filter = FILTER_BILINEAR, .wrap = WRAP_CLAMP, .table = -1, .to_world = -1, .texture = id};
+    for (int voxel = 1; voxel < 8; voxel++) {
+        double factor = between(r, 0.5, 1);
+        for (int i = 0; i < channels; i++) {
+            c->theta[t->theta + voxel * channels + i] = factor * c->theta[t->theta + i];
+        }
+    }
+    c->theta_count = t->theta + 8 * channels;
+}
+
 // S = A A' + a little, for a random A.
 static void positive_definite(Random *r, double *s) {
     static const int rows[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
@@ -42,27 +59,46 @@ static void positive_definite(Random *r, double *s) {
     }
 }
 
+static int add_node(PhaseCase *c, Random *r, int kind);
+
+static int add_leaf(PhaseCase *c, Random *r) {
+    int kind;
+    do {
+        kind = below(r, rey_phase_kind_count);
+    } while (rey_phase_kinds[kind].children != 0);
+    return add_node(c, r, kind);
+}
+
 static int add_node(PhaseCase *c, Random *r, int kind) {
     const PhaseKind *k = rey_phase_kinds + kind;
-    int id = c->node_count++;
+    int id = c->node_count++, rest = 0;
     PhaseNode node = {.kind = kind, .slot = {-1}, .child = {-1, -1}, .table = -1};
     for (int i = 0; i < k->param_count; i++) {
         static const int most[] = {1, 7, 6};
-        int n = k->params[i].type == PHASE_PARAM_TABLE ? 2 + below(r, 6) : most[k->params[i].type];
-        n = k->children && uniform(r) < 0.5 ? 4 : n;
+        PhaseParamType type = k->params[i].type;
+        int n = type == PHASE_PARAM_TABLE ? 2 + below(r, 6) : type == PHASE_PARAM_WEIGHTS ? 1 + below(r, 3) : most[type];
+        n = k->children > 0 && uniform(r) < 0.5 ? 4 : n;
+        rest = type == PHASE_PARAM_WEIGHTS ? n : rest;
         node.slot[i] = add_texture(c, r, k->params + i, n);
         if (k->params[i].type == PHASE_PARAM_MATRIX) {
             positive_definite(r, c->theta + c->textures[node.slot[i]].theta);
         }
+        if ((type == PHASE_PARAM_MATRIX || (type == PHASE_PARAM_NUMBER && n == 1)) && uniform(r) < 0.4) {
+            spread(c, r, node.slot[i], type == PHASE_PARAM_MATRIX ? 6 : 1);
+        }
     }
     for (int i = 0; i < k->children; i++) {
-        int child;
-        do {
-            child = below(r, rey_phase_kind_count);
-        } while (rey_phase_kinds[child].children > 0);
-        node.child[i] = add_node(c, r, child);
+        node.child[i] = add_leaf(c, r);
     }
-    c->nodes[id] = node;
+    for (int at = id; rest > 0; rest--) { // a list: one node after the other, each with one function
+        node.child[0] = add_leaf(c, r);
+        node.child[1] = rest > 1 ? c->node_count++ : -1;
+        c->nodes[at] = node;
+        at = node.child[1];
+    }
+    if (k->children != ANY_NUMBER) {
+        c->nodes[id] = node;
+    }
     return id;
 }
 
@@ -350,6 +386,7 @@ static void test_reciprocity(void **state) {
     for (int k = 0; k < 100; k++) {
         PhaseCase c;
         phase_case(&c, &r, rey_phase_kind_find("sggx"));
+        c.textures[0].kind = TEXTURE_TABLE; // the same everywhere
         PhaseQuery q;
         random_query(&r, &q);
         PhaseQuery back = q;
