@@ -133,11 +133,11 @@ REY_API const char *rey_scene_note(const rey_scene *scene, int note);
 /* Terms of a derivative. A gradient is the sum of the terms that its parameter needs. */
 enum {
     REY_TERM_INTERIOR = 1,    /* everything that does not move a discontinuity */
-    REY_TERM_PRIMARY = 2,     /* silhouettes seen by the camera */
-    REY_TERM_INDIRECT = 4,    /* silhouettes seen from other path vertices */
+    REY_TERM_PRIMARY = 2,     /* silhouettes, and shading normals that turn away, seen by the camera */
+    REY_TERM_INDIRECT = 4,    /* the same seen from other path vertices */
     REY_TERM_SPECULAR = 8,    /* edges seen in smooth mirrors and through glass */
     REY_TERM_MEDIUM = 16,     /* participating media */
-    REY_TERM_TERMINATOR = 32, /* jumps where a shading normal turns away from the viewer or the light */
+    REY_TERM_TERMINATOR = 32, /* jumps where the normal of a normal or bump map turns away from the viewer */
     REY_TERM_ALL = 63
 };
 /* Name of one term ("interior"), null when bit is not one of the above. */

@@ -11,7 +11,7 @@ size_t KNAME(rey_kernel_boundary_bytes)(void) {
 
 static void run_indirect(Indirect *in, Sink *sink, int32_t *begin) {
     const Tracer *t = in->t;
-    const int32_t most = t->ws.chunk;
+    const int32_t most = in->b->kind == BOUNDARY_INDIRECT ? t->ws.chunk : t->ws.chunk / 2; // terminators take two paths
     for (int64_t at = 0; at < in->b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
         int64_t left = in->b->count - at;
         indirect_chunk(in, in->b->first + at, left < most ? (int32_t)left : most, sink, begin);
@@ -63,7 +63,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Sink sink = sink_of(&b->job);
     in.pinhole = &pinhole;
     in.filter = &filter;
-    if (b->primary) {
+    if (b->kind == BOUNDARY_PRIMARY) {
         run_primary(&t, b, &pinhole, &filter, &sink, kept, begin);
     } else {
         run_indirect(&in, &sink, begin);

@@ -62,7 +62,7 @@ static void landing_load(const Tracer *t, const RecordBatch *batch, Int slot, Sp
 // A particle is looked at from the sensor and from where it goes on.
 static void watch_landings(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
     const Exchange both[] = {exchange_sight(s), exchange_onward(s)};
-    for (int k = 0; k < 2 && t->job->watch_turned; k++) {
+    for (int k = 0; k < 2 && (t->job->watch_turned || t->job->watch_smooth); k++) {
         SurfaceSweep seen = *s;
         seen.m = both[k].m & mi_eq(both[k].lobe, i_set(LOBE_SMOOTH));
         seen.wi = both[k].view;

@@ -259,7 +259,9 @@ static void path_forward(Tracer *t, int32_t *begin) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
-        trace_stage(t, bounce);
+        if (!t->placed || bounce > t->first_bounce) {
+            trace_stage(t, bounce);
+        }
         if (scene->has_media) {
             flight_stage(t, begin, bounce);
         }

@@ -121,7 +121,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
 KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
     // What moves: the surface, the sensor, or an earlier vertex that looks at it.
     bool moved = sink->any_motion && (sink->any_camera || !s->first || (t->job->live[s->group - t->scene->groups] & LIVE_MOTION));
-    bool smooth = s->group->shape_kind == SHAPE_MESH && (s->group->shape_flags & SHAPE_HAS_NORMALS);
+    bool smooth = s->group->shape_kind == SHAPE_MESH && (s->group->shape_flags & SHAPE_HAS_NORMALS) && t->job->watch_smooth;
     if (smooth && (sink->any_normals || moved)) {
         Mask selected = moved ? s->m : s->m & mi_lt(i_set(-1), i_gather(sink->normals_at, s->hit.shape));
         Float geometric = -v3_dot(s->d, s->si.ng);
@@ -148,7 +148,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
         s.call.surface = &s.surface;
     }
-    if (job->watch_turned && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
+    if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, &s, sink);
     }
     if ((live & LIVE_SCATTERING) || live_passing) {

@@ -69,13 +69,13 @@ KFN Vec3 segment_adj(Vec3 w, Float distance, Vec3 n, Float c, Vec3 dw, Vec3 *dar
     return v3_scale(v3_madd(v3_madd(across, facing, n), -3.0f * c, w), rcp);
 }
 
-// Adds the adjoint of attached points of any surfaces: of their positions and area vectors.
-static NOINLINE void points_move_adj(const Tracer *t, const Hit *hit, Vec3 dp, Vec3 darea, Sink *sink, Mask m) {
+// Adds the adjoint d of attached points of any surfaces.
+static NOINLINE void surfaces_move_adj(const Tracer *t, const Hit *hit, const SurfaceAdj *d, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t id = scene->shapes[i_lane(hit->shape, m_first(left))].group;
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, hit->shape, group), i_set(id));
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
         if (!(t->job->live[id] & LIVE_MOTION)) {
             continue;
         }
@@ -84,11 +84,16 @@ static NOINLINE void points_move_adj(const Tracer *t, const Hit *hit, Vec3 dp, V
         h.prim = i_select(mine, hit->prim, i_set(0));
         h.instance = i_select(mine, hit->instance, i_set(0));
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
-        SurfaceAdj d = surface_adj_zero();
-        d.p = dp;
-        d.area = darea;
-        shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, &d, sink, mine);
+        shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, d, sink, mine);
     }
+}
+
+// Of their positions and area vectors.
+KFN void points_move_adj(const Tracer *t, const Hit *hit, Vec3 dp, Vec3 darea, Sink *sink, Mask m) {
+    SurfaceAdj d = surface_adj_zero();
+    d.p = dp;
+    d.area = darea;
+    surfaces_move_adj(t, hit, &d, sink, m);
 }
 
 // The hit of a light sample: its point, and of meshes the barycentrics there.

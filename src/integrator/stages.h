@@ -38,6 +38,7 @@ typedef struct Tracer {
     int32_t first_bounce;    // 0, but for paths that do not begin at the camera
     real **rungs;            // radiance by number of segments: rows of a colour per number; or null
     int32_t rung_count, rungs_kept;
+    bool placed;             // the paths' first vertices are known
     bool overflow;           // the chunk's vertices did not fit the records
     int32_t most;            // paths of the next chunk
 } Tracer;

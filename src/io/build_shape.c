@@ -55,8 +55,7 @@ rey_result build_copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const c
     int64_t v = mesh->vertex_count, f = mesh->face_count;
     Param positions = {PARAM_DEFAULTS, .unit = "scene units", .description = "vertex positions", .terms = GEOMETRY_TERMS,
                        .why = moving_why, .geometry = id};
-    Param normals = {PARAM_DEFAULTS, .description = "vertex normals", .terms = REY_TERM_INTERIOR | REY_TERM_TERMINATOR,
-                     .why = normals_why, .normals = id};
+    Param normals = {PARAM_DEFAULTS, .description = "vertex normals", .terms = GEOMETRY_TERMS, .why = normals_why, .normals = id};
     Param uvs = {PARAM_DEFAULTS, .description = "texture coordinates", .terms = 0,
                  .why = "texture coordinates are not parameters of the derivative yet"};
     shape->vertex_count = (int32_t)v;

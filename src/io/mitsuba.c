@@ -175,7 +175,7 @@ static bool turns_within(const rey_scene *scene, int32_t bsdf) {
 }
 
 // Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
-// what turns such mirrors' normals; what moves needs another where shading normals turn away from the viewer. Scattering
+// what turns such mirrors' normals; what moves needs another where the normals of maps turn away from the viewer. Scattering
 // functions that no shape has do not count.
 static void name_further_terms(Builder *b) {
     rey_scene *scene = b->scene;
@@ -183,12 +183,13 @@ static void name_further_terms(Builder *b) {
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
         bends |= bends_within(scene, shape->bsdf);
-        turns |= turns_within(scene, shape->bsdf) || (shape->flags & SHAPE_HAS_NORMALS);
+        turns |= turns_within(scene, shape->bsdf);
     }
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
     for (size_t i = 0; i < scene->params.count; i++) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
         p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
+        p->terms |= p->normals >= 0 ? moving & REY_TERM_TERMINATOR : 0;
         bool mirror = p->normals >= 0
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);

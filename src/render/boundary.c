@@ -2,8 +2,10 @@
 #include "render/boundary.h"
 
 #include "base/parallel.h"
+#include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "render/boundary_edges.h"
+#include "scene/sink.h"
 #include "sensor/kinds.h"
 #include "shape/shape.h"
 
@@ -28,9 +30,16 @@ static bool has_steps(const SceneView *view) {
     return false;
 }
 
-rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int term) {
+static bool boundary_sees(const SensorRecord *sensor) {
+    return sensor->kind == SENSOR_PERSPECTIVE || sensor->kind == SENSOR_THINLENS || sensor->kind == SENSOR_ORTHOGRAPHIC;
+}
+
+int rey_boundary_term(int32_t kind) { return kind == BOUNDARY_PRIMARY ? REY_TERM_PRIMARY : REY_TERM_INDIRECT; }
+
+// Whether a term of a selection can be computed; records why not.
+static rey_result boundary_check(rey_scene *scene, const SensorRecord *sensor, int term) {
     const SceneView *view = &scene->view;
-    if (sensor->kind != SENSOR_PERSPECTIVE && sensor->kind != SENSOR_THINLENS && sensor->kind != SENSOR_ORTHOGRAPHIC) {
+    if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic");
     }
     if (term == REY_TERM_PRIMARY && has_steps(view)) {
@@ -72,26 +81,33 @@ static rey_result reserve_workspaces(Render *r) {
     return REY_OK;
 }
 
-rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
+// Samples of one set. By default, for one of the interior's: a sample of the primary term is two paths, and on a large mesh a
+// fiftieth as noisy; what happens where normals turn away is smaller than what happens at silhouettes.
+static int64_t sample_count(const Render *r, int32_t kind) {
+    static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
+                                                  [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4};
+    int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
+    int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
+    int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
+    int64_t count = asked ? pixels * asked / (part * r->def.sets) : pixels * r->job.spp / part;
+    return count < least ? least : count;
+}
+
+static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     rey_context *ctx = r->scene->ctx;
     *plan = (BoundaryPlan){.film = r->plan};
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
     if (result == REY_OK) {
-        result = rey_boundary_edges(r, term == REY_TERM_PRIMARY, plan);
+        result = rey_boundary_edges(r, kind, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
         plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
         result = plan->films ? REY_OK : REY_ERROR_MEMORY;
     }
     int32_t edge_count = plan->job.edge_count;
-    // A sample of the primary term is two paths, and on a large mesh a fiftieth as noisy as one of the interior.
-    int32_t asked = term == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
-    plan->samples = (int64_t)r->plan.width * r->plan.height * (asked ? asked : r->job.spp) /
-                    (asked ? r->def.sets : term == REY_TERM_PRIMARY ? 4 : 1);
-    int64_t least = asked ? 1 : LEAST_SAMPLES;
-    plan->samples = plan->samples < least ? least : plan->samples;
-    plan->job = (BoundaryJob){.job = r->job, .primary = term == REY_TERM_PRIMARY, .edges = plan->edges,
+    plan->samples = sample_count(r, kind);
+    plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .cdf = plan->cdf,
                               .edge_count = edge_count,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
@@ -99,6 +115,47 @@ rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan) {
     plan->job.job.y = r->plan.y;
     plan->job.job.width = r->plan.width;
     plan->job.job.height = r->plan.height;
+    return result;
+}
+
+// Where the boundary terms are not computed, paths look out for shading normals that turn away.
+static void watch_smooth_normals(Render *r) {
+    const SceneView *view = &r->scene->view;
+    const int both = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+    r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && (r->terms & both) != both;
+    for (int64_t i = 0; i < view->shapes_count && r->job.watch_smooth; i++) {
+        if (r->job.normals_at[i] >= 0 && view->shapes[i].emitter >= 0) {
+            // A light's normals say into which directions it shines: light samples jump where none of its points is met.
+            r->faces = FACES_ALIKE | FACES_AWAY;
+        }
+    }
+}
+
+// Whether what only vertex normals move is known: silhouettes have no part in it.
+static bool knows_turning(const Render *r) {
+    const SceneView *view = &r->scene->view;
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        if (rey_bsdf_bends(view->bsdfs[i].kind)) {
+            return false;
+        }
+    }
+    return boundary_sees(r->plan.sensor) && !view->has_media;
+}
+
+rey_result rey_boundaries_begin(Render *r) {
+    bool moves = r->job.any_motion || r->job.any_places;
+    rey_result result = REY_OK;
+    if (!moves && !r->def.terms && !knows_turning(r)) {
+        r->terms &= REY_TERM_INTERIOR; // paths look out instead
+    }
+    for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
+        if (r->terms & rey_boundary_term(i)) {
+            bool check = moves || !boundary_sees(r->plan.sensor);
+            result = check ? boundary_check(r->scene, r->plan.sensor, rey_boundary_term(i)) : REY_OK;
+            result = result == REY_OK ? boundary_begin(r, i, r->boundary + i) : result;
+        }
+    }
+    watch_smooth_normals(r);
     return result;
 }
 

@@ -3,10 +3,11 @@
 
 #include "render/render_parts.h"
 
-// Whether a term of a selection can be computed; records why not.
-rey_result rey_boundary_check(rey_scene *scene, const SensorRecord *sensor, int term);
-// Prepares a term after the selection is mapped; rey_boundary_free follows in any case.
-rey_result rey_boundary_begin(Render *r, int term, BoundaryPlan *plan);
+// Prepares the terms of a derivative after the selection is mapped, where they can be computed, and records why not; a
+// rey_boundary_free of every plan follows in any case.
+rey_result rey_boundaries_begin(Render *r);
+// The term that boundaries of a kind (BOUNDARY_) belong to.
+int rey_boundary_term(int32_t kind);
 void rey_boundary_free(Render *r, BoundaryPlan *plan);
 // Runs the samples of one set. Reverse: adds to r->gradients. Forward: adds to the picture.
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture);

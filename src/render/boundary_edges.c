@@ -10,15 +10,25 @@ typedef struct Projection {
     double inverse[12];     // of the sensor's pose
     double scale_x, scale_y, shift_x, shift_y; // pixels per slope, and the centre
     double low_x, low_y, high_x, high_y;       // what of the film counts [pixels]
-    double near;
+    double near, lens; // lens: no point of it is further from the middle
     bool parallel, pinhole;
 } Projection;
+
+// Largest entry of a pose's linear part.
+static double pose_size(const float *m) {
+    double size = 0;
+    for (int k = 0; k < 11; k++) {
+        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
+    }
+    return size;
+}
 
 static Projection projection_of(const SceneView *view, const FilmPlan *plan) {
     const SensorRecord *s = plan->sensor;
     Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
                     .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
     rey_affine_inverse(view->theta + s->to_world, p.inverse);
+    p.lens = p.pinhole ? 0 : 3 * pose_size(view->theta + s->to_world) * (double)view->theta[s->lens];
     double tangent = p.parallel ? 1 : tan(0.5 * 3.14159265358979323846 / 180 * (double)view->theta[s->fov]);
     p.scale_x = -0.5 * s->width / tangent;
     p.scale_y = -0.5 * s->width / tangent; // pixels are square
@@ -114,7 +124,7 @@ static void mesh_point(const SceneView *view, const EdgeRecord *e, int32_t verte
 // Whether rays from the eye pass both triangles of a mesh's edge on one side, or the picture jumps there anyway.
 static bool can_jump(const SceneView *view, const double eye[4], const EdgeRecord *e, const double a[3], const double b[3],
                      const int32_t *corners) {
-    if (e->crease || e->opposite < 0 || e->fan_count > 0) {
+    if (e->crease == EDGE_CREASE || e->opposite < 0 || e->fan_count > 0) {
         return true;
     }
     double side[2][3], n[3], d[3];
@@ -137,24 +147,119 @@ static bool can_jump(const SceneView *view, const double eye[4], const EdgeRecor
     return s[0] * s[1] > -1e-9 * size * size;
 }
 
+// The angle between the planes of the triangles at a mesh's edge, pi where it is open; and its world length.
+static double mesh_edge_angle(const SceneView *view, const EdgeRecord *e, double *length) {
+    const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
+    double a[3], p[3][3], n[2][3], length2 = 0, dot = 0, sizes[2] = {0, 0};
+    mesh_point(view, e, corners[e->corner], a);
+    mesh_point(view, e, corners[(e->corner + 1) % 3], p[0]);
+    mesh_point(view, e, corners[(e->corner + 2) % 3], p[1]);
+    mesh_point(view, e, e->opposite >= 0 ? e->opposite : corners[e->corner], p[2]);
+    for (int k = 0; k < 9; k++) {
+        p[k / 3][k % 3] -= a[k % 3];
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        length2 += p[0][k] * p[0][k];
+        n[0][k] = p[0][i] * p[1][j] - p[0][j] * p[1][i];
+        n[1][k] = p[2][i] * p[0][j] - p[2][j] * p[0][i];
+        dot += n[0][k] * n[1][k];
+        sizes[0] += n[0][k] * n[0][k];
+        sizes[1] += n[1][k] * n[1][k];
+    }
+    double cosine = dot / sqrt(sizes[0] * sizes[1]), angle = acos(fmax(-1, fmin(1, cosine)));
+    *length = sqrt(length2);
+    return e->opposite < 0 || !isfinite(angle) ? 3.14159265358979323846 : angle;
+}
+
+static double mesh_edge_weight(const SceneView *view, const EdgeRecord *e) {
+    double length, angle = mesh_edge_angle(view, e, &length);
+    return length * angle;
+}
+
 static double see_mesh_edge(const SceneView *view, const Projection *p, const double eye[4], EdgeRecord *e) {
     const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
     double a[3], b[3];
     mesh_point(view, e, corners[e->corner], a);
     mesh_point(view, e, corners[(e->corner + 1) % 3], b);
+    double part = 1, length;
     if (p->pinhole && !can_jump(view, eye, e, a, b, corners)) {
-        return 0;
+        // What the planes of both triangles hide of the light differs by an angle, where the cosine is no larger.
+        double angle = e->crease == EDGE_SOFT ? mesh_edge_angle(view, e, &length) : 0;
+        part = fmin(1, angle * angle);
     }
-    return see_line(p, a, b, e);
+    return part > 0 ? part * see_line(p, a, b, e) : 0;
 }
 
-// Largest entry of a pose's linear part.
-static double pose_size(const float *m) {
-    double size = 0;
-    for (int k = 0; k < 11; k++) {
-        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
+// The normal of a vertex in the world.
+static void mesh_normal(const SceneView *view, const EdgeRecord *e, int32_t vertex, double n[3]) {
+    const ShapeRecord *shape = view->shapes + e->shape;
+    const float *own = view->theta + shape->normals + 3 * (int64_t)vertex;
+    const float *inverse = shape->collection >= 0 ? view->tables + view->instances[e->instance].table + 12 : NULL;
+    for (int k = 0; k < 3; k++) {
+        n[k] = (double)own[k];
     }
-    return size;
+    for (int k = 0; k < 3 && inverse; k++) {
+        n[k] = (double)inverse[k] * (double)own[0] + (double)inverse[4 + k] * (double)own[1] +
+               (double)inverse[8 + k] * (double)own[2];
+    }
+}
+
+// Whether the shading normal of a triangle is somewhere at right angles to the direction to the eye, which may be off by
+// `radius`: facet.h says how that depends on the corners.
+static bool can_turn(const double p[3][3], const double n[3][3], const double eye[4], double radius) {
+    bool above = false, below = false;
+    for (int i = 0; i < 3; i++) {
+        for (int j = i; j < 3; j++) {
+            double q = 0, size = 0;
+            for (int k = 0; k < 3; k++) {
+                double to[2] = {eye[k] - eye[3] * p[i][k], eye[k] - eye[3] * p[j][k]};
+                q += n[i][k] * to[1] + n[j][k] * to[0];
+                size += fabs(n[i][k]) * (fabs(to[1]) * 1e-6 + radius) + fabs(n[j][k]) * (fabs(to[0]) * 1e-6 + radius);
+            }
+            above |= q > -size;
+            below |= q < size;
+        }
+    }
+    return above && below;
+}
+
+// The length on the film of the longest edge of a triangle that the film sees in part.
+static double see_triangle(const Projection *p, const double world[3][3]) {
+    double film[3][2], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, length = 0;
+    const double most = 2 * (p->high_x - p->low_x + p->high_y - p->low_y);
+    int behind = 0;
+    for (int i = 0; i < 3; i++) {
+        double local[3];
+        to_sensor(p, world[i], local);
+        behind += local[2] < p->near;
+        to_film(p, local, film[i]);
+    }
+    if (behind) {
+        return behind < 3 ? most : 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *a = film[i], *b = film[(i + 1) % 3];
+        length = fmax(length, hypot(a[0] - b[0], a[1] - b[1]));
+        for (int k = 0; k < 2; k++) {
+            low[k] = fmin(low[k], a[k]);
+            high[k] = fmax(high[k], a[k]);
+        }
+    }
+    if (p->pinhole && (high[0] < p->low_x || low[0] > p->high_x || high[1] < p->low_y || low[1] > p->high_y)) {
+        return 0;
+    }
+    return fmin(length, most) + (p->pinhole ? 0 : 1);
+}
+
+static double see_terminator(const SceneView *view, const Projection *p, const double eye[4], const EdgeRecord *e) {
+    const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
+    double q[3][3], n[3][3];
+    for (int k = 0; k < 3; k++) {
+        mesh_point(view, e, corners[k], q[k]);
+        mesh_normal(view, e, corners[k], n[k]);
+    }
+    return can_turn(q, n, eye, p->lens) ? see_triangle(p, q) : 0;
 }
 
 // A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
@@ -174,7 +279,8 @@ static bool edge_moves(const Render *r, const EdgeRecord *e) {
     const PathJob *job = &r->job;
     const ShapeRecord *shape = r->scene->view.shapes + e->shape;
     return job->any_camera || job->points_at[e->shape] >= 0 || job->pose_at[e->shape] >= 0 ||
-           (shape->collection >= 0 && job->instance_at[e->instance] >= 0);
+           (shape->collection >= 0 && job->instance_at[e->instance] >= 0) ||
+           (e->kind == EDGE_TERMINATOR && job->normals_at[e->shape] >= 0);
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
@@ -211,50 +317,52 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, Array
     return REY_OK;
 }
 
-// World length of a mesh's edge times the angle between the planes of its triangles; pi where it is open.
-static double mesh_edge_weight(const SceneView *view, const EdgeRecord *e) {
+static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
+    return 20 * pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
+}
+
+// World area of a triangle times the largest sine of the angles between its normals.
+static double turning_weight(const SceneView *view, const EdgeRecord *e) {
     const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
-    double a[3], p[3][3], n[2][3], length = 0, dot = 0, sizes[2] = {0, 0};
-    mesh_point(view, e, corners[e->corner], a);
-    mesh_point(view, e, corners[(e->corner + 1) % 3], p[0]);
-    mesh_point(view, e, corners[(e->corner + 2) % 3], p[1]);
-    mesh_point(view, e, e->opposite >= 0 ? e->opposite : corners[e->corner], p[2]);
-    for (int k = 0; k < 9; k++) {
-        p[k / 3][k % 3] -= a[k % 3];
+    double p[3][3], ng[3], largest = 0, area2 = 0;
+    for (int k = 0; k < 3; k++) {
+        mesh_point(view, e, corners[k], p[k]);
     }
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
-        length += p[0][k] * p[0][k];
-        n[0][k] = p[0][i] * p[1][j] - p[0][j] * p[1][i];
-        n[1][k] = p[2][i] * p[0][j] - p[2][j] * p[0][i];
-        dot += n[0][k] * n[1][k];
-        sizes[0] += n[0][k] * n[0][k];
-        sizes[1] += n[1][k] * n[1][k];
+        ng[k] = (p[1][i] - p[0][i]) * (p[2][j] - p[0][j]) - (p[1][j] - p[0][j]) * (p[2][i] - p[0][i]);
+        area2 += ng[k] * ng[k];
     }
-    double cosine = dot / sqrt(sizes[0] * sizes[1]), angle = acos(fmax(-1, fmin(1, cosine)));
-    return sqrt(length) * (e->opposite < 0 || !isfinite(angle) ? 3.14159265358979323846 : angle);
-}
-
-static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
-    return 20 * pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
+    for (int c = 0; c < 3 && area2 > 0; c++) {
+        double n[3], cross2 = 0, length2 = 0;
+        mesh_normal(view, e, corners[c], n);
+        for (int k = 0; k < 3; k++) {
+            int i = (k + 1) % 3, j = (k + 2) % 3;
+            cross2 += (n[i] * ng[j] - n[j] * ng[i]) * (n[i] * ng[j] - n[j] * ng[i]);
+            length2 += n[k] * n[k];
+        }
+        largest = length2 > 0 ? fmax(largest, sqrt(cross2 / (length2 * area2))) : largest;
+    }
+    return largest > 1e-6 ? sqrt(area2) * largest : 0;
 }
 
 // What an edge that the sensor sees, or that other vertices see, is worth.
 typedef struct Weigher {
     Projection projection;
     double eye[4];  // or the direction of parallel views, and 0
-    bool primary;
+    int32_t kind;   // BOUNDARY_
     double still;   // factor on edges that stand still: they may pass light between what moves
 } Weigher;
 
-static Weigher weigher_of(const Render *r, bool primary) {
+static Weigher weigher_of(const Render *r, int32_t kind) {
     const SceneView *view = &r->scene->view;
     const float *m = view->theta + r->plan.sensor->to_world;
-    Weigher w = {projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, primary, r->job.any_camera ? 1 : 0.25};
+    Weigher w = {projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, kind, r->job.any_camera ? 1 : 0.25};
     if (w.projection.parallel) {
         w.eye[0] = m[2], w.eye[1] = m[6], w.eye[2] = m[10], w.eye[3] = 0;
     }
-    w.still = primary ? 0 : w.still;
+    bool ends_move = r->job.any_motion || (kind == BOUNDARY_INDIRECT && r->job.any_places);
+    w.still = kind == BOUNDARY_PRIMARY || !ends_move ? 0 : w.still;
     return w;
 }
 
@@ -265,14 +373,23 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if (factor == 0) {
         return 0;
     }
-    if (w->primary) {
-        return e->kind == EDGE_MESH ? see_mesh_edge(view, &w->projection, w->eye, e) : see_round(view, &w->projection, e);
+    bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;
+    if (w->kind != BOUNDARY_PRIMARY && turning != (e->kind == EDGE_TERMINATOR)) {
+        return 0;
     }
-    return factor * (e->kind == EDGE_MESH ? mesh_edge_weight(view, e) : round_edge_weight(view, e));
+    switch (e->kind) {
+    case EDGE_TERMINATOR:
+        return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
+    case EDGE_MESH:
+        return w->kind == BOUNDARY_INDIRECT ? factor * mesh_edge_weight(view, e)
+                                            : see_mesh_edge(view, &w->projection, w->eye, e);
+    default:
+        return w->kind == BOUNDARY_INDIRECT ? factor * round_edge_weight(view, e) : see_round(view, &w->projection, e);
+    }
 }
 
-rey_result rey_boundary_edges(Render *r, bool primary, BoundaryPlan *plan) {
-    const Weigher w = weigher_of(r, primary);
+rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
+    const Weigher w = weigher_of(r, kind);
     Array kept = {0}, weights = {0};
     rey_result result = r->edges.count ? REY_OK : rey_edges_find(r->scene, &r->edges, &r->fans);
     for (size_t i = 0; i < r->edges.count && result == REY_OK; i++) {

@@ -3,7 +3,7 @@
 
 #include "render/boundary.h"
 
-// Fills the plan's edges and their cumulative probabilities; edge_count 0 = nothing that jumps can move. primary: what the
-// sensor sees of edges that move, by its length on the film; else silhouettes that any vertex may see, by length and by the
-// angle that they are silhouettes in.
-rey_result rey_boundary_edges(Render *r, bool primary, BoundaryPlan *plan);
+// Fills the plan's edges and their cumulative probabilities; edge_count 0 = nothing that jumps can move. What the sensor sees
+// of edges that move, by its length on the film; silhouettes that any vertex may see, by length and by the angle that they are
+// silhouettes in; or triangles, by area and by the angle between their normals.
+rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan);

@@ -63,7 +63,7 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
            (volume_live(view, job, medium->emission) ? LIVE_GLOW : 0);
 }
 
-// Groups of surfaces of which something selected moves a point.
+// Groups of surfaces of which something selected moves a point or a vertex normal.
 static void moving_groups(const SceneView *view, const PathJob *job, int32_t *live) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
@@ -71,7 +71,7 @@ static void moving_groups(const SceneView *view, const PathJob *job, int32_t *li
         for (int64_t k = 0; k < view->instances_count && (shape->flags & SHAPE_INSTANCED) && !moves; k++) {
             moves = job->instance_at[k] >= 0 && view->instances[k].group == shape->collection;
         }
-        live[shape->group] |= moves && job->any_motion ? LIVE_MOTION : 0;
+        live[shape->group] |= moves ? LIVE_MOTION : 0;
     }
 }
 

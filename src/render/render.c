@@ -26,7 +26,7 @@ static void render_free(Render *r) {
         rey_free(ctx, r->workspaces[i]);
     }
     rey_free(ctx, r->workspaces);
-    for (int i = 0; i < BOUNDARY_TERMS; i++) {
+    for (int i = 0; i < BOUNDARY_KINDS; i++) {
         rey_boundary_free(r, r->boundary + i);
     }
     rey_array_free(ctx, &r->edges);
@@ -263,10 +263,6 @@ static rey_result map_selection(Render *r, rey_selection selection) {
             *slot = (int32_t)at;
         }
         r->job.any_normals |= p->normals >= 0;
-        if (p->normals >= 0 && view->shapes[p->normals].emitter >= 0) {
-            // A light's normals say into which directions it shines: light samples jump where none of its points is met.
-            r->faces = FACES_ALIKE | FACES_AWAY;
-        }
         r->job.any_attributes |= p->attribute >= 0;
         r->job.any_places |= p->emitter >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
@@ -326,22 +322,17 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     }
     r->job.spp = set_spp(r);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
-    for (int i = 0; i < BOUNDARY_TERMS && result == REY_OK; i++) {
-        int term = REY_TERM_PRIMARY << i;
-        if (r->terms & term) {
-            result = rey_boundary_check(scene, r->plan.sensor, term);
-            result = result == REY_OK ? rey_boundary_begin(r, term, r->boundary + i) : result;
-        }
-    }
-    return result;
+    return rey_boundaries_begin(r);
 }
 
 // The boundary terms of one set.
 static void run_boundaries(Render *r, int set, double *picture) {
-    for (int i = 0; i < BOUNDARY_TERMS; i++) {
-        if (r->terms & (REY_TERM_PRIMARY << i)) {
+    for (int i = 0; i < BOUNDARY_KINDS; i++) {
+        if (r->terms & rey_boundary_term(i)) {
             rey_boundary_run(r, r->boundary + i, set_scramble(r, set, 3 + (uint32_t)i), picture);
-            rey_terms_book(r, set, REY_TERM_PRIMARY << i, picture);
+        }
+        if ((r->terms & rey_boundary_term(i)) && (i + 1 == BOUNDARY_KINDS || rey_boundary_term(i + 1) != rey_boundary_term(i))) {
+            rey_terms_book(r, set, rey_boundary_term(i), picture);
         }
     }
 }
@@ -353,7 +344,8 @@ static rey_result derivative_end(const Render *r, rey_result result, rey_selecti
     }
     const Param *p = NULL;
     for (int i = 0; i < selection.count && (!p || !(p->terms & REY_TERM_TERMINATOR)); i++) {
-        p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
+        const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
+        p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
     }
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                     "the gradient of %s needs the term 'terminator', which does not exist yet: paths met shading "

@@ -8,8 +8,6 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-enum { BOUNDARY_TERMS = 2 }; // primary, indirect
-
 // What a boundary term samples (boundary.c).
 typedef struct BoundaryPlan {
     BoundaryJob job;         // what all units share
@@ -46,7 +44,7 @@ typedef struct Render {
     TermRequest request;
     double booked;         // of a set's value: what its terms have brought so far
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
-    BoundaryPlan boundary[BOUNDARY_TERMS];
+    BoundaryPlan boundary[BOUNDARY_KINDS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;
     double done, total;    // progress

@@ -12,7 +12,7 @@ static const char *term_reason(int bit, const rey_param_info *info) {
         return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and the "
                "edges that are seen in or through them are not found";
     case REY_TERM_TERMINATOR:
-        return "the picture jumps where shading normals turn away from the viewer";
+        return "the picture jumps where the normals of maps turn away from the viewer";
     default:
         return info->why;
     }
@@ -27,6 +27,9 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
     }
     if (p->volume >= 0) {
         return 0;
+    }
+    if (p->normals >= 0) {
+        return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     }
     return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
 }

@@ -117,17 +117,17 @@ static rey_result mesh_edge(rey_scene *scene, int32_t id, const Side *sides, int
     const ShapeRecord *shape = view->shapes + id;
     const int32_t *indices = mesh_indices(view, shape);
     *e = (EdgeRecord){.kind = EDGE_MESH, .shape = id, .prim = sides[0].at / 3, .corner = sides[0].at % 3,
-                      .opposite = EDGE_OPEN, .other = count > 1 ? EDGE_ANY : EDGE_NONE, .crease = 1, .last = 1};
+                      .opposite = EDGE_OPEN, .other = count > 1 ? EDGE_ANY : EDGE_NONE, .crease = EDGE_CREASE, .last = 1};
     if (r->count > 1) {
         int32_t at = sides[r->side[1]].at, other = at / 3;
         e->opposite = indices[3 * other + (at % 3 + 2) % 3];
         if (count == 2) {
             e->other = other;
-            // With vertex normals, shading runs on where both triangles use the same vertices.
+            // With vertex normals, scattering runs on where both triangles use the same vertices.
             int32_t a = indices[sides[0].at], b = indices[3 * e->prim + (e->corner + 1) % 3];
             int32_t c = indices[at], d = indices[3 * other + (at % 3 + 1) % 3];
             bool same = (a == c && b == d) || (a == d && b == c);
-            e->crease = !(same && (shape->flags & SHAPE_HAS_NORMALS));
+            e->crease = same && (shape->flags & SHAPE_HAS_NORMALS) ? EDGE_SOFT : EDGE_CREASE;
         }
     }
     e->fan = (int32_t)fans->count;
@@ -193,12 +193,24 @@ static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges, Array *
     return result;
 }
 
+// Triangles whose shading normals may turn away from a viewer.
+static rey_result mesh_terminators(rey_scene *scene, int32_t id, Array *edges) {
+    const ShapeRecord *shape = scene->view.shapes + id;
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < shape->triangle_count && (shape->flags & SHAPE_HAS_NORMALS) && result == REY_OK; i++) {
+        EdgeRecord e = {.kind = EDGE_TERMINATOR, .shape = id, .prim = i, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE,
+                        .last = 1};
+        result = push_edge(scene, edges, e);
+    }
+    return result;
+}
+
 // Another curve, in pieces.
 static rey_result curve_edges(rey_scene *scene, int32_t id, int32_t kind, int32_t end, Array *edges) {
     const int32_t pieces = kind == EDGE_SIDE ? 8 : 64;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < pieces && result == REY_OK; i++) {
-        EdgeRecord e = {.kind = kind, .shape = id, .corner = end, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = 1,
+        EdgeRecord e = {.kind = kind, .shape = id, .corner = end, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE,
                         .first = (float)i / (float)pieces, .last = (float)(i + 1) / (float)pieces};
         result = push_edge(scene, edges, e);
     }
@@ -215,6 +227,7 @@ rey_result rey_edges_find(rey_scene *scene, Array *edges, Array *fans) {
         switch (shape->kind) {
         case SHAPE_MESH:
             result = mesh_edges(scene, id, edges, fans);
+            result = result == REY_OK ? mesh_terminators(scene, id, edges) : result;
             break;
         case SHAPE_SPHERE:
             result = curve_edges(scene, id, EDGE_OUTLINE, 0, edges);

@@ -4,10 +4,13 @@
 
 #include "scene/scene.h"
 
-// EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer.
-enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE };
+// EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer; EDGE_TERMINATOR: the curve in
+// a triangle along which its shading normal is at right angles to the viewer.
+enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TERMINATOR };
 enum { EDGE_OPEN = -1 };
 enum { EDGE_NONE = -1, EDGE_ANY = -2 };
+// EDGE_SOFT: only the plane does behind which rays start
+enum { EDGE_SMOOTH, EDGE_CREASE, EDGE_SOFT };
 
 typedef struct EdgeRecord {
     int32_t kind, shape;
@@ -16,7 +19,7 @@ typedef struct EdgeRecord {
     int32_t opposite;    // meshes: vertex of the other triangle that is not on it, or EDGE_OPEN
     int32_t other;       // meshes: that triangle, EDGE_NONE, or EDGE_ANY triangle of the mesh
     int32_t fan, fan_count; // meshes: where more than two triangles meet, such vertices of the others, in `fans`
-    int32_t crease;      // shading jumps across it
+    int32_t crease;      // whether and why shading jumps across it: EDGE_SMOOTH, _CREASE, _SOFT
     float first, last;   // the part of it that counts, within [0, 1]
 } EdgeRecord;
 

@@ -151,7 +151,9 @@ static inline bool has_interior(const Room room, int param) {
     rey_param_info info;
     rey_param_get_info(room.scene, param, &info);
     // Of the rooms' normals only the lantern's turn away from the camera.
-    int jumps = strncmp(info.name, "lantern.", 8) == 0 ? 0 : REY_TERM_TERMINATOR;
+    bool lantern = strncmp(info.name, "lantern.", 8) == 0;
+    int jumps = lantern ? 0 : REY_TERM_TERMINATOR;
+    jumps |= strstr(info.name, ".normals") && !lantern ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
     // Nothing stands in the way of lights with this name, and no border of what they cast is in the picture.
     int shadows = strncmp(info.name, "moving_", 7) == 0 ? REY_TERM_INDIRECT | REY_TERM_PRIMARY : 0;
     return (info.terms & ~jumps & ~shadows) == REY_TERM_INTERIOR;

@@ -37,6 +37,14 @@ static const Motion motions[] = {
     {"boundary_view.xml", "camera.x_fov", ADD, {0, 0, 0}, 1, 1},
     {"boundary_view.xml", "camera.principal_point_offset_x", ADD, {0, 0, 0}, 0.01, 1},
     {"boundary_bounce.xml", "card.to_world", SHIFT, {1, 0, 0}, 0.06, 24},
+    {"turning_lamp.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 1},
+    {"turning_lamp.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
+    {"turning_bounce.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.01, 5},
+    {"turning_sky.xml", "ball.to_world", SHIFT, {1, 0, 0.3f}, 0.01, 1},
+    {"turning_sky.xml", "camera.to_world", TURN, {1, 0, 0.3f}, 0.2, 2},
+    {"turning_light.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 1},
+    {"turning_light.xml", "ball.normals", SHEAR, {0, 0, 0}, 0.08, 4},
+    {"turning_light.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.01, 2},
 };
 
 static void blocks_of(const float *image, double *blocks) {

@@ -4,9 +4,13 @@
 #include "integrator/job.h"
 #include "shape/edges.h"
 
+// What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
+// whose geometric normals do (turning.h).
+enum { BOUNDARY_PRIMARY, BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_KINDS };
+
 typedef struct BoundaryJob {
     PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
-    bool primary;             // what the camera sees; else what other vertices see
+    int32_t kind;             // BOUNDARY_
     const EdgeRecord *edges;
     const int32_t *fans;      // see EdgeRecord
     const float *cdf;         // cumulative probabilities of the edges

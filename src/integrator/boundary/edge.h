@@ -2,7 +2,7 @@
 #pragma once
 
 #include "integrator/boundary/boundary_job.h"
-#include "shape/shape.h"
+#include "integrator/boundary/facet.h"
 
 // A point x(t) of an edge, attached to its surface.
 typedef struct EdgePoint {
@@ -15,6 +15,9 @@ typedef struct EdgePoint {
     Vec3 origin;        // of a mesh's edge: its first vertex, in its own space
     Mask round;         // which points it has depends on the eye
     Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
+    // Where the shading normal n turns away from the viewer, along F = n . view = 0: n, the vector to the viewer, and how far
+    // over the surface F rises by 1. Elsewhere 0.
+    Vec3 normal, view, rise;
 } EdgePoint;
 
 #define EDGE_FIELD(job, i, field)                                                                                      \
@@ -137,6 +140,31 @@ static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
 }
 
+// Where a shading normal is at right angles to the direction to `eye`, or to `eye` itself where the view is parallel.
+static void edge_of_terminator(const SceneView *scene, Float t, Vec3 eye, bool parallel, Mask m, EdgePoint *out) {
+    Facet f = facet_load(scene, &out->hit, m);
+    Float u, v, which = f_min(f_floor(6.0f * t), f_set(5)), s = 6.0f * t - which;
+    Int choice = i_from_f(which);
+    Mask found = m & facet_cross(&f, eye, parallel, choice >> 1, mi_eq(choice & 1, i_set(1)), s, &u, &v);
+    Vec2 slope = facet_slope(&f, eye, parallel, u, v);
+    // The curve runs along (du, dv) = (-slope.y, slope.x), here in units in which |du| + |dv| + |du + dv| = 1.
+    Float size = f_abs(slope.x) + f_abs(slope.y) + f_abs(slope.x - slope.y), r = f_safe_rcp(size);
+    Vec3 e1 = v3_sub(f.p[1], f.p[0]), e2 = v3_sub(f.p[2], f.p[0]), n = facet_at(f.n, u, v);
+    Vec3 tangent = v3_scale(v3_madd(v3_scale(e1, -slope.y), slope.x, e2), r);
+    Float length = v3_length(n), steep = slope.x * slope.x + slope.y * slope.y;
+    Vec3 rise = v3_scale(v3_madd(v3_scale(e1, slope.x), slope.y, e2), length * f_safe_rcp(steep));
+    found = found & m_gt(size, f_set(0)) & m_gt(length, f_set(0));
+    out->p = v3_select(m, facet_at(f.p, u, v), out->p);
+    out->hit.u = f_select(m, u, out->hit.u);
+    out->hit.v = f_select(m, v, out->hit.v);
+    out->tangent = v3_select(m, tangent, out->tangent);
+    out->normal = v3_select(m, v3_scale(n, f_safe_rcp(length)), out->normal);
+    out->view = v3_select(m, facet_view(eye, parallel, out->p), out->view);
+    out->rise = v3_select(m, rise, out->rise);
+    out->open = out->open & ~m;
+    out->probability = f_select(m, f_zero_unless(found, out->probability * (1.0f / 6)), out->probability);
+}
+
 // A point of a random edge; u in the unit square.
 static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob *b, Vec2 u, Vec3 eye, bool parallel) {
     EdgePoint out;
@@ -145,6 +173,7 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.hit = (Hit){EDGE_FIELD(b, e, shape), i_set(0), f_set(0), f_set(0), v3_zero(), EDGE_FIELD(b, e, instance)};
     out.probability = out.probability * f_safe_rcp(range);
     out.p = out.tangent = out.side[0] = out.side[1] = v3_zero();
+    out.normal = out.view = out.rise = v3_zero();
     out.open = m_set(true);
     out.other = EDGE_FIELD(b, e, other);
     out.fan = EDGE_FIELD(b, e, fan);
@@ -152,7 +181,7 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.origin = v3_zero();
     out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
     Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE));
-    Mask side = mi_eq(kind, i_set(EDGE_SIDE));
+    Mask side = mi_eq(kind, i_set(EDGE_SIDE)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
     if (m_any(mesh)) {
         edge_of_mesh(scene, b, e, t, mesh, &out);
     }
@@ -164,6 +193,10 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     }
     if (m_any(side)) {
         edge_of_side(scene, b, e, t, eye, parallel, side, &out);
+    }
+    if (m_any(terminator)) {
+        out.hit.prim = i_select(terminator, EDGE_FIELD(b, e, prim), out.hit.prim);
+        edge_of_terminator(scene, t, eye, parallel, terminator, &out);
     }
     out.round = outline | side;
     out.hit.p = out.p;

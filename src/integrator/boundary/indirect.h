@@ -6,7 +6,7 @@
 // NOT differentiated: what moves behind smooth mirrors and glass, and edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/segments.h"
+#include "integrator/boundary/turning.h"
 #include "integrator/film.h"
 
 typedef struct Indirect {
@@ -26,14 +26,14 @@ static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
 
 // ---- the far side ------------------------------------------------------------------------------------------------
 
-// Fills the rungs: radiance that arrives along the segments, but for what their far points emit themselves.
-static void far_paths(Indirect *in, int32_t *begin) {
-    Tracer *t = in->t;
-    Segments *q = &in->q;
+static int32_t far_half(const Segments *q) { return (q->count + LANES - 1) / LANES * LANES; }
+
+// Starts paths along those segments that end on no light.
+static void far_start(Tracer *t, const Segments *q) {
     int32_t *slots = t->ws.order, n = 0;
     for (int32_t k = 0; k < q->count; k++) {
         slots[n] = k;
-        n += !q->lit[k];
+        n += q->lit[k] != 1;
     }
     for (int32_t k = 0; k < n; k += LANES) {
         Mask m = m_first_n(n - k);
@@ -41,10 +41,22 @@ static void far_paths(Indirect *in, int32_t *begin) {
         Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
         path_begin(t, k, slot, &ray, f_set(1));
     }
+    t->active = n;
+}
+
+// Fills the rungs: radiance that arrives along the segments.
+static void far_paths(Indirect *in, int32_t *begin) {
+    Tracer *t = in->t;
+    Segments *q = &in->q;
+    t->placed = in->b->kind == BOUNDARY_TERMINATOR;
+    if (t->placed) {
+        turning_start(t, q, far_half(q));
+    } else {
+        far_start(t, q);
+    }
     for (int c = 0; c < SPEC_N; c++) {
         memset(t->ws.radiance[c], 0, CHUNK * sizeof(real));
     }
-    t->active = n;
     t->current = 0;
     t->record_count = t->batch_count = 0;
     t->overflow = false;
@@ -54,27 +66,39 @@ static void far_paths(Indirect *in, int32_t *begin) {
     t->rungs_kept = 0;
     t->rung_count = depth > 0 && depth <= MOST_RUNGS ? depth - 1 : 1;
     for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
-        memset(q->rungs[i], 0, (size_t)q->count * sizeof(real));
+        memset(q->rungs[i], 0, (size_t)(t->placed ? 2 * far_half(q) : q->count) * sizeof(real));
     }
-    t->job->paths += n;
+    t->job->paths += t->active;
     path_forward(t, begin);
     t->first_bounce = 0;
+    t->placed = false;
     t->rungs = NULL;
 }
 
-// Radiance along the segments of particles that reach the sensor after `bounce` further vertices.
-KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
+// What the paths in the slots brought that are continued by particles that reach the sensor after `bounce` further vertices.
+KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
     const Tracer *t = in->t;
-    const Segments *q = &in->q;
-    Mask lit = mi_lt(i_set(0), i_gather(q->lit, slot));
-    Spec l = spec_gather(q->light, slot);
     int32_t depth = t->scene->max_depth, rung = depth - 2 - bounce;
-    Spec reflected = spec_gather(t->ws.radiance, slot);
     if (depth > 0 && depth <= MOST_RUNGS && rung < t->rungs_kept) { // paths that have ended bring no more
-        reflected = spec_gather(q->rungs + rung * SPEC_N, slot);
+        return spec_gather(in->q.rungs + rung * SPEC_N, slot);
     }
-    reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
-    return spec_select(lit, l, reflected);
+    return spec_gather(t->ws.radiance, slot);
+}
+
+// Radiance along the segments of such particles. Silhouettes leave out what the far points emit: that is for segments that end
+// on lights.
+KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
+    const Segments *q = &in->q;
+    Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
+    switch (in->b->kind) {
+    case BOUNDARY_TERMINATOR:
+        return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
+    case BOUNDARY_HORIZON:
+        return reflected;
+    default:
+        reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
+        return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
+    }
 }
 
 // ---- the near side -----------------------------------------------------------------------------------------------
@@ -126,7 +150,8 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
     Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * sight.density;
     Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
-    m = m & m_gt(spec_max(l), f_set(0)) & m_finite(spec_sum(l));
+    Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); // jumps have either sign
+    m = m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
     m = m_any(m) ? particle_open(t, &ray, m) : m;
     near_book(in, &sight, l, at->v.slot, bounce, m);
@@ -138,6 +163,9 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     Landing at;
     at.v = vertex_load(in->t, order, count, bounce);
     landing_look(in->t, group, &at);
+    if (in->b->kind == BOUNDARY_HORIZON && bounce == 0) {
+        at.cosine = f_set(1); // is part of no weight of the segment's
+    }
     if (!scene->hide_emitters || group->emitter < 0) {
         near_connect(in, &at, bounce);
     }
@@ -158,12 +186,21 @@ static void near_particles(Indirect *in, int32_t *begin) {
         Spec kept = spec_load(t->ws.radiance, k);
         path_begin(t, k, slot, &ray, f_set(1));
         spec_store(t->ws.radiance, k, kept);
+        if (in->b->kind == BOUNDARY_HORIZON) { // they are there
+            Hit hit = LOAD_HIT(q, k, near);
+            hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
+            hit_place(t, k, &hit);
+        }
     }
     t->active = q->count;
     t->current = 0;
+    t->placed = in->b->kind == BOUNDARY_HORIZON;
     int32_t groups = (int32_t)t->scene->groups_count + 1;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
-        trace_stage(t, 1);
+        if (!t->placed) {
+            trace_stage(t, 1);
+        }
+        t->placed = false;
         sort_stage(t, begin, groups);
         int32_t next_count = 0;
         for (int32_t g = 1; g < groups; g++) {
@@ -221,6 +258,22 @@ KFN Float sink_taken(Sink *sink) {
     return d;
 }
 
+// The share of the near points in the motion of the segments k..., after that of everything else.
+static void segments_near_adj(Indirect *in, int32_t k, const Hit *near, Vec3 dnear, Float seen, Float unseen, Sink *sink, Mask m) {
+    const Segments *q = &in->q;
+    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
+    if (in->b->job.mode != MODE_FORWARD) {
+        points_slide_adj(in, near, v3_scale(dnear, seen), lens, sink, m);
+        points_move_adj(in->t, near, v3_scale(dnear, unseen), v3_zero(), sink, m);
+        return;
+    }
+    Float common = sink_taken(sink);
+    points_slide_adj(in, near, dnear, lens, sink, m);
+    f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
+    points_move_adj(in->t, near, dnear, v3_zero(), sink, m);
+    f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
+}
+
 // The motion of the segments k..., worth `seen` where the sensor sees the near points, and `unseen` elsewhere: adds it to the
 // gradient, or in forward mode leaves in both what it is.
 static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
@@ -248,32 +301,68 @@ static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
         lights_move_adj(in->t->scene, i_select(delta, light, i_set(0)), delta, near.p, record_v3(q->dx, q->dy, q->dz, k),
                         total, &move, sink);
     }
-    Vec3 dnear = v3_scale(n, along - 1.0f);
-    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
-    if (!forward) {
-        points_slide_adj(in, &near, v3_scale(dnear, seen), lens, sink, m);
-        points_move_adj(in->t, &near, v3_scale(dnear, unseen), v3_zero(), sink, m);
+    segments_near_adj(in, k, &near, v3_scale(n, along - 1.0f), seen, unseen, sink, m);
+}
+
+// The same of n . view / r between x and the other end of segments at right angles to n (turning.h). x slides where the sensor
+// sees it, but in the plane that its geometric normal stands for.
+static void turnings_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    Mask m = m_first_n(q->count - k);
+    bool forward = in->b->job.mode == MODE_FORWARD, horizon = in->b->kind == BOUNDARY_HORIZON;
+    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
+    m = m & m_finite(seen + unseen);
+    Float both = f_zero_unless(m, seen + unseen), factor = f_load(q->along + k);
+    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero()), d = record_v3(q->dx, q->dy, q->dz, k);
+    Vec3 apart = v3_select(m, v3_scale(n, f_load(q->behind + k)), v3_zero()), turned = v3_scale(d, both * factor);
+    Hit near = LOAD_HIT(q, k, near), x = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
+    SurfaceAdj own = surface_adj_zero();
+    own.p = v3_scale(apart, -both);
+    if (horizon) {
+        own.ng = turned;
+    } else {
+        own.n = v3_neg(turned);
+    }
+    surfaces_move_adj(in->t, &x, &own, sink, m);
+    if (horizon) {
+        points_move_adj(in->t, &far, v3_scale(apart, both), v3_zero(), sink, m & mi_lt(i_set(-1), far.shape));
+        if (forward) {
+            Float all = sink_taken(sink);
+            f_store(q->seen + k, all);
+            f_store(q->unseen + k, all);
+        }
         return;
     }
-    Float common = sink_taken(sink);
-    points_slide_adj(in, &near, dnear, lens, sink, m);
-    f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
-    points_move_adj(in->t, &near, dnear, v3_zero(), sink, m);
-    f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
+    segments_near_adj(in, k, &near, apart, seen, unseen, sink, m);
+}
+
+static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
+    if (in->b->kind == BOUNDARY_INDIRECT) {
+        segments_move_adj(in, k, sink);
+    } else {
+        turnings_move_adj(in, k, sink);
+    }
 }
 
 // Samples first... of a chunk.
 static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sink, int32_t *begin) {
     Tracer *t = in->t;
     Segments *q = &in->q;
-    segments_find(t, in->b, first, count, q);
+    if (in->b->kind == BOUNDARY_INDIRECT) {
+        segments_find(t, in->b, first, count, q);
+    } else {
+        turnings_find(t, in->b, first, count, q);
+    }
+    if (q->count == 0) {
+        return;
+    }
     slot_numbers(t, q, first);
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_FORWARD; k += LANES) {
-        segments_move_adj(in, k, sink);
+        moves_adj(in, k, sink);
     }
     far_paths(in, begin);
     near_particles(in, begin);
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_REVERSE; k += LANES) {
-        segments_move_adj(in, k, sink);
+        moves_adj(in, k, sink);
     }
 }

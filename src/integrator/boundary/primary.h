@@ -70,10 +70,10 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         Ray ray = primary_ray(t, s, side ? PRIMARY_STEP : -PRIMARY_STEP).ray;
         Hit hit = trace_closest(t->scene, &ray, m, false);
         Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
-        Mask met = mi_lt(i_set(-1), hit.shape);
+        Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
         own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
         Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
-                                  mi_eq(e->other, i_set(EDGE_ANY)));
+                                  (near & mi_eq(e->other, i_set(EDGE_ANY))));
         own[side] = (silhouette & own[side]) | faces;
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
     }
@@ -129,6 +129,29 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
     t->job->paths += 2 * count;
 }
 
+// Adds the motion of the edges along n, worth `worth`. A terminator is where F = n . view is 0: where F grows, it moves back over
+// the surface, down the slope.
+static void primary_move_adj(Tracer *t, const PrimarySample *s, Float worth, bool parallel, Sink *sink) {
+    Vec3 along = v3_scale(s->n, f_zero_unless(s->m, worth));
+    SurfaceAdj d = surface_adj_zero();
+    Float df = -v3_dot(along, s->edge.rise);
+    RayAdj ray = {s->edge.p, v3_neg(along), v3_zero()};
+    d.p = along;
+    d.n = v3_scale(s->edge.view, df);
+    if (parallel) { // view = - direction
+        ray.direction = v3_scale(s->edge.normal, -df);
+    } else { // view = eye - p; the eye is the ray's point minus distance times direction
+        Vec3 toward = v3_scale(s->edge.normal, df);
+        d.p = v3_sub(d.p, toward);
+        ray.position = v3_add(ray.position, toward);
+        ray.direction = v3_scale(toward, -s->seen.distance);
+    }
+    surfaces_move_adj(t, &s->edge.hit, &d, sink, s->m);
+    if (sink->any_camera) {
+        sensor_ray_adj(t->scene, t->sensor, s->seen.x, s->seen.y, s->view.lens, &ray, sink, s->m);
+    }
+}
+
 // Books what the paths found: slots k and half + k. Reverse: film_adj has left the film's adjoint in ws.adjoint.
 static void primary_finish(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Sink *sink, int32_t count,
                            int32_t half) {
@@ -143,12 +166,7 @@ static void primary_finish(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
             worth = worth * spec_dot(jump, spec_load(t->ws.adjoint, k));
         }
         s.m = s.m & m_finite(worth) & m_finite(spec_sum(jump));
-        Vec3 dp = v3_scale(s.n, f_zero_unless(s.m, worth));
-        points_move_adj(t, &s.edge.hit, dp, v3_zero(), sink, s.m);
-        if (sink->any_camera) {
-            RayAdj ray = {s.edge.p, v3_neg(dp), v3_zero()};
-            sensor_ray_adj(t->scene, t->sensor, s.seen.x, s.seen.y, s.view.lens, &ray, sink, s.m);
-        }
+        primary_move_adj(t, &s, worth, pinhole->parallel, sink);
         if (b->job.mode == MODE_FORWARD) {
             spec_store(t->ws.radiance, k, spec_zero_unless(s.m, spec_scale(jump, sink->derivative)));
             sink->derivative = f_set(0);

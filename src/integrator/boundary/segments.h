@@ -15,6 +15,7 @@
 #define DIMENSION_EDGE_SEGMENT 0x80000002u
 #define DIMENSION_SEGMENT_LIGHT 0x80000003u
 #define DIMENSION_SEGMENT_END 0x80000004u
+#define DIMENSION_TURNING_SIDE 0x80000005u
 
 // Blocks of samples that end on lights take turns with blocks that leave into a random direction.
 enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64 };

@@ -1,0 +1,166 @@
+// turning.h: the jumps of light that leaves or reaches a surface at right angles to one of its normals, seen by vertices other
+// than the camera. Terminator: what a point x scatters and emits jumps where its shading normal n turns away from the vertex a
+// that looks at it. Horizon: what x receives jumps where its geometric normal n turns away from where the light comes from,
+// because rays then start behind the surface; scattering goes by the shading normal and goes on. With r the distance,
+//   dI += integral dA_x dphi |n_g . w| (n' . w + n . (a' - x') / r) (L+ - L-) W        terminator, W the importance at a
+//   dI += integral dA_x dphi f |n_s . w| (n' . w + n . (b' - x') / r) L W              horizon, -L from below
+// over the points x of smooth meshes and the directions w at right angles to n. docs/derivations/boundary.md.
+// NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
+#pragma once
+
+#include "integrator/boundary/segments.h"
+
+// What a segment says of its light in `lit`, beside "no" and "from a light": all that comes along it, or the difference
+// between two directions beside it, the other one in a second slot.
+enum { SEGMENT_ALL = 2, SEGMENT_JUMP = 3 };
+
+// Half the angle between those two.
+#define TURNING_STEP 1e-4f
+// How often directions leave on the side of the surface that its geometric normal is on.
+#define TURNING_OUTSIDE 0.75f
+
+// A batch of segments that leave x, in the edge record's place, along d.
+typedef struct Turning {
+    Hit hit;
+    Vec3 p, n, ng, d;
+    Float weight, factor; // factor: of the light that comes, 1 or -1
+    Mask m;
+} Turning;
+
+// The geometric normal, on the side on which the interaction has it.
+KFN Vec3 turning_cross(const SceneView *scene, const Facet *f, const Hit *hit, Mask m) {
+    Int shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m))));
+    Mask flip = mi_lt(i_set(0), SHAPE_FIELD(scene, shape, flags) & SHAPE_FLIP_NORMALS);
+    Mask inside = m & mi_lt(i_set(-1), SHAPE_FIELD(scene, shape, collection));
+    Vec3 cross = v3_cross(v3_sub(f->p[1], f->p[0]), v3_sub(f->p[2], f->p[0]));
+    if (m_any(inside)) { // by the inverse transpose; a mirror turns the corners round
+        Hit h = *hit;
+        h.instance = i_select(inside, hit->instance, i_set(0));
+        Int at = instance_table(scene, &h);
+        Float det = v3_dot(v3_cross(table_v3(scene, at), table_v3(scene, at + 4)), table_v3(scene, at + 8));
+        flip = flip ^ (inside & m_lt(det, f_set(0)));
+    }
+    return v3_select(flip, v3_neg(cross), cross);
+}
+
+static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Turning *out) {
+    const SceneView *scene = t->scene;
+    SampleKey key = slot_key(t, slot);
+    Vec2 at = rng_2d(&key, DIMENSION_EDGE_SEGMENT), way = rng_2d(&key, DIMENSION_SEGMENT_END);
+    Float choice = rng_1d(&key, DIMENSION_SEGMENT_LIGHT), probability, root = f_sqrt(1.0f - at.x);
+    Int e = edge_choose(b, choice, &probability);
+    out->hit = (Hit){EDGE_FIELD(b, e, shape), EDGE_FIELD(b, e, prim), 1.0f - root, at.y * root, v3_zero(),
+                     EDGE_FIELD(b, e, instance)};
+    Facet f = facet_load(scene, &out->hit, m_set(true));
+    Vec3 cross = turning_cross(scene, &f, &out->hit, m_set(true)), shading = facet_at(f.n, out->hit.u, out->hit.v);
+    Float twice = v3_length(cross);
+    shading = v3_normalize(shading);
+    out->ng = v3_scale(cross, f_safe_rcp(twice));
+    out->p = out->hit.p = facet_at(f.p, out->hit.u, out->hit.v);
+    bool horizon = b->kind == BOUNDARY_HORIZON;
+    Vec3 other = horizon ? shading : out->ng;
+    out->n = horizon ? out->ng : shading;
+    // The part of the other normal across this one; directions in proportion to their cosine with it.
+    Vec3 across = v3_madd(other, -v3_dot(other, out->n), out->n);
+    Float size = v3_length(across), rcp = f_safe_rcp(size);
+    Vec3 x = v3_scale(across, rcp), y = v3_cross(out->n, x);
+    Mask outside = m_lt(way.x, f_set(TURNING_OUTSIDE));
+    Float share = f_select(outside, f_set(TURNING_OUTSIDE), f_set(1 - TURNING_OUTSIDE));
+    Float sine = 2.0f * way.y - 1.0f, cosine = f_safe_sqrt(1.0f - sine * sine);
+    out->d = v3_madd(v3_scale(x, f_select(outside, cosine, -cosine)), sine, y);
+    // dA dphi over densities: of dphi, cosine / 2. The terminator has the factor |n_g . d| = size cosine.
+    Float density = probability * share * (horizon ? 0.5f * cosine : f_set(0.5f));
+    out->weight = (horizon ? f_set(0.5f) : 0.5f * size) * twice * f_safe_rcp(density);
+    out->factor = f_set(1);
+    if (horizon) { // what comes from above or from below, each with its own distance
+        Mask above = m_lt(rng_1d(&key, DIMENSION_TURNING_SIDE), f_set(0.5f));
+        out->factor = f_select(above, f_set(2), f_set(-2));
+    }
+    out->m = m & m_gt(size, f_set(1e-6f)) & m_gt(probability, f_set(0)) & m_gt(density, f_set(0)) & m_finite(out->weight) &
+             m_gt(out->weight, f_set(0));
+}
+
+// Finds where the segments end and keeps those that do.
+static void turning_trace(Tracer *t, const Turning *s, bool horizon, Int number, Segments *q) {
+    Float step = (1.0f + f_max(f_max(f_abs(s->p.x), f_abs(s->p.y)), f_abs(s->p.z))) * 9e-5f;
+    Float up = horizon ? s->factor : v3_dot(s->ng, s->d);
+    Ray ray = {v3_madd(s->p, f_copysign(step, up), s->ng), s->d, f_set(INFINITY)};
+    t->job->rays += m_count(s->m);
+    Hit end = trace_closest(t->scene, &ray, s->m, false);
+    Mask met = mi_lt(i_set(-1), end.shape), m = s->m & (horizon ? met | m_set(t->scene->environment >= 0) : met);
+    if (!m_any(m)) {
+        return;
+    }
+    Float near = f_zero_unless(met, f_safe_rcp(v3_length(v3_sub(end.p, s->p))));
+    int32_t at = q->count;
+    // Segments run from the near point, towards the sensor, to the far one: of a terminator, x is that.
+    Vec3 d = horizon ? s->d : v3_neg(s->d), n = v3_scale(s->n, s->weight * s->factor);
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray.o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, d, m);
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, n, m);
+    f_compress(q->behind + at, near, m);
+    f_compress(q->along + at, s->weight * s->factor, m);
+    f_compress(q->seen + at, f_set(0), m);
+    f_compress(q->unseen + at, f_set(0), m);
+    spec_compress(q->light, at, spec_set(f_set(1)), m);
+    i_compress(q->lit + at, i_set(horizon ? SEGMENT_ALL : SEGMENT_JUMP), m);
+    i_compress(q->source + at, i_set(-1), m);
+    i_compress(q->number + at, number, m);
+    end.shape = i_select(met, end.shape, i_set(-1));
+    KEEP_HIT(q, at, edge, &s->hit, s->p, m);
+    KEEP_HIT(q, at, near, horizon ? &s->hit : &end, horizon ? s->p : end.p, m);
+    KEEP_HIT(q, at, far, horizon ? &end : &s->hit, horizon ? end.p : s->p, m);
+    q->count += m_count(m);
+}
+
+// As segments_find.
+static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        for (int32_t k = i; k < i + LANES; k++) {
+            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
+            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
+        }
+        Turning s;
+        turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
+        if (m_any(s.m)) {
+            turning_trace(t, &s, b->kind == BOUNDARY_HORIZON, i_iota() + i, q);
+        }
+    }
+}
+
+// Puts path k, which path_begin has started, where the ray would have met the surface.
+KFN void hit_place(Tracer *t, int32_t k, const Hit *hit) {
+    Workspace *ws = &t->ws;
+    i_store(ws->hit_shape + k, hit->shape);
+    i_store(ws->hit_prim + k, hit->prim);
+    i_store(ws->hit_instance + k, hit->instance);
+    i_store(ws->hit_group + k, SHAPE_FIELD(t->scene, hit->shape, group) + 1);
+    f_store(ws->hit_u + k, hit->u);
+    f_store(ws->hit_v + k, hit->v);
+    f_store(ws->hit_x + k, hit->p.x);
+    f_store(ws->hit_y + k, hit->p.y);
+    f_store(ws->hit_z + k, hit->p.z);
+}
+
+// Terminators: starts the paths that look at x from both sides of its shading normal's plane, in slots k and half + k.
+static void turning_start(Tracer *t, const Segments *q, int32_t half) {
+    for (int32_t k = 0; k < half; k++) {
+        int32_t at = k < q->count ? k : q->count - 1;
+        t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
+        t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
+    }
+    for (int32_t k = 0; k < half; k += LANES) {
+        Int at = i_min(i_iota() + k, i_set(q->count - 1));
+        Hit hit = {i_gather(q->edge_shape, at), i_gather(q->edge_prim, at), real_gather(q->edge_u, at),
+                   real_gather(q->edge_v, at), LOAD_V3(*q, edge_x, edge_y, edge_z, at), i_gather(q->edge_instance, at)};
+        Vec3 d = LOAD_V3(*q, dx, dy, dz, at), n = v3_normalize(LOAD_V3(*q, nx, ny, nz, at));
+        for (int side = 0; side < 2; side++) {
+            Vec3 to = v3_normalize(v3_madd(d, f_set(side ? TURNING_STEP : -TURNING_STEP), n)); // first from where n points to
+            Ray ray = {v3_sub(hit.p, to), to, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
+            path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
+            hit_place(t, side * half + k, &hit);
+        }
+    }
+    t->active = 2 * half;
+}
