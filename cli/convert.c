@@ -28,6 +28,11 @@ int cli_convert(int argc, char **argv) {
         return status;
     }
     options.output = options.files[1];
+    if (options.output[0] == '-' && !options.output[1]) {
+        fprintf(stderr, "reynolds convert: a scene is written with its meshes and pictures, which standard output cannot hold; name a file\n");
+        cli_options_free(&options);
+        return 2;
+    }
     if (same_file(options.files[0], options.files[1])) {
         fprintf(stderr, "reynolds convert: %s is both read and written; name another file for the result\n", options.files[1]);
         cli_options_free(&options);

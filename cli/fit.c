@@ -254,6 +254,9 @@ static int run(const Options *options, Session *session, const char *command) {
     }
     if (code == REY_ERROR_CANCELLED) {
         cli_note("%s", rey_error(session->ctx));
+        if (options->json) {
+            cli_json_error(rey_error(session->ctx), rey_result_text(code));
+        }
         status = EXIT_INTERRUPTED;
     } else if (code) {
         status = cli_report_failure(options, session->ctx, code);

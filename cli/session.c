@@ -101,7 +101,7 @@ static void report(const Options *options, const char *message, rey_result resul
 
 int cli_report_failure(const Options *options, const rey_context *ctx, rey_result result) {
     if (result == REY_ERROR_CANCELLED && cli_interrupted()) {
-        cli_note("interrupted");
+        report(options, "interrupted", result);
         return EXIT_INTERRUPTED;
     }
     const char *message = rey_error(ctx);

@@ -79,6 +79,28 @@ static int terms_of(const rey_scene *scene, const char *name) {
     return info.terms;
 }
 
+// A texture that stands by itself has the range of what refers to it, the narrower one of two.
+static void test_ranges(void **state) {
+    (void)state;
+    static const char text[] = "<texture type='checkerboard' id='shared'/>"
+                               "<bsdf type='diffuse' id='paint'><ref name='reflectance' id='shared'/></bsdf>"
+                               "<bsdf type='blendbsdf' id='mix'><ref name='weight' id='shared'/><bsdf type='diffuse'/>"
+                               "<bsdf type='diffuse'/></bsdf>"
+                               "<texture type='checkerboard' id='free'/>"
+                               "<bsdf type='bumpmap' id='bumpy'><ref id='free'/><bsdf type='diffuse'/></bsdf>";
+    rey_context *ctx;
+    rey_scene *scene;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    assert_int_equal(load(ctx, text, &scene), REY_OK);
+    rey_param_info info;
+    assert_int_equal(rey_param_get_info(scene, rey_param_find(scene, "shared.color0.value"), &info), REY_OK);
+    assert_true(info.low == 0 && info.high == 1);
+    assert_int_equal(rey_param_get_info(scene, rey_param_find(scene, "free.color0.value"), &info), REY_OK);
+    assert_true(info.low < 0 && info.high > 1);
+    rey_scene_destroy(scene);
+    rey_context_destroy(ctx);
+}
+
 // A texture that colours one function and turns the normal of another one asks for what both of them need.
 static void test_terms(void **state) {
     (void)state;
@@ -106,6 +128,6 @@ static void test_terms(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_terms)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_ranges), cmocka_unit_test(test_terms)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,15 +6,55 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+
+// Large blocks come from the system, which hands out zeroed pages as they are touched: the scratch memory of a render is
+// sized for its longest paths and mostly stays untouched. Every block begins with a header.
+enum { LARGE_BLOCK = 1 << 20, HEADER_BYTES = 64 };
+
+typedef struct BlockHeader {
+    size_t mapped; // bytes from the system; 0 = from the heap
+} BlockHeader;
+
+// Sanitizers watch the heap alone.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+static bool is_large(size_t bytes) { return bytes == SIZE_MAX; }
+#else
+static bool is_large(size_t bytes) { return bytes >= LARGE_BLOCK; }
+#endif
 
 static void *default_alloc(void *user, size_t bytes, size_t alignment) {
     UNUSED(user);
-    return aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+    if (alignment > HEADER_BYTES || bytes > SIZE_MAX / 2) {
+        return NULL;
+    }
+    size_t size = (bytes + 2 * HEADER_BYTES - 1) / HEADER_BYTES * HEADER_BYTES;
+    char *block;
+    if (is_large(bytes)) {
+        block = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        block = block == MAP_FAILED ? NULL : block;
+    } else {
+        block = aligned_alloc(HEADER_BYTES, size);
+    }
+    if (!block) {
+        return NULL;
+    }
+    ((BlockHeader *)(void *)block)->mapped = is_large(bytes) ? size : 0;
+    return block + HEADER_BYTES;
 }
 
 static void default_release(void *user, void *memory) {
     UNUSED(user);
-    free(memory);
+    if (!memory) {
+        return;
+    }
+    char *block = (char *)memory - HEADER_BYTES;
+    size_t mapped = ((BlockHeader *)(void *)block)->mapped;
+    if (mapped) {
+        munmap(block, mapped);
+    } else {
+        free(block);
+    }
 }
 
 rey_context_def rey_default_context_def(void) {
@@ -124,7 +164,9 @@ void *rey_alloc(rey_context *ctx, size_t bytes) {
         rey_fail_memory(ctx, size);
         return NULL;
     }
-    memset(memory, 0, size);
+    if (ctx->def.alloc != default_alloc || !is_large(size)) {
+        memset(memory, 0, size);
+    }
     return memory;
 }
 

@@ -97,7 +97,10 @@ void rey_text_number(Text *text, double value) {
         rey_text_bytes(text, "null", 4);
         return;
     }
-    for (int precision = 1; precision <= 17; precision++) {
+    // Exponents are for numbers that need them.
+    double size = fabs(value);
+    int whole = size >= 1 && size < 1e15 ? (int)log10(size) + 1 : 1;
+    for (int precision = whole; precision <= 17; precision++) {
         snprintf(digits, sizeof digits, "%.*g", precision, value);
         for (char *c = digits; *c; c++) {
             *c = *c == ',' ? '.' : *c; // locales with a decimal comma

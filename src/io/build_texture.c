@@ -3,6 +3,7 @@
 #include "io/lenient.h"
 #include "io/load.h"
 
+#include <math.h>
 #include <string.h>
 
 rey_result build_note_source(Builder *b, rey_xml_node *node, const char *property, int32_t texture) {
@@ -212,17 +213,23 @@ bool build_is_volume(const Builder *b, int32_t texture) {
            (t->child[1] >= 0 && build_is_volume(b, t->child[1]));
 }
 
-// A texture that several slots share needs the terms of all of them.
-static void add_terms(Builder *b, int32_t texture, const TextureUse *use) {
+// A texture that several slots share needs the terms of all of them, and its values must suit them all.
+static void add_use(Builder *b, int32_t texture, const TextureUse *use, bool values) {
+    const TextureNode *node = &ARRAY_AT(b->scene->build.textures, TextureNode, texture);
     Param *p;
+    // Temperatures and factors have ranges of their own.
+    values = values && (node->kind == TEXTURE_CONSTANT || node->kind == TEXTURE_BITMAP || node->kind == TEXTURE_CHECKERBOARD);
     for (int k = 0; (p = build_param_of(b, texture, k)); k++) {
         p->terms |= use->terms;
         p->why = use->why && !*p->why ? use->why : p->why;
+        if (values && p->texture == texture) {
+            p->low = fmaxf(p->low, use->low);
+            p->high = fminf(p->high, use->high);
+        }
     }
     for (int k = 0; k < 2; k++) {
-        int32_t child = ARRAY_AT(b->scene->build.textures, TextureNode, texture).child[k];
-        if (child >= 0) {
-            add_terms(b, child, use);
+        if (node->child[k] >= 0) {
+            add_use(b, node->child[k], use, values);
         }
     }
 }
@@ -232,7 +239,7 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
     TRY(build_visit(b, node, path, &first));
     if (!first) {
         *out = node->built;
-        add_terms(b, *out, &use);
+        add_use(b, *out, &use, true);
         return REY_OK;
     }
     if (strcmp(node->type, "bitmap") == 0) {
@@ -247,7 +254,7 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
         TRY(build_spectrum(b, node, use, path, out));
     }
     node->built = *out;
-    add_terms(b, *out, &use);
+    add_use(b, *out, &use, true);
     TRY(build_check_unused(b, node));
     return build_finish(b, node, path);
 }
