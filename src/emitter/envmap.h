@@ -1,5 +1,6 @@
-// envmap.h: radiance by direction from a picture in latitude and longitude. Sampled from the luminance of its cells;
-// the table is the inverse pose, then that distribution (distribution.h).
+// envmap.h: radiance by direction from a picture in latitude and longitude. Sampled from the luminance of its cells, and within
+// a cell from the bilinear interpolation of its corners' luminance, as it is read: suns are single texels. The table is the
+// inverse pose, the luminance that every direction has in addition, then that distribution (distribution.h).
 #pragma once
 
 #include "emitter/distribution.h"
@@ -11,7 +12,7 @@
     P(SKY, to_world, 0, -INFINITY, INFINITY, "from the image's space", "")
 EMITTER_SLOTS(Envmap, ENVMAP_PARAMS)
 
-enum { ENVMAP_DISTRIBUTION = 12 };
+enum { ENVMAP_FLOOR = 12, ENVMAP_DISTRIBUTION = 13 };
 
 // ---- host --------------------------------------------------------------------------------------------------------
 
@@ -70,6 +71,7 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
     }
     double floor = total > 0 ? uniform_share * total / sines : 1;
     double all = total > 0 ? total * (1 + uniform_share) : sines;
+    view->tables[e->table + ENVMAP_FLOOR] = (float)floor;
     for (int64_t y = 0; y < rows; y++) {
         float *row = cells + y * width;
         double mass = 0, sum = 0;
@@ -85,7 +87,7 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
     }
 }
 
-// Inverse pose, row masses, masses within rows.
+// Inverse pose, floor, row masses, masses within rows.
 static inline int64_t envmap_size(const TextureNode *textures, const EmitterRecord *e) {
     const TextureNode *t = textures + e->slot[SLOT(Envmap, data)];
     return ENVMAP_DISTRIBUTION + (int64_t)(t->height - 1) * (t->width + 1);
@@ -191,6 +193,45 @@ KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 
     move->d = v3_add(move->d, light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, dy, sink, m));
 }
 
+// Luminance at the corners of a cell, as sampling counts it.
+typedef struct EnvmapCell {
+    Float corner[4];
+    Float mean;
+} EnvmapCell;
+
+KFN EnvmapCell envmap_cell(const SceneView *scene, const EmitterRecord *e, const Footprint *f) {
+    const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
+    const real floor = (real)scene->tables[e->table + ENVMAP_FLOOR];
+    EnvmapCell cell;
+    for (int k = 0; k < 4; k++) {
+        Spec s = bitmap_texel(scene, t, f->at[k]);
+        cell.corner[k] = f_max(0.212671f * s.c[0] + 0.715160f * s.c[1] + 0.072169f * s.c[2], f_set(0)) + floor;
+    }
+    cell.mean = 0.25f * (cell.corner[0] + cell.corner[1] + cell.corner[2] + cell.corner[3]);
+    return cell;
+}
+
+// Density within the cell at (x, y), relative to a uniform one.
+KFN Float envmap_cell_density(const EnvmapCell *c, Float x, Float y) {
+    return f_lerp(f_lerp(c->corner[0], c->corner[1], x), f_lerp(c->corner[2], c->corner[3], x), y) * f_safe_rcp(c->mean);
+}
+
+// Sample of the density that goes from a at 0 to b at 1 linearly.
+KFN Float envmap_sample_linear(Float a, Float b, Float u) {
+    return f_min(u * (a + b) * f_safe_rcp(a + f_safe_sqrt(f_lerp(a * a, b * b, u))), f_set(1));
+}
+
+// Moves a uniform sample of the cell at uv to one of its density, which multiplies *density.
+KFN Vec2 envmap_within_cell(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Float *density) {
+    const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
+    Footprint f = envmap_footprint(t, uv);
+    EnvmapCell c = envmap_cell(scene, e, &f);
+    Float y = envmap_sample_linear(c.corner[0] + c.corner[1], c.corner[2] + c.corner[3], f.fy);
+    Float x = envmap_sample_linear(f_lerp(c.corner[0], c.corner[2], y), f_lerp(c.corner[1], c.corner[3], y), f.fx);
+    *density = *density * envmap_cell_density(&c, x, y);
+    return (Vec2){uv.x + (x - f.fx) * (1 / (real)t->width), uv.y + (y - f.fy) * (1 / (real)(t->height - 1))};
+}
+
 KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
     UNUSED(ref);
     const TextureNode *t = scene->textures + l->e->slot[SLOT(Envmap, data)];
@@ -199,6 +240,7 @@ KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, 
     s.uv = grid_sample(scene, l->e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, u, &density);
     // Cell column i covers [i + 1/2, i + 3/2] of the image, the span between two texel centres.
     s.uv.x = s.uv.x + 0.5f / (real)t->width;
+    s.uv = envmap_within_cell(scene, l->e, s.uv, &density);
     s.uv.x = s.uv.x - f_floor(s.uv.x);
     Float sin_theta, cos_theta, sin_phi, cos_phi;
     f_sincos(s.uv.y * PI, &sin_theta, &cos_theta);
@@ -225,8 +267,11 @@ KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec
     // The same with y = A^-1 d = v / |A v|: |A v|^3 / sin = 1 / (|y|^2 |(x, z)|).
     Vec3 y = light_direction_to_local(scene, &l, d);
     Float ring2 = y.x * y.x + y.z * y.z;
+    Footprint f = envmap_footprint(t, uv);
+    EnvmapCell cell = envmap_cell(scene, e, &f);
     uv.x = uv.x - 0.5f / (real)t->width;
     uv.x = uv.x - f_floor(uv.x);
-    return grid_pdf(scene, e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, uv) * envmap_shrinking(scene, e) *
+    return grid_pdf(scene, e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, uv) *
+           envmap_cell_density(&cell, f.fx, f.fy) * envmap_shrinking(scene, e) *
            f_safe_rcp(2.0f * PI * PI * f_sqrt(ring2) * (ring2 + y.y * y.y));
 }
