@@ -22,7 +22,7 @@ demo: all
 	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
 test: all
-	@cd $(BUILD) && ctest --output-on-failure -LE slow
+	@cd $(BUILD) && ctest -j$(JOBS) --output-on-failure -LE slow
 
 # Half an hour and more: the demo's scene from ten seeds, and all jobs in examples/.
 test-slow: all
@@ -55,7 +55,7 @@ fuzz:
 sanitize: setup
 	@cmake -S . -B build-asan -DREYNOLDS_SANITIZE=ON > /dev/null
 	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
-	@cd build-asan && ctest --output-on-failure -LE 'slow|heavy'
+	@cd build-asan && ctest -j$(JOBS) --output-on-failure -LE 'slow|heavy'
 
 tsan: setup
 	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON > /dev/null
