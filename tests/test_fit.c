@@ -78,6 +78,20 @@ static void expect_error(Fixture *f, const char *text, const char *set, const ch
     }
 }
 
+// The kind alone will do where there is nothing else to say.
+static void test_job_kinds(void **state) {
+    Fixture *f = *state;
+    Job job;
+    assert_int_equal(read_job(f, HEAD "loss: l2\noptimizer: sgd\n", NULL, &job), REY_OK);
+    assert_int_equal(job.loss, LOSS_L2);
+    assert_int_equal(job.optimizer.kind, OPTIMIZER_SGD);
+    rey_job_free(&job);
+    assert_int_equal(read_job(f, HEAD, "optimizer=lbfgs", &job), REY_OK);
+    assert_int_equal(job.optimizer.kind, OPTIMIZER_LBFGS);
+    rey_job_free(&job);
+    expect_error(f, HEAD "optimizer: adan\n", NULL, "job.yaml:4: unknown value 'adan', did you mean 'adam'?");
+}
+
 static void test_job_errors(void **state) {
     Fixture *f = *state;
     expect_error(f, HEAD "optimizer:\n  lerning_rate: 3\n", NULL,
@@ -422,6 +436,7 @@ static void test_fit_errors(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_job_kinds),
         cmocka_unit_test(test_job_errors),
         cmocka_unit_test(test_job_round_trip),
         cmocka_unit_test(test_loss_derivatives),

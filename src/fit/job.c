@@ -168,7 +168,8 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
         {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
         {0},
     };
-    return rey_job_read_map(job, node, "optimizer", fields, target);
+    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, target)
+                                     : rey_job_read_map(job, node, "optimizer", fields, target);
 }
 
 static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
