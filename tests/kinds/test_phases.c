@@ -341,7 +341,9 @@ static PhaseCase case_of(const char *name, const double *values, int n) {
     c.nodes[0] = (PhaseNode){.kind = rey_phase_kind_find(name), .slot = {0}, .child = {-1, -1}, .table = -1};
     assert_true(c.nodes[0].kind >= 0);
     c.textures[0] = (TextureNode){.kind = TEXTURE_CONSTANT, .width = n, .height = 1, .channels = 1, .to_uv = -1};
-    memcpy(c.theta, values, (size_t)n * sizeof *values);
+    for (int i = 0; i < n; i++) {
+        c.theta[i] = values[i];
+    }
     update_tables(&c);
     return c;
 }
