@@ -118,10 +118,18 @@ static void test_step(void **state) {
     room_close(room);
 }
 
-int main(void) {
+// Arguments: the rooms to test, all without any.
+int main(int argc, char **argv) {
     struct CMUnitTest tests[COUNT_OF(steps)];
+    size_t count = 0;
     for (int i = 0; i < COUNT_OF(steps); i++) {
-        tests[i] = (struct CMUnitTest){steps[i].param, test_step, NULL, NULL, (void *)(uintptr_t)(steps + i)};
+        bool asked = argc < 2;
+        for (int k = 1; k < argc; k++) {
+            asked = asked || strcmp(steps[i].room, argv[k]) == 0;
+        }
+        if (asked) {
+            tests[count++] = (struct CMUnitTest){steps[i].param, test_step, NULL, NULL, (void *)(uintptr_t)(steps + i)};
+        }
     }
-    return _cmocka_run_group_tests("chains", tests, COUNT_OF(steps), write_pictures, remove_pictures);
+    return _cmocka_run_group_tests("chains", tests, count, write_pictures, remove_pictures);
 }
