@@ -119,7 +119,7 @@ def write_cloud(path, n=64):
         f.write(struct.pack("<%df" % len(values), *values))
 
 
-CLOUD = """<shape type="cube"><bsdf type="null"/><medium name="interior" type="heterogeneous" id="cloud">
+CLOUD = """<shape type="cube" id="air"><bsdf type="null"/><medium name="interior" type="heterogeneous" id="cloud">
 <volume name="sigma_t" type="gridvolume"><string name="filename" value="cloud.vol"/>
 <transform name="to_world"><scale value="2"/><translate value="-1"/></transform></volume>
 <rgb name="albedo" value="0.97 0.98 0.99"/><float name="scale" value="20"/><phase type="hg"><float name="g" value="0.5"/></phase></medium></shape>
@@ -127,7 +127,7 @@ CLOUD = """<shape type="cube"><bsdf type="null"/><medium name="interior" type="h
 <emitter type="directional"><vector name="direction" value="0.3 -1 0.5"/><rgb name="irradiance" value="3 2.8 2.5"/></emitter>
 """
 # Between the walls, under the lamp.
-FOG = """<shape type="cube"><transform name="to_world"><scale x="270" y="270" z="274"/><translate x="277" y="273" z="279"/></transform>
+FOG = """<shape type="cube" id="air"><transform name="to_world"><scale x="270" y="270" z="274"/><translate x="277" y="273" z="279"/></transform>
 <bsdf type="null"/><medium name="interior" type="homogeneous" id="fog"><rgb name="sigma_t" value="0.003"/><rgb name="albedo" value="0.9"/></medium></shape>
 """
 
@@ -170,8 +170,8 @@ def make(folder):
                     '<string name="filename" value="blob1m.ply"/><ref id="metal"/></shape>' + SKY, ["metal.alpha.value"]),
         "spheres": (board, spheres(), ["ball%d.roughness.value" % i for i in range(16)]),
         "forest": (dict(board, origin="0, -60, 12", target="0, 0, 0"), forest(), ["leaf.reflectance.value"]),
-        "cloud": (dict(air, origin="0, 1, -4.5", target="0, 0, 0", near=0.01), CLOUD, ["cloud.sigma_t.data"]),
-        "fog": (dict(air, depth=16), cornell + FOG, ["fog.sigma_t.value.value"]),
+        "cloud": (dict(air, origin="0, 1, -4.5", target="0, 0, 0", near=0.01), CLOUD, ["air.interior_medium.sigma_t.data"]),
+        "fog": (dict(air, depth=16), cornell + FOG, ["air.interior_medium.sigma_t.value.value"]),
     }
     made = {}
     for name, (head, body, parameters) in scenes.items():
