@@ -204,8 +204,7 @@ KFN EnvmapCell envmap_cell(const SceneView *scene, const EmitterRecord *e, const
     const real floor = (real)scene->tables[e->table + ENVMAP_FLOOR];
     EnvmapCell cell;
     for (int k = 0; k < 4; k++) {
-        Spec s = bitmap_texel(scene, t, f->at[k]);
-        cell.corner[k] = f_max(0.212671f * s.c[0] + 0.715160f * s.c[1] + 0.072169f * s.c[2], f_set(0)) + floor;
+        cell.corner[k] = f_max(luminance(bitmap_texel(scene, t, f->at[k])), f_set(0)) + floor;
     }
     cell.mean = 0.25f * (cell.corner[0] + cell.corner[1] + cell.corner[2] + cell.corner[3]);
     return cell;
