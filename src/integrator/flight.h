@@ -193,15 +193,7 @@ static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c,
     w.pdf = phase_pdf(&c->call, c->wi, w.d);
     w.rcp = f_safe_rcp(w.pdf);
     w.f = spec_scale(c->albedo, phase_eval(&c->call, c->wi, w.d));
-    Spec weight = spec_scale(w.f, w.rcp);
-    w.beta = spec_mul(v->beta, weight);
-    w.m = w.m & m_gt(w.pdf, f_set(0)) & m_finite(spec_sum(w.beta));
-    w.roulette = spec_max(w.beta);
-    if (t->derivative) {
-        w.roulette = real_gather(p->roulette, v->at) * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
-    } else {
-        w.m = w.m & m_gt(w.roulette, f_set(0));
-    }
+    onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
     append_paths(t, v, v->hit.p, v->hit.p, &w, v->medium, next_count);
     if (record >= 0) {

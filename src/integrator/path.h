@@ -106,22 +106,13 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         w.rcp = w.rcp * split.scatter_weight;
         w.m = w.m & split.scatter;
     }
-    Spec weight = spec_scale(w.f, w.rcp);
-    w.beta = spec_mul(v->beta, weight);
     w.eta2 = real_gather(p->eta2, v->at) * w.sample.eta * w.sample.eta;
-    w.m = w.m & m_gt(w.pdf, f_set(0)) & m_finite(spec_sum(w.beta));
     w.passed = m_set(scene->through) & mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
     w.depth = v->depth + i_select(w.passed, i_set(0), i_set(1));
     if (scene->through && scene->max_depth >= 0) {
         w.m = w.m & mi_lt(w.depth, i_set(scene->max_depth));
     }
-    w.roulette = spec_max(w.beta);
-    if (t->derivative) {
-        // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
-        w.roulette = real_gather(p->roulette, v->at) * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
-    } else {
-        w.m = w.m & m_gt(w.roulette, f_set(0));
-    }
+    onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
     w.d = frame_to_world(&si->sh, w.sample.wo);
     append_paths(t, v, si->p, interaction_offset(si, w.d), &w, medium_behind(group, si->ng, w.d, v->medium), next_count);

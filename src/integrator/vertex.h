@@ -148,6 +148,21 @@ typedef struct Onward {
     Mask m, passed;                          // lanes that go on; that went through a surface undeviated
 } Onward;
 
+// Throughput and roulette of sampled directions, by value, density and 1 / density.
+KFN void onward_weigh(const Tracer *t, const Vertex *v, Onward *w) {
+    Spec weight = spec_scale(w->f, w->rcp);
+    w->beta = spec_mul(v->beta, weight);
+    w->m = w->m & m_gt(w->pdf, f_set(0)) & m_finite(spec_sum(w->beta));
+    w->roulette = spec_max(w->beta);
+    if (t->derivative) {
+        // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
+        Float before = real_gather(t->ws.paths[t->current].roulette, v->at);
+        w->roulette = before * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
+    } else {
+        w->m = w->m & m_gt(w->roulette, f_set(0));
+    }
+}
+
 // Roulette from rr_depth on.
 KFN void play_roulette(const Tracer *t, const SampleKey *key, int32_t bounce, Onward *w) {
     const SceneView *scene = t->scene;
