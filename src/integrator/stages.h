@@ -194,9 +194,24 @@ static void counting_sort(const int32_t *key, int32_t base, int32_t count, int32
     begin[0] = 0;
 }
 
-static void trace_stage(Tracer *t, int32_t bounce) {
+// What the rays of the paths k... meet.
+KFN void hit_store(Tracer *t, int32_t k, const Hit *hit) {
     Workspace *ws = &t->ws;
-    const Paths *p = &ws->paths[t->current];
+    Mask found = mi_lt(i_set(-1), hit->shape);
+    Int group = SHAPE_FIELD(t->scene, i_max(hit->shape, i_set(0)), group);
+    i_store(ws->hit_shape + k, hit->shape);
+    i_store(ws->hit_prim + k, hit->prim);
+    i_store(ws->hit_instance + k, hit->instance);
+    i_store(ws->hit_group + k, i_select(found, group + 1, i_set(0)));
+    f_store(ws->hit_u + k, hit->u);
+    f_store(ws->hit_v + k, hit->v);
+    f_store(ws->hit_x + k, hit->p.x);
+    f_store(ws->hit_y + k, hit->p.y);
+    f_store(ws->hit_z + k, hit->p.z);
+}
+
+static void trace_stage(Tracer *t, int32_t bounce) {
+    const Paths *p = &t->ws.paths[t->current];
     double start = stage_seconds();
     for (int32_t k = 0; k < t->active; k += LANES) {
         Mask m = m_first_n(t->active - k);
@@ -206,17 +221,7 @@ static void trace_stage(Tracer *t, int32_t bounce) {
             Mask seen = t->scene->through ? m & mi_eq(i_load(p->depth + k), i_set(0)) : m;
             hit = trace_past_emitters(t, ray, seen, hit);
         }
-        Mask found = mi_lt(i_set(-1), hit.shape);
-        Int group = SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), group);
-        i_store(ws->hit_shape + k, hit.shape);
-        i_store(ws->hit_prim + k, hit.prim);
-        i_store(ws->hit_instance + k, hit.instance);
-        i_store(ws->hit_group + k, i_select(found, group + 1, i_set(0)));
-        f_store(ws->hit_u + k, hit.u);
-        f_store(ws->hit_v + k, hit.v);
-        f_store(ws->hit_x + k, hit.p.x);
-        f_store(ws->hit_y + k, hit.p.y);
-        f_store(ws->hit_z + k, hit.p.z);
+        hit_store(t, k, &hit);
     }
     t->job->rays += t->active;
     t->job->trace_seconds += stage_seconds() - start;

@@ -189,7 +189,7 @@ static void near_particles(Indirect *in, int32_t *begin) {
         if (in->b->kind == BOUNDARY_HORIZON) { // they are there
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
-            hit_place(t, k, &hit);
+            hit_store(t, k, &hit);
         }
     }
     t->active = q->count;

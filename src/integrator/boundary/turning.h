@@ -129,20 +129,6 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
     }
 }
 
-// Puts path k, which path_begin has started, where the ray would have met the surface.
-KFN void hit_place(Tracer *t, int32_t k, const Hit *hit) {
-    Workspace *ws = &t->ws;
-    i_store(ws->hit_shape + k, hit->shape);
-    i_store(ws->hit_prim + k, hit->prim);
-    i_store(ws->hit_instance + k, hit->instance);
-    i_store(ws->hit_group + k, SHAPE_FIELD(t->scene, hit->shape, group) + 1);
-    f_store(ws->hit_u + k, hit->u);
-    f_store(ws->hit_v + k, hit->v);
-    f_store(ws->hit_x + k, hit->p.x);
-    f_store(ws->hit_y + k, hit->p.y);
-    f_store(ws->hit_z + k, hit->p.z);
-}
-
 // Terminators: starts the paths that look at x from both sides of its shading normal's plane, in slots k and half + k.
 static void turning_start(Tracer *t, const Segments *q, int32_t half) {
     for (int32_t k = 0; k < half; k++) {
@@ -159,7 +145,7 @@ static void turning_start(Tracer *t, const Segments *q, int32_t half) {
             Vec3 to = v3_normalize(v3_madd(d, f_set(side ? TURNING_STEP : -TURNING_STEP), n)); // first from where n points to
             Ray ray = {v3_sub(hit.p, to), to, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
-            hit_place(t, side * half + k, &hit);
+            hit_store(t, side * half + k, &hit);
         }
     }
     t->active = 2 * half;
