@@ -107,7 +107,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     sink->at = NULL;
     if (sink->any_motion) {
         d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
-        vertex_move_adj(t, s, &d, &s->call, weight, live, channel, sink);
+        vertex_move_adj(t, s, &d, weight, live, channel, sink);
     } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         vertex_frame_adj(s, call.surface != NULL, &d);
         mesh_interaction_adj(t->scene, s->group->shape_flags, &s->hit, &s->si, &d.frame, sink, s->m);
@@ -194,6 +194,9 @@ static void path_backward(Tracer *t) {
     const Records *r = &t->ws.records;
     Sink sink = sink_of(job);
     bool live_passing = passing_is_live(t);
+    if (job->any_motion) {
+        vertices_forget(t);
+    }
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
         if (batch->tag == VERTEX_ESCAPED) {

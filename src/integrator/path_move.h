@@ -209,8 +209,8 @@ static NOINLINE void vertex_place_adj(const Tracer *t, const SurfaceSweep *s, Ve
 
 // What is mirrored or refracted at a batch of vertices, for one delta: L += f w_s L_next along a direction that follows from
 // how the path came.
-static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, Spec weight, int32_t live,
-                                    int channel, Carried *carried, Sink *sink) {
+static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, Spec weight, int32_t live, int channel,
+                                    Carried *carried, Sink *sink) {
     const Workspace *ws = &t->ws;
     SurfaceSweep chain = *s;
     chain.m = s->scattered & s->chained;
@@ -222,7 +222,7 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, cons
     Vec3 dd = v3_select(meets, v3_madd(turn, v3_length(v3_sub(q, s->si.p)), drag), turn);
     VertexAdj d;
     vertex_adj_clear(&d, true);
-    BsdfCall own = *call;
+    BsdfCall own = s->call;
     own.dsurface = own.surface ? &d.surface : NULL;
     // d' = to_world(wo(wi))
     Vec3 sampled = v3_select(turns, dd, v3_zero()), dwo = frame_to_local(&s->si.sh, sampled);
@@ -238,14 +238,14 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, cons
 }
 
 // Adjoint of where a batch of vertices lies, for one delta.
-static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, const BsdfCall *call, Spec weight,
-                                     int32_t live, int channel, Sink *sink) {
+static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, Spec weight, int32_t live,
+                                     int channel, Sink *sink) {
     Carried carried = {v3_zero(), v3_zero()};
     Vec3 dp = v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink));
     vertex_place_adj(t, s, v, dp, s->slides, live, &carried, sink);
     Vec3 back = frame_to_world(&s->si.sh, v->wi);
     if (m_any(s->scattered & s->chained)) {
-        chain_move_adj(t, s, call, weight, live, channel, &carried, sink);
+        chain_move_adj(t, s, weight, live, channel, &carried, sink);
     }
     if (s->first) {
         if (sink->any_camera) {
@@ -256,6 +256,24 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     rows_scatter(&t->ws.back, channel, s->slot, back, s->m);
     rows_scatter(&t->ws.drag, channel, s->slot, carried.drag, s->m);
     rows_scatter(&t->ws.turn, channel, s->slot, carried.turn, s->m);
+}
+
+// Forgets the vertices of the chunk before.
+KFN void vertices_forget(Tracer *t) {
+    Workspace *ws = &t->ws;
+    const size_t bytes = CHUNK * sizeof(real);
+    memset(ws->next, 0xff, CHUNK * sizeof *ws->next);
+    for (int c = 0; c < SPEC_N; c++) {
+        memset(ws->attached[c], 0, bytes);
+    }
+    const ChannelRows *rows[] = {&ws->drag, &ws->turn};
+    for (int i = 0; i < 2; i++) {
+        for (int c = 0; c < drives(t); c++) {
+            memset(rows[i]->x[c], 0, bytes);
+            memset(rows[i]->y[c], 0, bytes);
+            memset(rows[i]->z[c], 0, bytes);
+        }
+    }
 }
 
 // Leaves the vertices for those before them.

@@ -94,14 +94,6 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     i_store(p->depth + i, i_set(0));
     spec_store(t->ws.radiance, i, spec_zero());
     spec_store(t->ws.suffix, i, spec_zero());
-    if (t->job->any_motion) {
-        i_store(t->ws.next + i, i_set(-1));
-        spec_store(t->ws.attached, i, spec_zero());
-        for (int c = 0; c < SPEC_N; c++) {
-            rows_scatter(&t->ws.drag, c, i_iota() + i, v3_zero(), m_set(true));
-            rows_scatter(&t->ws.turn, c, i_iota() + i, v3_zero(), m_set(true));
-        }
-    }
 }
 
 // Starts `count` paths: samples `first`... of the tile, pixel by pixel, so that packets are coherent.
