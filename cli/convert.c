@@ -2,6 +2,7 @@
 #include "cli.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 
 // Whether both names mean one file.
@@ -28,7 +29,7 @@ int cli_convert(int argc, char **argv) {
         return status;
     }
     options.output = options.files[1];
-    if (options.output[0] == '-' && !options.output[1]) {
+    if (!strcmp(options.output, "-")) {
         fprintf(stderr, "reynolds convert: a scene is written with its meshes and pictures, which standard output cannot hold; name a file\n");
         cli_options_free(&options);
         return 2;

@@ -3,6 +3,7 @@
 #include "fit/tensorboard.h"
 #include "io/file.h"
 #include "io/image.h"
+#include "folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -53,9 +54,7 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    int status = system(command);
+    int status = folder_remove(f->folder);
     rey_context_destroy(f->ctx);
     free(f);
     return status;

@@ -2,6 +2,7 @@
 #include "fit/fit.h"
 #include "io/file.h"
 #include "io/image.h"
+#include "folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -123,9 +124,7 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    int status = system(command);
+    int status = folder_remove(f->folder);
     rey_context_destroy(f->ctx);
     free(f);
     return status;
@@ -161,9 +160,9 @@ static void expect_same_when_resumed(Fixture *f, const char *text, int stop, con
         assert_memory_equal(a->found, b->found, (size_t)a->count * sizeof(float));
     }
     rey_fit_result_free(&part);
-    char command[160];
-    snprintf(command, sizeof command, "rm -r %s/part", f->folder);
-    assert_int_equal(system(command), 0);
+    char folder[128];
+    snprintf(folder, sizeof folder, "%s/part", f->folder);
+    assert_int_equal(folder_remove(folder), 0);
 }
 
 #define VIEWS "scene: scene.xml\nviews: [{target: target_0.exr}, {target: target_1.exr}]\nloss: l2\nreport_spp: 0\n"

@@ -1,6 +1,7 @@
 // test_io_file.c: files written whole: through links, into pipes and devices, past limits, under long names.
 #include "io/file.h"
 #include "io/file_stale.h"
+#include "folder.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -31,10 +32,8 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Fixture *f = *state;
-    char command[128];
     rey_context_destroy(f->ctx);
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    return chdir("/") || system(command);
+    return chdir("/") || folder_remove(f->folder);
 }
 
 static void expect_content(Fixture *f, const char *path, const char *text) {

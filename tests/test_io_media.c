@@ -3,6 +3,7 @@
 #include "io/image.h"
 #include "io/vol.h"
 #include "render/update.h"
+#include "folder.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -51,9 +52,7 @@ static int make_folder(void **state) {
 
 static int remove_folder(void **state) {
     rey_context_destroy(*state);
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    return system(command);
+    return folder_remove(folder);
 }
 
 #define SENSOR                                                                                                         \

@@ -2,6 +2,7 @@
 // where memory ends nothing is left behind.
 #include "base/platform.h"
 #include "reynolds/reynolds.h"
+#include "folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -66,10 +67,8 @@ static int make_folder(void **state) {
 }
 
 static int remove_folder(void **state) {
-    char command[PATH_BYTES];
     UNUSED(state);
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
+    return folder_remove(folder);
 }
 
 static rey_result load(rey_context *ctx, bool lenient, rey_scene **scene) {

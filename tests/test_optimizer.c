@@ -11,23 +11,29 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { UNKNOWNS = 2 };
+
+// Storage for unknowns of at most two numbers.
+typedef struct Numbers {
+    float start[UNKNOWNS], value[UNKNOWNS];
+    double variable[UNKNOWNS], first[UNKNOWNS], second[UNKNOWNS], average[UNKNOWNS], gradient[UNKNOWNS];
+} Numbers;
+
+// The unknowns of `count` items of one number each, kept in n.
+static Unknowns unknowns_of(Unknown *items, int count, Numbers *n) {
+    return (Unknowns){.items = {items, count, count}, .count = count, .start = n->start, .value = n->value,
+                      .variable = n->variable, .first = n->first, .second = n->second, .average = n->average,
+                      .gradient = n->gradient};
+}
+
 // Minimises (log x - log 0.3)^2-like bowls in every parameterisation; the gradient is that of (x - 0.3)^2.
 static void test_optimizers_find_minimum(void **state) {
     UNUSED(state);
     for (int kind = 0; kind < OPTIMIZER_COUNT; kind++) {
         for (int p = 0; p < PARAMETERISATION_RIGID && kind != OPTIMIZER_LBFGS; p++) {
             Unknown item = {.count = 1, .low = 0.01, .high = 1, .parameterisation = (Parameterisation)p};
-            float start = 0.8f, value = 0;
-            double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
-            Unknowns u = {.items = {&item, 1, 1},
-                          .count = 1,
-                          .start = &start,
-                          .value = &value,
-                          .variable = &variable,
-                          .first = &first,
-                          .second = &second,
-                          .average = &average,
-                          .gradient = &gradient};
+            Numbers n = {.start = {0.8f}};
+            Unknowns u = unknowns_of(&item, 1, &n);
             JobOptimizer o = {.kind = (OptimizerKind)kind,
                               .learning_rate = kind == OPTIMIZER_ADAM ? 0.05 : 0.1,
                               .beta1 = 0.9,
@@ -36,16 +42,16 @@ static void test_optimizers_find_minimum(void **state) {
                               .momentum = 0.8,
                               .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 600}};
             rey_unknowns_begin(&u);
-            assert_float_equal((double)value, 0.8, 1e-6);
+            assert_float_equal((double)n.value[0], 0.8, 1e-6);
             for (int i = 0; i < 600; i++) {
-                gradient = 2 * ((double)value - 0.3);
+                n.gradient[0] = 2 * ((double)n.value[0] - 0.3);
                 rey_optimizer_step(&o, &u, i, 0);
             }
-            assert_float_equal((double)value, 0.3, 2e-3);
-            gradient = 1e9; // far out of bounds
+            assert_float_equal((double)n.value[0], 0.3, 2e-3);
+            n.gradient[0] = 1e9; // far out of bounds
             rey_optimizer_step(&(JobOptimizer){.kind = OPTIMIZER_SGD, .learning_rate = 1, .schedule = {.length = 1}},
                                &u, 0, 0);
-            assert_true(value >= 0.01f && value <= 0.0101f);
+            assert_true(n.value[0] >= 0.01f && n.value[0] <= 0.0101f);
         }
     }
 }
@@ -54,26 +60,17 @@ static void test_optimizers_find_minimum(void **state) {
 static void test_average(void **state) {
     UNUSED(state);
     Unknown item = {.count = 1, .low = 0, .high = 1};
-    float start = 0.8f, value = 0;
-    double variable = 0, first = 0, second = 0, average = 0, gradient = 0;
-    Unknowns u = {.items = {&item, 1, 1},
-                  .count = 1,
-                  .start = &start,
-                  .value = &value,
-                  .variable = &variable,
-                  .first = &first,
-                  .second = &second,
-                  .average = &average,
-                  .gradient = &gradient};
+    Numbers n = {.start = {0.8f}};
+    Unknowns u = unknowns_of(&item, 1, &n);
     JobOptimizer o = {.kind = OPTIMIZER_SGD, .learning_rate = 1, .average = 4, .schedule = {.length = 1}};
     rey_unknowns_begin(&u);
     for (int i = 0; i < 100; i++) {
-        gradient = (double)value - (i % 2 ? 0.2 : 0.4);
+        n.gradient[0] = (double)n.value[0] - (i % 2 ? 0.2 : 0.4);
         rey_optimizer_step(&o, &u, i, 0);
     }
-    assert_float_equal((double)value, 0.2, 1e-5);
+    assert_float_equal((double)n.value[0], 0.2, 1e-5);
     rey_unknowns_take_average(&u);
-    assert_float_equal((double)value, 0.3, 0.004);
+    assert_float_equal((double)n.value[0], 0.3, 0.004);
 }
 
 
@@ -141,23 +138,22 @@ static void test_lbfgs_keeps_bounds(void **unused) {
     UNUSED(unused);
     Unknown items[2] = {{.count = 1, .low = 0.5, .high = 2, .learning_rate = 0.1},
                         {.offset = 1, .count = 1, .low = 0.01, .high = 10, .parameterisation = PARAMETERISATION_LOG}};
-    float start[2] = {1.5f, 8}, value[2] = {0};
-    double variable[2] = {0}, first[2] = {0}, second[2] = {0}, average[2] = {0}, gradient[2] = {0};
+    Numbers n = {.start = {1.5f, 8}};
     double *state = calloc((size_t)rey_lbfgs_numbers(2, 4), sizeof *state);
     assert_non_null(state);
-    Unknowns u = {.items = {items, 2, 2}, .count = 2, .start = start, .value = value, .variable = variable,
-                  .first = first, .second = second, .average = average, .gradient = gradient, .lbfgs = state};
+    Unknowns u = unknowns_of(items, 2, &n);
+    u.lbfgs = state;
     JobOptimizer o = {.kind = OPTIMIZER_LBFGS, .learning_rate = 0.5, .memory = 4, .schedule = {.length = 1}};
     rey_unknowns_begin(&u);
     for (int i = 0; i < 60; i++) { // the least is at (0.3, 0.7), and 0.5 the lowest that is allowed
-        double a = (double)value[0] - 0.3, b = (double)value[1] - 0.7;
-        gradient[0] = 2 * a;
-        gradient[1] = 2 * b;
+        double a = (double)n.value[0] - 0.3, b = (double)n.value[1] - 0.7;
+        n.gradient[0] = 2 * a;
+        n.gradient[1] = 2 * b;
         rey_optimizer_step(&o, &u, i, a * a + b * b);
     }
     rey_optimizer_restart(&o, &u);
-    assert_float_equal((double)value[0], 0.5, 1e-6);
-    assert_float_equal((double)value[1], 0.7, 1e-4);
+    assert_float_equal((double)n.value[0], 0.5, 1e-6);
+    assert_float_equal((double)n.value[1], 0.7, 1e-4);
     free(state);
 }
 

@@ -2,6 +2,7 @@
 // Many rounds of load, render, free hold no memory. Values that make no sense are refused.
 #include "base/platform.h"
 #include "reynolds/reynolds.h"
+#include "folder.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -141,9 +142,7 @@ static int write_scene(void **state) {
 
 static int remove_scene(void **state) {
     UNUSED(state);
-    char command[128];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
+    return folder_remove(folder);
 }
 
 static rey_context *context_with(Meter *m) {

@@ -9,19 +9,19 @@
 #include <sys/mman.h>
 
 // Large blocks come from the system, which hands out zeroed pages as they are touched: the scratch memory of a render is
-// sized for its longest paths and mostly stays untouched. Every block begins with a header.
-enum { LARGE_BLOCK = 1 << 20, HEADER_BYTES = 64 };
+// sized for its longest paths and mostly stays untouched. Sanitizers watch the heap alone, so they get no large blocks.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+static const size_t LARGE_BLOCK = SIZE_MAX;
+#else
+static const size_t LARGE_BLOCK = 1 << 20;
+#endif
+
+// Every block begins with a header.
+enum { HEADER_BYTES = 64 };
 
 typedef struct BlockHeader {
     size_t mapped; // bytes from the system; 0 = from the heap
 } BlockHeader;
-
-// Sanitizers watch the heap alone.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static bool is_large(size_t bytes) { return bytes == SIZE_MAX; }
-#else
-static bool is_large(size_t bytes) { return bytes >= LARGE_BLOCK; }
-#endif
 
 static void *default_alloc(void *user, size_t bytes, size_t alignment) {
     UNUSED(user);
@@ -30,7 +30,7 @@ static void *default_alloc(void *user, size_t bytes, size_t alignment) {
     }
     size_t size = (bytes + 2 * HEADER_BYTES - 1) / HEADER_BYTES * HEADER_BYTES;
     char *block;
-    if (is_large(bytes)) {
+    if (bytes >= LARGE_BLOCK) {
         block = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         block = block == MAP_FAILED ? NULL : block;
     } else {
@@ -39,7 +39,7 @@ static void *default_alloc(void *user, size_t bytes, size_t alignment) {
     if (!block) {
         return NULL;
     }
-    ((BlockHeader *)(void *)block)->mapped = is_large(bytes) ? size : 0;
+    ((BlockHeader *)(void *)block)->mapped = bytes >= LARGE_BLOCK ? size : 0;
     return block + HEADER_BYTES;
 }
 
@@ -164,7 +164,7 @@ void *rey_alloc(rey_context *ctx, size_t bytes) {
         rey_fail_memory(ctx, size);
         return NULL;
     }
-    if (ctx->def.alloc != default_alloc || !is_large(size)) {
+    if (ctx->def.alloc != default_alloc || size < LARGE_BLOCK) {
         memset(memory, 0, size);
     }
     return memory;

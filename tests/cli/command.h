@@ -2,6 +2,7 @@
 #pragma once
 
 #include "json_read.h"
+#include "../folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -31,9 +32,7 @@ static inline int make_folder(void **state) {
 
 static inline int remove_folder(void **state) {
     Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    return chdir("/") || system(command);
+    return chdir("/") || folder_remove(f->folder);
 }
 
 static inline void read_text(const char *path, char *text) {

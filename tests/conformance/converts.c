@@ -1,5 +1,6 @@
 // converts.c: every scene that loads is written, loaded again, and must have the same parameters and picture, bit for
 // bit. --quick leaves the pictures out.
+#include "../folder.h"
 #include "conformance.h"
 
 #include "base/context.h"
@@ -100,15 +101,13 @@ static void convert_folder(Converts *c, const char *folder) {
 void run_converts(Suite *suite) {
     Converts c = {.suite = suite, .root = strlen(suite->folder)};
     const char *folder = getenv("TMPDIR");
-    char command[300];
     snprintf(c.folder, sizeof c.folder, "%s/reynolds-converts-XXXXXX", folder && folder[0] ? folder : "/tmp");
     if (!mkdtemp(c.folder)) {
         suite_report(suite, "convert", VERDICT_FAIL, true, "no temporary folder could be made");
         return;
     }
     convert_folder(&c, suite->folder);
-    snprintf(command, sizeof command, "rm -r '%s'", c.folder);
-    if (system(command)) {
+    if (folder_remove(c.folder)) {
         suite_report(suite, "convert", VERDICT_FAIL, true, "%s could not be removed", c.folder);
     }
 }

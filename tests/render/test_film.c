@@ -1,6 +1,7 @@
 // test_film.c: what films deliver: pixel formats, alpha, filters of any width, and the files that they are written to.
 #include "io/image.h"
 #include "reynolds/reynolds.h"
+#include "../folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -32,9 +33,7 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    int status = system(command);
+    int status = folder_remove(f->folder);
     rey_context_destroy(f->ctx);
     free(f);
     return status;

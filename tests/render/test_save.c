@@ -1,5 +1,6 @@
 // test_save.c: a scene that is saved and loaded again renders the same picture, bit for bit.
 #include "io/image.h"
+#include "../folder.h"
 
 #include <dirent.h>
 #include <setjmp.h>
@@ -43,9 +44,7 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Fixture *f = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", f->folder);
-    int status = system(command);
+    int status = folder_remove(f->folder);
     rey_context_destroy(f->ctx);
     free(f);
     return status;

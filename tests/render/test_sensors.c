@@ -1,4 +1,5 @@
 // Every kind of sensor against what it must see, against the pinhole camera, and through a save.
+#include "../folder.h"
 #include "base/context.h"
 #include "reynolds/reynolds.h"
 
@@ -133,7 +134,7 @@ static void test_batch(void **state) {
 static void test_saved(void **state) {
     Fixture *f = *state;
     static float before[MOST], after[MOST];
-    char folder[] = "/tmp/reynolds_sensors_XXXXXX", path[64], command[64];
+    char folder[] = "/tmp/reynolds_sensors_XXXXXX", path[64];
     rey_scene *again;
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/saved.xml", folder);
@@ -150,8 +151,7 @@ static void test_saved(void **state) {
         assert_memory_equal(before, after, (size_t)(width * height * 3) * sizeof(float));
     }
     rey_scene_destroy(again);
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    assert_int_equal(system(command), 0);
+    assert_int_equal(folder_remove(folder), 0);
 }
 
 static void test_refused(void **state) {

@@ -2,6 +2,7 @@
 // where the terms that know them are left out; pictures along recorded paths.
 #include "render/replay.h"
 #include "reynolds/reynolds.h"
+#include "../folder.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -71,9 +72,7 @@ static int set_up(void **state) {
 
 static int tear_down(void **state) {
     Stage *s = *state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r %s", s->folder);
-    int status = system(command);
+    int status = folder_remove(s->folder);
     rey_context_destroy(s->ctx);
     free(s);
     return status;
