@@ -18,6 +18,7 @@
 
 #include "bsdf/bsdf.h"
 #include "emitter/emitter.h"
+#include "gather.h"
 #include "kinds.h"
 
 typedef struct View {
@@ -93,35 +94,12 @@ static Sink sink_make(View *v, const KindCase *c, double *gradient, const double
                   .to_uv_at = v->to_uv_at, .place_at = v->place_at, .derivative = f_set(0)};
 }
 
-// Entry k of lane l is item (first + l), the last one repeated past the end.
-#define AT(lane) (first + (lane) < n ? first + (lane) : n - 1)
-#define GATHER(target, expression)                                                                                     \
-    do {                                                                                                               \
-        real gathered_[LANES];                                                                                         \
-        for (int lane = 0; lane < LANES; lane++) {                                                                     \
-            gathered_[lane] = (real)(expression);                                                                      \
-        }                                                                                                              \
-        (target) = f_load(gathered_);                                                                                  \
-    } while (0)
-#define GATHER3(target, field)                                                                                         \
-    do {                                                                                                               \
-        GATHER((target).x, (field)[0]);                                                                                \
-        GATHER((target).y, (field)[1]);                                                                                \
-        GATHER((target).z, (field)[2]);                                                                                \
-    } while (0)
-
 static Int gather_lobe(const Query *q, int first, int n) {
     int32_t lobes[LANES];
     for (int lane = 0; lane < LANES; lane++) {
         lobes[lane] = q[AT(lane)].lobe;
     }
     return i_load(lobes);
-}
-
-static void put3(double *to, Vec3 v, int lane) {
-    to[0] = (double)f_lane(v.x, lane);
-    to[1] = (double)f_lane(v.y, lane);
-    to[2] = (double)f_lane(v.z, lane);
 }
 
 static void put_spec(double *to, Spec s, int lane) {

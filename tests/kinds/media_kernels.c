@@ -13,6 +13,7 @@
 #define KERNELS KNAME(media_kernels)
 #endif
 
+#include "gather.h"
 #include "media_kernels.h"
 #include "medium/track.h"
 
@@ -32,23 +33,6 @@ static void view_make(const MediaCase *c, View *v) {
     v->scene.theta = v->theta;
     v->scene.tables = v->tables;
 }
-
-// Entry k of lane l is item (first + l), the last one repeated past the end.
-#define AT(lane) (first + (lane) < n ? first + (lane) : n - 1)
-#define GATHER(target, expression)                                                                                     \
-    do {                                                                                                               \
-        real gathered_[LANES];                                                                                         \
-        for (int lane = 0; lane < LANES; lane++) {                                                                     \
-            gathered_[lane] = (real)(expression);                                                                      \
-        }                                                                                                              \
-        (target) = f_load(gathered_);                                                                                  \
-    } while (0)
-#define GATHER3(target, field)                                                                                         \
-    do {                                                                                                               \
-        GATHER((target).x, (field)[0]);                                                                                \
-        GATHER((target).y, (field)[1]);                                                                                \
-        GATHER((target).z, (field)[2]);                                                                                \
-    } while (0)
 
 static void run_eval(const MediaCase *c, int n, MediaLookup *q) {
     View view;
@@ -83,9 +67,7 @@ static void run_adj(const MediaCase *c, int n, MediaLookup *q, double *gradient,
         volume_adj(&view.scene, &c->sigma_t, p, df, c->sigma_t.theta, &dp, &sink, m_first_n(n - first));
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             MediaLookup *to = q + first + lane;
-            to->dp[0] = (double)f_lane(dp.x, lane);
-            to->dp[1] = (double)f_lane(dp.y, lane);
-            to->dp[2] = (double)f_lane(dp.z, lane);
+            put3(to->dp, dp, lane);
             to->forward = (double)f_lane(sink.derivative, lane);
         }
     }

@@ -16,6 +16,7 @@
 #define KERNELS_NAME "float"
 #endif
 
+#include "gather.h"
 #include "medium/phase.h"
 #include "phase_kernels.h"
 
@@ -42,30 +43,8 @@ static void view_make(const PhaseCase *c, View *v) {
     v->scene.phases = (PhaseNode *)(uintptr_t)c->nodes;
 }
 
-// Entry k of lane l is item (first + l), the last one repeated past the end.
-#define AT(lane) (first + (lane) < n ? first + (lane) : n - 1)
-#define GATHER(target, expression)                                                                                     \
-    do {                                                                                                               \
-        real gathered_[LANES];                                                                                         \
-        for (int lane = 0; lane < LANES; lane++) {                                                                     \
-            gathered_[lane] = (real)(expression);                                                                      \
-        }                                                                                                              \
-        (target) = f_load(gathered_);                                                                                  \
-    } while (0)
-#define GATHER3(target, field)                                                                                         \
-    do {                                                                                                               \
-        GATHER((target).x, (field)[0]);                                                                                \
-        GATHER((target).y, (field)[1]);                                                                                \
-        GATHER((target).z, (field)[2]);                                                                                \
-    } while (0)
 #define CALL(uv) {&view.scene, c->root, texcoord(uv, &hit), (real)c->floor}
 #define HIT(uv) {.p = {(uv).x, (uv).y, f_set(0.3f)}}
-
-static void put3(double *to, Vec3 v, int lane) {
-    to[0] = (double)f_lane(v.x, lane);
-    to[1] = (double)f_lane(v.y, lane);
-    to[2] = (double)f_lane(v.z, lane);
-}
 
 static void run_eval(const PhaseCase *c, int n, PhaseQuery *q) {
     View view;
