@@ -306,6 +306,11 @@ static bool can_replay(const Work *w, const Direction *d) {
     return can;
 }
 
+static bool is_partial(const Work *w, const Check *check) {
+    const Options *o = w->session.options;
+    return o->all && o->terms && (cli_direction_terms(w->session.scene, &check->direction) & ~o->terms);
+}
+
 static int build_directions(Work *w, Check *checks, int count) {
     for (int i = 0; i < count; i++) {
         rey_param_info info;
@@ -337,8 +342,14 @@ static rey_result check_all(Work *w, Check *checks, int count) {
     s->def.sets = 1;
     s->progress.parts = (double)count * CHECK_SETS * (1 + CHECK_POINTS);
     rey_result result = work_prepare(w, largest);
+    int tests = 0;
     for (int i = 0; i < count && !result; i++) {
         result = check_or_refuse(w, &checks[i]);
+        tests += checks[i].result.tests;
+        if (!result && count > 1) {
+            cli_progress_end(&s->progress);
+            check_print_ready(&checks[i], i == 0, check_z_threshold(tests), is_partial(w, &checks[i]));
+        }
     }
     cli_progress_end(&s->progress);
     return result;
@@ -351,9 +362,7 @@ static void judge(const Work *w, Check *checks, int count, double *threshold) {
     }
     *threshold = check_z_threshold(tests);
     for (int i = 0; i < count; i++) {
-        bool partial = w->session.options->all && w->session.options->terms &&
-                       (cli_direction_terms(w->session.scene, &checks[i].direction) & ~w->session.options->terms);
-        check_judge(&checks[i], *threshold, partial);
+        check_judge(&checks[i], *threshold, is_partial(w, &checks[i]));
     }
 }
 

@@ -54,5 +54,7 @@ Step check_choose_step(const rey_scene *scene, const float *original, const Chec
 const char *check_verdict_name(Verdict verdict);
 // Sets the verdict, unless it is a refusal. threshold: of |z|; partial: terms are left out on request.
 void check_judge(Check *check, double threshold, bool partial);
+// A row on standard error as soon as it is known, judged by what is known so far.
+void check_print_ready(const Check *check, bool first, double threshold, bool partial);
 void check_print_table(const Check *checks, int count, double threshold);
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold);

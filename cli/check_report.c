@@ -11,24 +11,37 @@ static int count_verdicts(const Check *checks, int count, Verdict verdict) {
     return n;
 }
 
-static void print_row(const Check *check) {
+static void print_titles(FILE *file) {
+    fprintf(file, "%-36s %13s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "difference", "step",
+            "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
+}
+
+static void print_row(FILE *file, const Check *check) {
     const CheckResult *r = &check->result;
     if (check->verdict == VERDICT_REFUSED) {
-        printf("%-36s %s: %s\n", check->spec, check_verdict_name(check->verdict), check->refusal);
+        fprintf(file, "%-36s %s: %s\n", check->spec, check_verdict_name(check->verdict), check->refusal);
         return;
     }
     char block[32];
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    printf("%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative, r->difference,
-           check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->fresh_z, check->reverse_error,
-           check_verdict_name(check->verdict));
+    fprintf(file, "%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative,
+            r->difference, check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->fresh_z,
+            check->reverse_error, check_verdict_name(check->verdict));
+}
+
+void check_print_ready(const Check *check, bool first, double threshold, bool partial) {
+    Check so_far = *check; // the verdict follows from all directions, and may change
+    check_judge(&so_far, threshold, partial);
+    if (first) {
+        print_titles(stderr);
+    }
+    print_row(stderr, &so_far);
 }
 
 void check_print_table(const Check *checks, int count, double threshold) {
-    printf("%-36s %13s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "difference", "step", "error/rms",
-           "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
+    print_titles(stdout);
     for (int i = 0; i < count; i++) {
-        print_row(&checks[i]);
+        print_row(stdout, &checks[i]);
     }
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
     int undecided = 0;

@@ -3,6 +3,7 @@
 
 #include "base/parallel.h"
 #include "fit/fit.h"
+#include "fit/pose.h"
 
 #include <math.h>
 #include <signal.h>
@@ -58,25 +59,49 @@ static void entries_text(const FitRow *row, int column, char *text, size_t size)
     }
 }
 
-static void print_table(const FitResult *result) {
-    int width = 9;
-    for (size_t i = 0; i < result->rows.count; i++) {
-        int length = (int)strlen(ARRAY_AT(result->rows, FitRow, i).name);
-        width = length > width ? length : width;
+enum { CELLS = 5, CELL_BYTES = 512 }; // parameter, truth, start, found, error
+
+static void error_text(const FitRow *row, char *text, size_t size) {
+    if (row->points[COLUMN_TRUTH]) {
+        snprintf(text, size, "%.3f %% (Chamfer)", 100 * row->error);
+    } else if (row->truth && rey_fit_row_is_pose(row)) {
+        snprintf(text, size, "%.2f %% (%.3g away, turned by %.3g deg)", 100 * row->error,
+                 rey_pose_distance(row->found, row->truth), rey_pose_turned(row->found, row->truth));
+    } else if (row->truth) {
+        snprintf(text, size, "%.2f %%%s", 100 * row->error, row->weighted ? " (weighted)" : "");
+    } else {
+        snprintf(text, size, "-");
     }
-    printf("%-*s  %-22s %-22s %-22s %s\n", width, "parameter", "truth", "start", "found", "error");
-    for (size_t i = 0; i < result->rows.count; i++) {
-        const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
-        char truth[128], start[128], found[128], error[32] = "-";
-        entries_text(row, COLUMN_TRUTH, truth, sizeof truth);
-        entries_text(row, COLUMN_START, start, sizeof start);
-        entries_text(row, COLUMN_FOUND, found, sizeof found);
-        if (row->points[COLUMN_TRUTH]) {
-            snprintf(error, sizeof error, "%.3f %% (Chamfer)", 100 * row->error);
-        } else if (row->truth) {
-            snprintf(error, sizeof error, "%.2f %%%s", 100 * row->error, row->weighted ? " (weighted)" : "");
+}
+
+// The cells of one row, of the titles without one.
+static void row_cells(const FitRow *row, char cells[CELLS][CELL_BYTES]) {
+    static const char *const titles[CELLS] = {"parameter", "truth", "start", "found", "error"};
+    for (int c = 0; c < CELLS; c++) {
+        snprintf(cells[c], CELL_BYTES, "%s", row && c == 0 ? row->name : titles[c]);
+    }
+    if (row) {
+        entries_text(row, COLUMN_TRUTH, cells[1], CELL_BYTES);
+        entries_text(row, COLUMN_START, cells[2], CELL_BYTES);
+        entries_text(row, COLUMN_FOUND, cells[3], CELL_BYTES);
+        error_text(row, cells[4], CELL_BYTES);
+    }
+}
+
+static void print_table(const FitResult *result) {
+    char cells[CELLS][CELL_BYTES];
+    int widths[CELLS] = {0};
+    for (size_t i = 0; i < 2 * (result->rows.count + 1); i++) { // first how wide the columns are
+        size_t row = i % (result->rows.count + 1);
+        row_cells(row ? &ARRAY_AT(result->rows, FitRow, row - 1) : NULL, cells);
+        for (int c = 0; c < CELLS; c++) {
+            int length = (int)strlen(cells[c]);
+            if (i == row) {
+                widths[c] = length > widths[c] ? length : widths[c];
+            } else {
+                printf("%-*s%s", c + 1 < CELLS ? widths[c] : 0, cells[c], c + 1 < CELLS ? "  " : "\n");
+            }
         }
-        printf("%-*s  %-22s %-22s %-22s %s\n", width, row->name, truth, start, found, error);
     }
 }
 
@@ -116,6 +141,10 @@ static void print_json(const FitResult *result) {
         bool mesh = row->points[COLUMN_TRUTH] != 0;
         json_number(&json, "error", row->truth || mesh ? row->error : (double)NAN);
         json_string(&json, "measure", mesh ? "chamfer" : row->weighted ? "weighted_mean" : "largest_relative");
+        if (row->truth && rey_fit_row_is_pose(row)) {
+            json_number(&json, "distance", rey_pose_distance(row->found, row->truth));
+            json_number(&json, "angle", rey_pose_turned(row->found, row->truth));
+        }
         if (mesh) {
             json_number(&json, "start_error", row->chamfer[COLUMN_START]);
         }
@@ -131,9 +160,13 @@ static void print_json(const FitResult *result) {
 
 static void print_words(const FitResult *result) {
     print_table(result);
-    printf("\n%lld number%s, %d iteration%s%s, %.1f s, loss %.4g\n", (long long)result->numbers,
-           PLURAL(result->numbers), result->iterations, PLURAL(result->iterations),
-           result->converged ? " (converged)" : "", result->seconds, result->loss);
+    printf("\n%lld number%s, %d iteration%s%s, %.1f s", (long long)result->numbers, PLURAL(result->numbers),
+           result->iterations, PLURAL(result->iterations), result->converged ? " (converged)" : "", result->seconds);
+    if (result->iterations) {
+        printf(", loss %.4g\n", result->loss);
+    } else {
+        printf(", no loss: nothing was rendered\n");
+    }
     if (result->nonfinite) {
         cli_note("warning: %lld sample%s not finite and left out of losses and gradients", (long long)result->nonfinite,
                  result->nonfinite == 1 ? " was" : "s were");
@@ -258,6 +291,8 @@ static int run(const Options *options, Session *session, const char *command) {
             cli_json_error(rey_error(session->ctx), rey_result_text(code));
         }
         status = EXIT_INTERRUPTED;
+    } else if (result.bad_override) {
+        status = cli_usage_error(options, "%s", rey_error(session->ctx));
     } else if (code) {
         status = cli_report_failure(options, session->ctx, code);
     } else {

@@ -291,7 +291,8 @@ static rey_result reverse(Grad *g) {
 static rey_result differentiate(Grad *g) {
     Session *s = &g->session;
     s->def.sets = SETS;
-    g->request = (TermRequest){s->options->primary_spp, s->options->indirect_spp, g->shares, g->direction.tangent};
+    g->request = (TermRequest){.primary_spp = s->options->primary_spp, .indirect_spp = s->options->indirect_spp,
+                               .values = g->shares, .direction = g->direction.tangent};
     g->needed = cli_direction_terms(s->scene, &g->direction);
     g->used = s->options->terms ? s->options->terms : g->needed;
     return s->options->reverse ? reverse(g) : forward(g);

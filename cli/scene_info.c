@@ -4,7 +4,7 @@
 #include "base/context.h"
 #include "base/parallel.h"
 #include "io/mitsuba.h"
-#include "base/parallel.h"
+#include "render/term_request.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,7 +27,18 @@ static Range value_range(const float *values, int64_t count) {
     return r;
 }
 
-static void json_param(Json *json, const rey_param_info *info, const float *values) {
+// Why `grad` refuses a parameter, by the words that it uses; null where it does not.
+static const char *refusal(const Session *s, int param) {
+    rey_render_def def = rey_default_render_def();
+    return rey_derivative_check(s->scene, &def, (rey_selection){&param, 1}) ? rey_error(s->ctx) : NULL;
+}
+
+static void json_param(Json *json, const Session *s, int param) {
+    rey_param_info all, *info = &all;
+    if (rey_param_get_info(s->scene, param, info) != REY_OK) {
+        return;
+    }
+    const float *values = rey_param_values(s->scene, param);
     Range range = value_range(values, info->count);
     json_object(json, NULL);
     json_string(json, "name", info->name);
@@ -53,8 +64,10 @@ static void json_param(Json *json, const rey_param_info *info, const float *valu
     json_number(json, "mean", range.mean);
     json_number(json, "min", range.low);
     json_number(json, "max", range.high);
-    cli_json_terms(json, "terms", info->terms);
+    cli_json_terms(json, "terms", info->terms & ~REY_TERM_TERMINATOR);
+    cli_json_terms(json, "terms_if_met", info->terms & REY_TERM_TERMINATOR);
     json_string(json, "why", info->why);
+    json_string(json, "refused", refusal(s, param));
     json_object_end(json);
 }
 
@@ -81,6 +94,18 @@ static void value_text(const rey_param_info *info, const float *values, char *te
 
 enum { PARAM_CELLS = 6, CELL_BYTES = 512 };
 
+// Whether there is a gradient. A jump of shading normals is looked for on the way, and may not be met.
+static void print_gradient(const Session *s, int param) {
+    rey_param_info info = {0};
+    const char *refused = refusal(s, param);
+    if (refused) {
+        printf("refused: %s\n", refused);
+        return;
+    }
+    rey_param_get_info(s->scene, param, &info);
+    puts(info.terms & REY_TERM_TERMINATOR ? "complete, unless paths meet the jump of 'terminator'" : "complete");
+}
+
 // One parameter's cells: name, shape, unit, range, value, terms.
 static void param_cells(const Session *s, int param, char cells[PARAM_CELLS][CELL_BYTES]) {
     static const char *const titles[PARAM_CELLS] = {"name", "shape", "unit", "range", "value", "terms"};
@@ -96,7 +121,7 @@ static void param_cells(const Session *s, int param, char cells[PARAM_CELLS][CEL
     snprintf(cells[2], CELL_BYTES, "%s", info.unit[0] ? info.unit : "-");
     snprintf(cells[3], CELL_BYTES, "[%g, %g]", (double)info.low, (double)info.high);
     value_text(&info, rey_param_values(s->scene, param), cells[4], CELL_BYTES);
-    cli_terms_text(info.terms, cells[5], CELL_BYTES);
+    cli_terms_text(info.terms & ~REY_TERM_TERMINATOR, cells[5], CELL_BYTES);
 }
 
 static void print_params(const Session *s) {
@@ -104,7 +129,7 @@ static void print_params(const Session *s) {
     char cells[PARAM_CELLS][CELL_BYTES];
     for (int i = -1; i < count; i++) { // the titles first
         param_cells(s, i, cells);
-        for (int c = 0; c < PARAM_CELLS - 1; c++) {
+        for (int c = 0; c < PARAM_CELLS; c++) {
             int length = (int)strlen(cells[c]);
             widths[c] = length > widths[c] ? length : widths[c];
         }
@@ -112,7 +137,12 @@ static void print_params(const Session *s) {
     for (int i = -1; i < count; i++) {
         param_cells(s, i, cells);
         for (int c = 0; c < PARAM_CELLS; c++) {
-            printf("%-*s%s", widths[c], cells[c], c < PARAM_CELLS - 1 ? "  " : "\n");
+            printf("%-*s  ", widths[c], cells[c]);
+        }
+        if (i < 0) {
+            puts("gradient");
+        } else {
+            print_gradient(s, i);
         }
     }
 }
@@ -122,10 +152,7 @@ static void print_params_json(const Session *s) {
     json_object(&json, NULL);
     json_array(&json, "parameters");
     for (int i = 0; i < rey_param_count(s->scene); i++) {
-        rey_param_info info;
-        if (rey_param_get_info(s->scene, i, &info) == REY_OK) {
-            json_param(&json, &info, rey_param_values(s->scene, i));
-        }
+        json_param(&json, s, i);
     }
     json_array_end(&json);
     cli_json_ignored(&json, s);

@@ -89,6 +89,14 @@ static void test_job_kinds(void **state) {
     assert_int_equal(job.optimizer.kind, OPTIMIZER_LBFGS);
     rey_job_free(&job);
     expect_error(f, HEAD "optimizer: adan\n", NULL, "job.yaml:4: unknown value 'adan', did you mean 'adam'?");
+    // a parameter's name, too, may stand alone
+    const char *names = "scene: a.xml\nviews: [{target: t.exr}]\nparameters: [a.b, 'c.*']\n";
+    assert_int_equal(read_job(f, names, "parameters.1.start=2", &job), REY_OK);
+    assert_int_equal(job.parameter_count, 2);
+    assert_string_equal(job.parameters[0].name, "a.b");
+    assert_string_equal(job.parameters[1].name, "c.*");
+    assert_true(job.parameters[1].start_count == 1 && job.parameters[1].start[0] == 2);
+    rey_job_free(&job);
 }
 
 static void test_job_errors(void **state) {
@@ -109,8 +117,13 @@ static void test_job_errors(void **state) {
     expect_error(f, "[", NULL, "job.yaml:");
     expect_error(f, "- 1\n", NULL, "expected 'key: value' lines");
     expect_error(f, "", NULL, "key 'scene' is missing");
-    expect_error(f, HEAD, "optimizer.lerning_rate=3", "--set: unknown key 'lerning_rate'");
-    expect_error(f, HEAD, "parameters.0.bounds=[1,0]", "--set: bounds: 1 is not below 0");
+    expect_error(f, HEAD, "optimizer.lerning_rate=3", "--set optimizer.lerning_rate=3: unknown key 'lerning_rate'");
+    expect_error(f, HEAD, "parameters.0.bounds=[1,0]", "--set parameters.0.bounds=[1,0]: bounds: 1 is not below 0");
+    expect_error(f, HEAD, "seed=[", "--set seed=[: did not find");
+    expect_error(f, HEAD, "views.1.weight=2", "--set views.1.weight=2: views: key 'target' is missing");
+    expect_error(f, "scene: a.xml\nviews:\n  - t.exr\n", NULL, "job.yaml:3: views: expected entries such as {sensor: 0,");
+    expect_error(f, "parameters: [[a]]\n", NULL, "job.yaml:1: parameters: expected 'key: value' lines");
+    expect_error(f, "parameters: ['']\n", NULL, "job.yaml:1: entry: expected a text");
     expect_error(f, HEAD, "parameters.2.name=b", "'2' is not an index from 0 to 1");
     expect_error(f, HEAD, "x..y=1", "malformed key");
     char deep[128];

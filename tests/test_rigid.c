@@ -1,4 +1,5 @@
 // Poses that turn and shift (fit/rigid.h).
+#include "fit/pose.h"
 #include "fit/rigid.h"
 
 #include <math.h>
@@ -48,7 +49,47 @@ static void test_rigid_poses(void **state) {
     }
 }
 
+// A pose in words, from a rotation vector, a place and a scale; half a turn and a mirror are no special cases.
+static void test_words(void **state) {
+    (void)state;
+    static const struct {
+        double turn[3], scale;
+        const char *words;
+    } cases[] = {{{0, 0, 0}, 1, "1 2 3, turned 0 0 0 deg"},
+                 {{0, 30, 0}, 1, "1 2 3, turned 0 30 0 deg"},
+                 {{-20, 0, 10}, 2, "1 2 3, turned -20 0 10 deg, scale 2"},
+                 {{0, 0, 180}, 1, "1 2 3, turned 0 0 180 deg"},
+                 {{0, 179, 0}, 0.5, "1 2 3, turned 0 179 0 deg, scale 0.5"},
+                 {{100, 100, -60}, 1, "1 2 3, turned 100 100 -60 deg"},
+                 {{0, 0, 40}, -1, "1 2 3, turned 0 0 40 deg, scale -1"}};
+    const float unit[RIGID_VALUES] = {1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        double variable[RIGID_VALUES] = {0}, size = fabs(cases[i].scale);
+        float pose[RIGID_VALUES];
+        char text[128];
+        for (int k = 0; k < 3; k++) {
+            variable[k] = cases[i].turn[k] * 3.14159265358979323846 / 180;
+        }
+        variable[RIGID_VARIABLES] = log(size);
+        rey_rigid_pose(unit, variable, pose);
+        for (int k = 0; k < 12; k++) {
+            pose[k] = k % 4 == 3 || cases[i].scale > 0 ? pose[k] : -pose[k];
+        }
+        rey_pose_text(pose, text, sizeof text);
+        assert_string_equal(text, cases[i].words);
+        double angle = sqrt(cases[i].turn[0] * cases[i].turn[0] + cases[i].turn[1] * cases[i].turn[1] +
+                            cases[i].turn[2] * cases[i].turn[2]);
+        assert_float_equal(rey_pose_turned(unit, pose), angle, 0.1);
+        assert_float_equal(rey_pose_distance(unit, pose), 0, 1e-6);
+    }
+    const float stretched[RIGID_VALUES] = {2, 0, 0, 4, 0, 1, 0, 2, 0, 0, 3, 7};
+    char text[128];
+    rey_pose_text(stretched, text, sizeof text);
+    assert_string_equal(text, "4 2 7, turned 0 0 0 deg, scale 2 1 3");
+    assert_float_equal(rey_pose_distance(unit, stretched), 5, 1e-6);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rigid_poses)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rigid_poses), cmocka_unit_test(test_words)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

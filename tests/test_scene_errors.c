@@ -231,6 +231,34 @@ static void defines_may_be_empty(void **state) {
     rey_context_destroy(ctx);
 }
 
+// What is wrong with a file that a scene names is told with the place that names it.
+static void files_are_told_by_their_place(void **state) {
+    (void)state;
+    char empty[96], words[3][256], texts[3][512];
+    snprintf(empty, sizeof empty, "%s/empty", folder);
+    FILE *file = fopen(empty, "w");
+    assert_non_null(file);
+    fclose(file);
+    snprintf(texts[0], sizeof texts[0], "<bsdf type='diffuse'>\n<texture type='bitmap' name='reflectance'>\n<string "
+                                        "name='filename' value='empty'/></texture></bsdf>");
+    snprintf(words[0], sizeof words[0], "scene.xml:4:1: %s: not a picture that can be read", empty);
+    snprintf(texts[1], sizeof texts[1], "<shape type='ply'><string name='filename' value='empty'/></shape>");
+    snprintf(words[1], sizeof words[1], "scene.xml:2:19: %s:", empty);
+    snprintf(texts[2], sizeof texts[2], "<emitter type='constant'>\n<spectrum name='radiance' filename='empty'/></emitter>");
+    snprintf(words[2], sizeof words[2], "scene.xml:3:1: %s:", empty);
+    const Case cases[] = {{texts[0], words[0]}, {texts[1], words[1]}, {texts[2], words[2]}};
+    check_cases(cases, 3);
+    unlink(empty);
+    rey_context *ctx;
+    rey_scene *scene;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    assert_int_equal(rey_scene_load(ctx, "/none/such.xml", NULL, 0, &scene), REY_ERROR_IO);
+    assert_string_equal(rey_error(ctx), "/none/such.xml: cannot open the scene: No such file or directory");
+    assert_int_equal(rey_scene_load(ctx, folder, NULL, 0, &scene), REY_ERROR_IO);
+    assert_non_null(strstr(rey_error(ctx), ": cannot open the scene: not a file"));
+    rey_context_destroy(ctx);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_finite),
@@ -241,6 +269,7 @@ int main(void) {
         cmocka_unit_test(incomplete_scenes_do_not_render),
         cmocka_unit_test(folders_are_listed_once),
         cmocka_unit_test(defines_may_be_empty),
+        cmocka_unit_test(files_are_told_by_their_place),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -11,7 +11,7 @@
     P(IOR, eta, 1.49f, 1e-3f, INFINITY, "relative index of refraction, interior over exterior", "polypropylene")       \
     P(SPEC, diffuse_reflectance, 0.5f, 0, 1, "colour of the base", "")                                                 \
     P(SPEC, specular_reflectance, 1, 0, 1, "factor on the reflection of the coat", "")                                 \
-    P(REAL, alpha, 0.1f, 1e-4f, 1, "roughness of the coat", "")
+    P(REAL, alpha, 0.1f, 0, 1, "roughness of the coat", "")
 #define ROUGHPLASTIC_CONFIG(C)                                                                                         \
     MICROFACET_CONFIG(C)                                                                                               \
     C(nonlinear, 0, "false|true", "colour shifts by scattering inside the coat")

@@ -62,6 +62,10 @@ static void roughplastic_update(rey_scene *scene, const BsdfNode *node) {
     float *table = view->tables + node->table;
     rey_rough_transmittance(node->config[0] == 1, fmax(alpha, (double)MICROFACET_ALPHA_MIN), eta, table,
                             table + COAT_BY_ALPHA, table + COAT_BY_ETA, &internal, &by_alpha, &by_eta);
+    if (alpha <= (double)MICROFACET_ALPHA_MIN) { // as of microfacet_alpha_adj
+        memset(table + COAT_BY_ALPHA, 0, (COAT_BY_ETA - COAT_BY_ALPHA) * sizeof *table);
+        by_alpha = 0;
+    }
     table[COAT_INTERNAL] = (float)internal;
     table[COAT_INTERNAL + 1] = (float)by_alpha;
     table[COAT_INTERNAL + 2] = (float)by_eta;

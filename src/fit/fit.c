@@ -6,6 +6,7 @@
 #include "io/file.h"
 
 #include <locale.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -176,7 +177,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
     out->numbers = fit->unknowns.count;
     out->nonfinite = fit->nonfinite;
     int window = fit->state.iteration < LOSS_WINDOW ? fit->state.iteration : LOSS_WINDOW;
-    out->loss = rey_fit_mean_loss(&fit->state, fit->state.iteration, window);
+    out->loss = window ? rey_fit_mean_loss(&fit->state, fit->state.iteration, window) : NAN;
     out->output = rey_strdup(fit->ctx, fit->output);
     rey_result result = out->output ? REY_OK : REY_ERROR_MEMORY;
     if (!result && fit->job.optimizer.average > 0 && fit->state.iteration > 0) {
@@ -219,6 +220,7 @@ rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out) {
     locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0); // files hold decimal points, whatever the host has set
     locale_t host = plain ? uselocale(plain) : (locale_t)0;
     rey_result result = open_fit(&fit);
+    out->bad_override = result == REY_ERROR_ARGUMENT;
     if (!result) {
         result = rey_fit_optimise(&fit);
     }

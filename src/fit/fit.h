@@ -46,13 +46,14 @@ typedef struct FitResult {
     rey_context *ctx;
     int iterations;
     bool converged; // by the stop rule
-    double loss;    // mean over the last 10 iterations
+    double loss;    // mean over the last 10 iterations; NaN when there was none
     double seconds; // of all runs
     int64_t numbers;
     int64_t nonfinite; // samples of this run that were left out because they were not finite; 0 in a healthy fit
     Array rows;                    // FitRow
     char *output, *report, *scene; // paths; null = not written
     char *note;                    // why the scene was not written, null = it was
+    bool bad_override;             // the fit failed, and what is wrong is an override
 } FitResult;
 
 rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out);
@@ -138,9 +139,9 @@ void rey_metrics_close(Fit *fit);
 
 // Fills result->rows with starts and found values.
 rey_result rey_fit_table(Fit *fit, FitResult *result);
-// What a column of the table says of a pose (4 x 4): where it is, and how far it is turned from the truth, or from the start
-// where that is not known; and of a mesh. False for other parameters.
+// What a column of the table says of a pose (4 x 4, see pose.h) and of a mesh. False for other parameters.
 bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size);
+bool rey_fit_row_is_pose(const FitRow *row);
 // The scene and the values that the fit began with.
 rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns);
 // Adds truths and errors to the rows; opens the truth when the job names one, which nothing does before.

@@ -113,8 +113,16 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     *views = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        (*views)[i] = (JobView){.sensor = i, .weight = 1, .exposure = 1, .line = entry->line};
-        result = rey_job_read_map(job, entry, "views", fields, &(*views)[i]);
+        JobView *view = &(*views)[i];
+        *view = (JobView){.sensor = i, .weight = 1, .exposure = 1, .at = rey_job_place(entry)};
+        result = entry->kind == YAML_MAP
+                     ? rey_job_read_map(job, entry, "views", fields, view)
+                     : rey_job_fail(job, entry, "views: expected entries such as {sensor: 0, target: photo.exr}");
+        if (!result) {
+            const YamlNode *mask = rey_yaml_find(entry, "mask");
+            view->target_at = rey_job_place(rey_yaml_find(entry, "target"));
+            view->mask_at = mask ? rey_job_place(mask) : view->at;
+        }
     }
     return result;
 }
@@ -199,6 +207,7 @@ static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
 static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     JobParameter *parameter = target;
     double value;
+    parameter->start_at = rey_job_place(node);
     if (node->kind == YAML_SCALAR && !rey_job_is_real(node, &value)) {
         return rey_job_read_text(job, node, &parameter->start_file);
     }
@@ -277,9 +286,12 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
     *parameters = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        (*parameters)[i] =
-            (JobParameter){.bounds = {NAN, NAN}, .moment = MOMENT_COUNT, .smoothness = 19, .line = entry->line};
-        result = rey_job_read_map(job, entry, "parameters", fields, &(*parameters)[i]);
+        JobPlace at = rey_job_place(entry);
+        (*parameters)[i] = (JobParameter){
+            .bounds = {NAN, NAN}, .moment = MOMENT_COUNT, .smoothness = 19, .at = at, .start_at = at};
+        result = entry->kind == YAML_SCALAR // a name alone
+                     ? rey_job_read_field(job, fields, entry, (char *)&(*parameters)[i])
+                     : rey_job_read_map(job, entry, "parameters", fields, &(*parameters)[i]);
         if (!result) {
             result = finish_parameter(job, entry, &(*parameters)[i]);
         }

@@ -24,13 +24,18 @@ typedef enum Parameterisation {
 } Parameterisation;
 typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_UNIFORM, MOMENT_COUNT } MomentKind;
 
+typedef struct JobPlace { // of an entry of the job
+    int line;             // 0 = it comes from
+    const char *set;      // this override
+} JobPlace;
+
 typedef struct JobView {
     int sensor;         // of the scene
     const char *target; // picture file
     const char *mask;   // picture file of weights, null = 1 everywhere
     double weight;      // of this view in the loss
     double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
-    int line;
+    JobPlace at, target_at, mask_at;
 } JobView;
 
 typedef struct JobParameter {
@@ -44,7 +49,7 @@ typedef struct JobParameter {
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none
-    int line;
+    JobPlace at, start_at;
 } JobParameter;
 
 typedef struct JobSpp { // samples per pixel from this iteration on
@@ -112,6 +117,10 @@ void rey_job_free(Job *job);
 // The same from memory.
 rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
                                const char *const *overrides, int override_count, Job *job);
+
+// Records what is wrong with an entry: "job.yaml:12: ...", of an override "--set key=value: ...", which is no failure of the
+// job but of the command (REY_ERROR_ARGUMENT).
+rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const char *format, ...) PRINTF_LIKE(4, 5);
 
 // Path of a file that the job names; owned by the job, null (and a recorded message) when memory runs out.
 const char *rey_job_path(Job *job, const char *name);

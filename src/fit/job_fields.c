@@ -13,10 +13,11 @@ rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    if (node->line == 0) {
-        return rey_fail(job->ctx, REY_ERROR_FORMAT, "--set: %s", message);
-    }
-    return rey_fail(job->ctx, REY_ERROR_FORMAT, "%s:%d: %s", job->path, node->line, message);
+    return rey_job_fail_at(job, rey_job_place(node), REY_ERROR_FORMAT, "%s", message);
+}
+
+JobPlace rey_job_place(const YamlNode *node) {
+    return (JobPlace){node->line, node->set};
 }
 
 bool rey_job_is_real(const YamlNode *node, double *value) {

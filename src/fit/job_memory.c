@@ -1,6 +1,7 @@
-// job_memory.c: what a job owns, its paths, and its schedule of samples.
+// job_memory.c: what a job owns, its paths, places of its entries, and its schedule of samples.
 #include "fit/job.h"
 
+#include <stdio.h>
 #include <string.h>
 
 void *rey_job_alloc(Job *job, size_t count, size_t item_bytes) {
@@ -24,6 +25,16 @@ void rey_job_free(Job *job) {
     rey_array_free(job->ctx, &job->memory);
     rey_yaml_free(job->ctx, job->tree);
     *job = (Job){0};
+}
+
+rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const char *format, ...) {
+    char message[1600]; // what is told may be the context's own message
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    return at.line ? rey_fail(job->ctx, code, "%s:%d: %s", job->path, at.line, message)
+                   : rey_fail(job->ctx, REY_ERROR_ARGUMENT, "--set %.200s: %s", at.set, message);
 }
 
 const char *rey_job_path(Job *job, const char *name) {

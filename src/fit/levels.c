@@ -18,13 +18,13 @@ rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *vi
     for (int i = 0; i < fit->job.level_count; i++) {
         int r = fit->job.levels[i].reduce;
         if (s->width % r || s->height % r || s->crop_x % r || s->crop_y % r || view->width % r || view->height % r) {
-            return rey_fail(fit->ctx, REY_ERROR_FORMAT,
-                            "%s:%d: level %d reduces by %d, but sensor %d has %d x %d pixels, expected multiples of %d",
-                            fit->job.path, job_view->line, i, r, view->sensor, view->width, view->height, r);
+            return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_FORMAT,
+                                   "level %d reduces by %d, but sensor %d has %d x %d pixels, expected multiples of %d", i,
+                                   r, view->sensor, view->width, view->height, r);
         }
         if (r > 1 && s->batch_count) {
-            return rey_fail(fit->ctx, REY_ERROR_UNSUPPORTED, "%s:%d: sensor %d is a batch, which levels do not reduce",
-                            fit->job.path, job_view->line, view->sensor);
+            return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_UNSUPPORTED,
+                                   "sensor %d is a batch, which levels do not reduce", view->sensor);
         }
     }
     return REY_OK;

@@ -57,6 +57,9 @@ static void widen(Chart *c, double value) {
 // False when there is nothing that the axis could show.
 static bool set_range(Chart *c) {
     int bins = bin_count(c->fit, MOST_POINTS);
+    if (bins == 0) {
+        return false;
+    }
     c->low = INFINITY;
     c->high = -INFINITY;
     for (int k = 0; k < c->count; k++) {
@@ -87,6 +90,7 @@ static double x_of(const Chart *c, double iteration) {
 }
 
 static void y_tick(const Chart *c, double value, Text *html) {
+    value = value == 0 ? 0 : value; // no -0
     double y = y_of(c, value);
     rey_text_add(html,
                  "<line class=\"grid\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
@@ -168,7 +172,9 @@ static void legend(const Chart *c, Text *html) {
 
 static void put_chart(Chart *c, Text *html) {
     if (!set_range(c)) {
-        rey_text_add(html, "<p class=\"note\">No iteration had a positive %s.</p>\n", c->label);
+        rey_text_add(html, "<p class=\"note\">No iteration had a %s", c->logarithmic ? "positive " : "");
+        rey_text_html(html, c->label);
+        rey_text_add(html, ".</p>\n");
         return;
     }
     rey_text_add(html, "<figure class=\"chart\"><svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", WIDE, HIGH);

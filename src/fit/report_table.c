@@ -1,4 +1,5 @@
 // report_table.c: truth, start, found and error of every parameter, with its curve.
+#include "fit/pose.h"
 #include "fit/report_parts.h"
 #include "io/image.h"
 
@@ -18,7 +19,7 @@ static void put_swatch(Text *html, const double rgb[3]) {
 // Few entries one by one, of many the mean: of the channels where they are colours.
 static void put_entries(Text *html, const FitRow *row, int column) {
     const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
-    char text[96];
+    char text[128];
     if (rey_fit_row_text(row, column, text, sizeof text)) {
         rey_text_html(html, text);
         return;
@@ -55,7 +56,10 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
         put_entries(html, row, i);
         rey_text_add(html, "</td>");
     }
-    if (row->truth || row->points[COLUMN_TRUTH]) {
+    if (row->truth && rey_fit_row_is_pose(row)) {
+        rey_text_add(html, "<td class=\"n\">%.2f&thinsp;%%<div class=\"note\">%.3g away, turned by %.3g&deg;</div></td><td>",
+                     100 * row->error, rey_pose_distance(row->found, row->truth), rey_pose_turned(row->found, row->truth));
+    } else if (row->truth || row->points[COLUMN_TRUTH]) {
         rey_text_add(html, row->points[COLUMN_TRUTH] ? "<td class=\"n\">%.3f&thinsp;%%%s</td><td>"
                                                      : "<td class=\"n\">%.2f&thinsp;%%%s</td><td>",
                      100 * row->error, row->weighted ? "<sup>w</sup>" : row->points[COLUMN_TRUTH] ? "<sup>c</sup>" : "");
@@ -84,6 +88,7 @@ void rey_report_table(Fit *fit, const FitResult *out, Text *html) {
         rey_text_add(html, " <sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the "
                            "pictures depend on it at the truth.");
     }
-    rey_text_add(html, " Poses: position, and the angle from the truth, or from the start where there is none. <sup>c</sup>&thinsp;Meshes: the Chamfer distance from the truth (the mean of the mean "
+    rey_text_add(html, " Poses: position, rotation as axis times angle, scale; their error is that of an entry over the "
+                       "largest. <sup>c</sup>&thinsp;Meshes: the Chamfer distance from the truth (the mean of the mean "
                        "distances from either surface to the other) over the diagonal of its bounding box. Dashed: the truth.</p>\n");
 }

@@ -2,6 +2,7 @@
 // optimisation is over, and nowhere else.
 #include "fit/chamfer.h"
 #include "fit/fit.h"
+#include "fit/pose.h"
 #include "io/mitsuba.h"
 #include "render/update.h"
 
@@ -63,42 +64,22 @@ static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t cou
     return result;
 }
 
-static bool is_pose(const FitRow *row) {
+bool rey_fit_row_is_pose(const FitRow *row) {
     return row->dims == 2 && row->shape[0] == 4 && row->shape[1] == 4;
-}
-
-// Angle between the columns of two poses, stretched or not: of R = A B^T, cos = (trace R - 1) / 2 [degrees].
-static double turned(const float *a, const float *b) {
-    double trace = 0;
-    for (int column = 0; column < 3; column++) {
-        double ab = 0, aa = 0, bb = 0;
-        for (int k = 0; k < 3; k++) {
-            double x = (double)a[4 * k + column], y = (double)b[4 * k + column];
-            ab += x * y;
-            aa += x * x;
-            bb += y * y;
-        }
-        trace += aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
-    }
-    return acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / 3.14159265358979323846;
 }
 
 bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size) {
     const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
-    const float *other = row->truth ? row->truth : row->start;
     if (row->points[column]) {
         bool off = row->points[COLUMN_TRUTH] && column != COLUMN_TRUTH;
         snprintf(text, size, off ? "%lld points, %.3g %%" : "%lld points", (long long)row->points[column],
                  100 * row->chamfer[column]);
         return true;
     }
-    if (!is_pose(row) || !values) {
+    if (!rey_fit_row_is_pose(row) || !values) {
         return false;
     }
-    int used = snprintf(text, size, "%.3g %.3g %.3g", (double)values[3], (double)values[7], (double)values[11]);
-    if (values != other && used > 0 && (size_t)used < size) {
-        snprintf(text + used, size - (size_t)used, ", %.3g deg", turned(values, other));
-    }
+    rey_pose_text(values, text, size);
     return true;
 }
 
@@ -114,7 +95,7 @@ static double pose_error(const FitRow *row) {
 
 static double worst_error(const FitRow *row) {
     double worst = 0;
-    if (is_pose(row)) {
+    if (rey_fit_row_is_pose(row)) {
         return pose_error(row);
     }
     for (int64_t i = 0; i < row->count; i++) {

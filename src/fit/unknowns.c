@@ -34,10 +34,7 @@ static bool glob_match(const char *pattern, const char *text) {
 }
 
 static rey_result fail_at(Job *job, const JobParameter *p, const char *name, const char *why) {
-    if (p->line == 0) {
-        return rey_fail(job->ctx, REY_ERROR_PARAM, "--set: parameter '%s': %s", name, why);
-    }
-    return rey_fail(job->ctx, REY_ERROR_PARAM, "%s:%d: parameter '%s': %s", job->path, p->line, name, why);
+    return rey_job_fail_at(job, p->at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
 }
 
 // Which numbers are allowed, from the job and from the parameter itself.
@@ -66,6 +63,9 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
     const char *path = rey_job_path(job, p->start_file);
     rey_image image = {0};
     rey_result result = path ? rey_image_read(job->ctx, path, &image) : REY_ERROR_MEMORY;
+    if (result && result != REY_ERROR_MEMORY) {
+        result = rey_job_fail_at(job, p->start_at, result, "parameter '%s': %s", unknown->name, rey_error(job->ctx));
+    }
     if (!result) {
         if (image.srgb) {
             rey_image_decode_srgb(&image);
@@ -179,7 +179,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     }
     *owner = job_index;
     *unknown = (Unknown){.param = param,
-                         .name = info.name,
+                         .name = strchr(p->name, '*') ? info.name : p->name, // aliases stay what the job calls them
                          .offset = u->count,
                          .count = info.count,
                          .dims = info.dims,

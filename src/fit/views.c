@@ -3,25 +3,16 @@
 #include "io/image.h"
 
 #include <math.h>
-#include <stdio.h>
 
-static rey_result fail_view(Fit *fit, const JobView *job_view, const char *why) {
-    return job_view->line ? rey_fail(fit->ctx, REY_ERROR_FORMAT, "%s:%d: %s", fit->job.path, job_view->line, why)
-                          : rey_fail(fit->ctx, REY_ERROR_FORMAT, "--set: %s", why);
-}
-
-static rey_result load_picture(Fit *fit, const JobView *job_view, const FitView *view, const char *name,
-                               rey_image *image) {
+static rey_result load_picture(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image) {
     const char *path = rey_job_path(&fit->job, name);
     rey_result result = path ? rey_image_read(fit->ctx, path, image) : REY_ERROR_MEMORY;
     if (result) {
-        return result;
+        return result == REY_ERROR_MEMORY ? result : rey_job_fail_at(&fit->job, at, result, "%s", rey_error(fit->ctx));
     }
     if (image->width != view->width || image->height != view->height) {
-        char why[1024];
-        snprintf(why, sizeof why, "%s is %d x %d, but sensor %d delivers %d x %d", name, image->width, image->height,
-                 view->sensor, view->width, view->height);
-        return fail_view(fit, job_view, why);
+        return rey_job_fail_at(&fit->job, at, REY_ERROR_FORMAT, "%s is %d x %d, but sensor %d delivers %d x %d", name,
+                               image->width, image->height, view->sensor, view->width, view->height);
     }
     return rey_image_to_rgb(fit->ctx, image);
 }
@@ -33,7 +24,7 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
         return REY_OK;
     }
     rey_image image = {0};
-    rey_result result = load_picture(fit, job_view, view, job_view->mask, &image); // of weights: never decoded
+    rey_result result = load_picture(fit, job_view->mask_at, view, job_view->mask, &image); // of weights: never decoded
     if (!result) {
         view->mask = rey_alloc_array(fit->ctx, (size_t)pixels, sizeof *view->mask);
         result = view->mask ? REY_OK : REY_ERROR_MEMORY;
@@ -43,11 +34,13 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
         view->mask[i] = image.data[3 * i];
         view->mask_sum += (double)view->mask[i];
         if (!(view->mask[i] >= 0) || !isfinite(view->mask[i])) {
-            result = fail_view(fit, job_view, "the mask holds values below 0 or not finite");
+            result = rey_job_fail_at(&fit->job, job_view->mask_at, REY_ERROR_FORMAT,
+                                     "%s: the mask holds values below 0 or not finite", job_view->mask);
         }
     }
     if (!result && !(view->mask_sum > 0)) {
-        result = fail_view(fit, job_view, "the mask is 0 everywhere");
+        result = rey_job_fail_at(&fit->job, job_view->mask_at, REY_ERROR_FORMAT, "%s: the mask is 0 everywhere",
+                                 job_view->mask);
     }
     rey_image_free(fit->ctx, &image);
     return result;
@@ -70,12 +63,10 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
     *view = (FitView){.sensor = job_view->sensor, .weight = job_view->weight};
     rey_result result = rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height);
     if (result) {
-        char why[256];
-        snprintf(why, sizeof why, "%.200s", rey_error(fit->ctx));
-        return fail_view(fit, job_view, why);
+        return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_FORMAT, "%s", rey_error(fit->ctx));
     }
     rey_image image = {0};
-    result = load_picture(fit, job_view, view, job_view->target, &image);
+    result = load_picture(fit, job_view->target_at, view, job_view->target, &image);
     if (!result) {
         result = load_mask(fit, job_view, view);
     }
@@ -85,10 +76,9 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
     }
     for (int64_t i = 0; i < floats && !result; i++) {
         if (!isfinite(image.data[i]) && (!view->mask || view->mask[i / 3] > 0)) {
-            char why[1024];
-            snprintf(why, sizeof why, "%s holds a value that is not finite at pixel %d, %d", job_view->target,
-                     (int)(i / 3 % view->width), (int)(i / 3 / view->width));
-            result = fail_view(fit, job_view, why);
+            result = rey_job_fail_at(&fit->job, job_view->target_at, REY_ERROR_FORMAT,
+                                     "%s holds a value that is not finite at pixel %d, %d", job_view->target,
+                                     (int)(i / 3 % view->width), (int)(i / 3 / view->width));
         }
     }
     if (!result) {

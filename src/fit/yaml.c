@@ -1,6 +1,7 @@
 // yaml.c: libyaml's events gathered into a tree.
 #include "fit/yaml.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
@@ -10,13 +11,19 @@ enum { DEEPEST = 32, MOST_KEYS = 4096 };
 typedef struct Reader {
     rey_context *ctx;
     const char *name;
-    bool override; // lines are 0: the text came from the command line
+    const char *override; // "key=value" that the text comes from: lines are 0; null = from a file
     yaml_parser_t parser;
     yaml_event_t event;
 } Reader;
 
 static int event_line(const Reader *r) {
     return (int)r->event.start_mark.line + 1;
+}
+
+// What is wrong with the text, and where it stands.
+static rey_result fail_at(const Reader *r, int line, const char *message) {
+    return r->override ? rey_fail(r->ctx, REY_ERROR_ARGUMENT, "--set %.200s: %s", r->override, message)
+                       : rey_fail(r->ctx, REY_ERROR_FORMAT, "%s:%d: %s", r->name, line, message);
 }
 
 static rey_result next_event(Reader *r) {
@@ -28,12 +35,11 @@ static rey_result next_event(Reader *r) {
     if (r->parser.error == YAML_MEMORY_ERROR) {
         return rey_fail_memory(r->ctx, 0);
     }
-    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s:%d: %s", r->name, (int)r->parser.problem_mark.line + 1,
-                    r->parser.problem ? r->parser.problem : "malformed YAML");
+    return fail_at(r, (int)r->parser.problem_mark.line + 1, r->parser.problem ? r->parser.problem : "malformed YAML");
 }
 
 static rey_result fail_here(Reader *r, const char *message) {
-    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s:%d: %s", r->name, event_line(r), message);
+    return fail_at(r, event_line(r), message);
 }
 
 static char *copy_text(rey_context *ctx, const void *bytes, size_t length) {
@@ -68,7 +74,9 @@ static rey_result read_entry(Reader *r, YamlNode *parent, int depth, YamlNode **
         }
         rey_result result = scalar_text(r, &key);
         if (!result && rey_yaml_find(parent, key)) {
-            result = rey_fail(r->ctx, REY_ERROR_FORMAT, "%s:%d: key '%s' is given twice", r->name, line, key);
+            char message[256];
+            snprintf(message, sizeof message, "key '%.200s' is given twice", key);
+            result = fail_at(r, line, message);
         }
         if (!result) {
             result = next_event(r);
@@ -85,6 +93,7 @@ static rey_result read_entry(Reader *r, YamlNode *parent, int depth, YamlNode **
     }
     (*out)->key = key;
     (*out)->line = r->override ? 0 : line;
+    (*out)->set = r->override;
     return REY_OK;
 }
 
@@ -123,6 +132,7 @@ static rey_result read_value(Reader *r, int depth, YamlNode **out) {
         return REY_ERROR_MEMORY;
     }
     node->line = r->override ? 0 : event_line(r);
+    node->set = r->override;
     rey_result result;
     switch (event->type) {
     case YAML_SCALAR_EVENT:
@@ -179,7 +189,7 @@ static rey_result read_document(Reader *r, YamlNode **out) {
     return result;
 }
 
-static rey_result read_text(rey_context *ctx, const char *name, bool override, const unsigned char *bytes, size_t size,
+static rey_result read_text(rey_context *ctx, const char *name, const char *override, const unsigned char *bytes, size_t size,
                             YamlNode **out) {
     Reader r = {.ctx = ctx, .name = name, .override = override};
     *out = NULL;
@@ -198,7 +208,7 @@ static rey_result read_text(rey_context *ctx, const char *name, bool override, c
 }
 
 rey_result rey_yaml_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, YamlNode **out) {
-    return read_text(ctx, name, false, bytes, size, out);
+    return read_text(ctx, name, NULL, bytes, size, out);
 }
 
 void rey_yaml_free(rey_context *ctx, YamlNode *node) {
@@ -235,14 +245,15 @@ int rey_yaml_count(const YamlNode *node) {
 static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, const char *assignment,
                             YamlNode **out) {
     YamlNode **place = &node->child;
-    if (node->kind == YAML_SCALAR && node->text && node->text[0]) { // "loss: l2" is short for "loss: {type: l2}"
+    if (node->kind == YAML_SCALAR && node->text && node->text[0]) {
+        // "loss: l2" is short for "loss: {type: l2}", and an entry "- a" of a list for "- {name: a}".
         YamlNode *type = rey_alloc(ctx, sizeof *type);
-        char *key = type ? rey_strdup(ctx, "type") : NULL;
+        char *key = type ? rey_strdup(ctx, node->key ? "type" : "name") : NULL;
         if (!key) {
             rey_free(ctx, type);
             return REY_ERROR_MEMORY;
         }
-        *type = (YamlNode){.line = node->line, .key = key, .text = node->text};
+        *type = (YamlNode){.line = node->line, .set = node->set, .key = key, .text = node->text};
         node->text = NULL;
         node->child = type;
         node->kind = YAML_MAP;
@@ -252,7 +263,7 @@ static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, 
         long index = strtol(part, &end, 10);
         int count = rey_yaml_count(node);
         if (*end || end == part || index < 0 || index > count) {
-            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %s: '%s' is not an index from 0 to %d", assignment, part,
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: '%s' is not an index from 0 to %d", assignment, part,
                             count);
         }
         for (long i = 0; i < index; i++) {
@@ -266,6 +277,9 @@ static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, 
     }
     if (!*place) {
         YamlNode *made = rey_alloc(ctx, sizeof *made);
+        if (made) {
+            made->set = assignment;
+        }
         if (made && node->kind == YAML_MAP) {
             made->key = rey_strdup(ctx, part);
         }
@@ -288,7 +302,7 @@ static rey_result override_path(rey_context *ctx, YamlNode *root, char *path, co
             *dot = 0;
         }
         if (!*part || depth >= DEEPEST) {
-            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %s: malformed key", assignment);
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: malformed key", assignment);
         }
         rey_result result = step_into(ctx, node, part, assignment, &node);
         if (result) {
@@ -303,10 +317,10 @@ static rey_result override_path(rey_context *ctx, YamlNode *root, char *path, co
 rey_result rey_yaml_override(rey_context *ctx, YamlNode *root, const char *assignment) {
     const char *equals = strchr(assignment, '=');
     if (!equals) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %s: expected key=value", assignment);
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: expected key=value", assignment);
     }
     YamlNode *value, *node = NULL;
-    rey_result result = read_text(ctx, "--set", true, (const unsigned char *)equals + 1, strlen(equals + 1), &value);
+    rey_result result = read_text(ctx, "", assignment, (const unsigned char *)equals + 1, strlen(equals + 1), &value);
     if (result) {
         return result;
     }
@@ -317,6 +331,7 @@ rey_result rey_yaml_override(rey_context *ctx, YamlNode *root, const char *assig
         YamlNode held = *node;
         node->kind = value->kind;
         node->line = 0;
+        node->set = assignment;
         node->text = value->text;
         node->child = value->child;
         value->text = held.text;

@@ -82,7 +82,8 @@ rey_result build_curve(Builder *b, rey_xml_node *node, int32_t id, const char *p
     }
     TRY(rey_xml_get_transform(b->ctx, node, "to_world", m));
     TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
-    rey_result result = rey_curves_read(b->ctx, file, plugin->order, &curves);
+    rey_result result = rey_xml_named_file(b->ctx, rey_xml_find(node, "filename")->at,
+                                           rey_curves_read(b->ctx, file, plugin->order, &curves));
     rey_free(b->ctx, file);
     TRY(result);
     curves_transform(&curves, m);

@@ -143,7 +143,7 @@ rey_result build_parts(Builder *b, rey_xml_node *node, const char *path, ShapeRe
         result = rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file);
     }
     if (result == REY_OK) {
-        result = rey_obj_materials(b->ctx, file, &runs);
+        result = rey_xml_named_file(b->ctx, node->at, rey_obj_materials(b->ctx, file, &runs));
     }
     if (result == REY_OK) {
         parts.of_face = rey_alloc_array(b->ctx, (size_t)parts.whole.face_count, sizeof *parts.of_face);

@@ -17,7 +17,8 @@ static rey_result read_nodes(Builder *b, const rey_xml_node *node, const rey_gri
     shape->positions = rey_scene_append(scene, &scene->build.theta, sizeof(float), rey_grid_count(grid));
     return shape->positions < 0
                ? REY_ERROR_MEMORY
-               : rey_grid_read(b->ctx, grid, &ARRAY_AT(scene->build.theta, float, shape->positions));
+               : rey_xml_named_file(b->ctx, node->at,
+                                    rey_grid_read(b->ctx, grid, &ARRAY_AT(scene->build.theta, float, shape->positions)));
 }
 
 rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
@@ -32,7 +33,7 @@ rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char 
     }
     TRY(rey_xml_get_choice(b->ctx, node, "normals", normals, 2, 0, &mode));
     TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
-    rey_result result = rey_grid_open(b->ctx, file, &grid);
+    rey_result result = rey_xml_named_file(b->ctx, rey_xml_find(node, "filename")->at, rey_grid_open(b->ctx, file, &grid));
     const int32_t dims[3] = {grid.nz, grid.ny, grid.nx};
     int64_t count = rey_grid_count(&grid);
     if (result == REY_OK) {

@@ -86,7 +86,7 @@ static rey_result add_grid(Builder *b, rey_xml_node *node, const rey_grid *grid,
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_FORMAT, "the grid has %d channels, expected 1, 3 or 6", grid->channels);
     }
     TRY(build_add_texture(b, TEXTURE_VOLUME, count, &volume->texture, &theta));
-    TRY(rey_grid_read(b->ctx, grid, theta));
+    TRY(rey_xml_named_file(b->ctx, node->at, rey_grid_read(b->ctx, grid, theta)));
     TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, volume->texture);
     t->channels = grid->channels;
     t->volume = id;
@@ -122,7 +122,7 @@ static rey_result build_gridvolume(Builder *b, rey_xml_node *node, TextureUse us
     volume->filter = filter;
     volume->wrap = wrap;
     TRY(rey_xml_resolve_file(b->ctx, b->source->document, node, "filename", &file));
-    rey_result result = rey_grid_open(b->ctx, file, &grid);
+    rey_result result = rey_xml_named_file(b->ctx, rey_xml_find(node, "filename")->at, rey_grid_open(b->ctx, file, &grid));
     if (result == REY_OK) {
         result = box && !grid.placed
                      ? rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the file says no box along the axes, which 'use_grid_bbox' asks for")

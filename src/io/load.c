@@ -71,7 +71,13 @@ rey_result load_request(rey_context *ctx, const rey_xml_document *document, rey_
     rey_result result = out->kind == FILE_MESH     ? mesh_request(ctx, node, out)
                         : out->kind == FILE_BITMAP ? rey_xml_get_bool(ctx, node, "raw", false, &out->raw)
                                                    : REY_OK;
-    return result == REY_OK ? rey_xml_resolve_file(ctx, document, node, "filename", &out->path) : result;
+    if (result == REY_OK) {
+        result = rey_xml_resolve_file(ctx, document, node, "filename", &out->path);
+    }
+    if (result == REY_OK) {
+        out->at = rey_xml_find(node, "filename")->at;
+    }
+    return result;
 }
 
 void load_request_free(rey_context *ctx, FileRequest *request) {
@@ -178,9 +184,9 @@ static rey_result read_image(rey_context *ctx, const FileRequest *request, rey_i
     }
     for (int64_t i = 0; i < (int64_t)image->width * image->height * image->channels; i++) {
         if (!isfinite(image->data[i]) || (sky && image->data[i] < 0)) {
-            return rey_xml_fail(ctx, request->at, REY_ERROR_FORMAT,
-                                sky ? "the environment image has a value that is negative or not finite"
-                                    : "the image has a value that is not finite");
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the picture has a value that is %snot finite at pixel %d, %d",
+                            request->path, sky ? "negative or " : "", (int)(i / image->channels % image->width),
+                            (int)(i / image->channels / image->width));
         }
     }
     return sky ? envmap_pad(ctx, image) : REY_OK;
@@ -188,7 +194,9 @@ static rey_result read_image(rey_context *ctx, const FileRequest *request, rey_i
 
 rey_result load_read(rey_context *ctx, const FileRequest *request, LoadedFile *out) {
     *out = (LoadedFile){0};
-    return request->kind == FILE_MESH ? read_mesh(ctx, request, out) : read_image(ctx, request, &out->image);
+    return rey_xml_named_file(ctx, request->at,
+                              request->kind == FILE_MESH ? read_mesh(ctx, request, out)
+                                                         : read_image(ctx, request, &out->image));
 }
 
 void load_free(rey_context *ctx, LoadedFile *file) {

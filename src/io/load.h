@@ -11,7 +11,7 @@ typedef enum FileKind { FILE_NONE, FILE_MESH, FILE_BITMAP, FILE_ENVMAP } FileKin
 typedef struct FileRequest {
     FileKind kind;
     char *path;
-    rey_xml_position at;                       // of who asks
+    rey_xml_position at;                       // where the scene names it
     rey_result (*read)(rey_context *ctx, const char *path, const struct FileRequest *request, rey_mesh *mesh);
     bool flip_tex_coords, flat_normals;        // meshes
     int shape_index;

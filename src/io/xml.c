@@ -71,6 +71,10 @@ rey_result rey_xml_fail(rey_context *ctx, rey_xml_position at, rey_result code, 
     return code;
 }
 
+rey_result rey_xml_named_file(rey_context *ctx, rey_xml_position at, rey_result result) {
+    return result == REY_OK || result == REY_ERROR_MEMORY ? result : rey_xml_fail(ctx, at, result, "%s", rey_error(ctx));
+}
+
 rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *word,
                              const char *(*next)(void *user, int i), void *user, const char *format, ...) {
     char text[1536];

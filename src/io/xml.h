@@ -132,6 +132,8 @@ const char *rey_xml_kind_name(rey_xml_kind kind);
 rey_result rey_xml_fail(rey_context *ctx, rey_xml_position at, rey_result code, const char *format, ...)
     PRINTF_LIKE(4, 5);
 // Records "FILE:LINE:COLUMN: message, did you mean 'x'?" with the nearest of the candidates (see rey_nearest_word).
+// Puts the place that named a file before what was wrong with the file; passes every result on.
+rey_result rey_xml_named_file(rey_context *ctx, rey_xml_position at, rey_result result);
 rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *word,
                              const char *(*next)(void *user, int i), void *user, const char *format, ...)
     PRINTF_LIKE(6, 7);

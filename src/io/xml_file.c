@@ -125,17 +125,20 @@ rey_result rey_xml_not_found(rey_context *ctx, const rey_xml_document *document,
     return rey_xml_fail(ctx, at, REY_ERROR_IO, "file '%.400s' was not found, looked in %s", path, list);
 }
 
-rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
+rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool scene, char **text,
                         size_t *bytes) {
     rey_context *ctx = reader->ctx;
     *text = NULL;
     *bytes = 0;
     struct stat info;
-    if (stat(path, &info) != 0) {
-        return rey_xml_fail(ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, strerror(errno));
+    const char *why = stat(path, &info) != 0                                          ? strerror(errno)
+                      : S_ISDIR(info.st_mode) || (!scene && !S_ISREG(info.st_mode)) ? "not a file"
+                                                                                      : NULL;
+    if (why && scene) {
+        return rey_fail(ctx, REY_ERROR_IO, "%.400s: cannot open the scene: %s", path, why);
     }
-    if (S_ISDIR(info.st_mode) || (!any_kind && !S_ISREG(info.st_mode))) {
-        return rey_xml_fail(ctx, at, REY_ERROR_IO, "'%.400s' is not a file", path);
+    if (why) {
+        return rey_xml_fail(ctx, at, REY_ERROR_IO, "cannot open '%.400s': %s", path, why);
     }
     if (info.st_size > (off_t)(XML_LARGEST_FILE - reader->bytes_read)) {
         return rey_xml_fail(ctx, at, REY_ERROR_SCENE, "the scene's files together exceed %d bytes", XML_LARGEST_FILE);

@@ -138,8 +138,8 @@ rey_result rey_xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *na
 
 // Parses one file's text into the open frames (xml.c).
 rey_result rey_xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes);
-// Reads a file into rey_alloc'ed memory. Only regular files unless any_kind (xml_file.c).
-rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool any_kind, char **text,
+// Reads a file into rey_alloc'ed memory: the scene, whose place is nowhere, or else a regular file that one names (xml_file.c).
+rey_result rey_xml_load(XmlReader *reader, rey_xml_position at, const char *path, bool scene, char **text,
                         size_t *bytes);
 // path when absolute, else the first of the folders that has it; null in *out when none has (xml_file.c).
 rey_result rey_xml_search(rey_context *ctx, const rey_xml_document *document, const char *first_folder,

@@ -139,6 +139,7 @@ static rey_result load_spectrum(XmlReader *reader, rey_xml_property *property) {
     }
     if (!result) {
         result = rey_spectrum_read_memory(ctx, path, text, bytes, &property->spectrum, storage);
+        result = rey_xml_named_file(ctx, property->at, result);
     }
     rey_free(ctx, text);
     rey_free(ctx, path);

@@ -6,7 +6,8 @@
 
 #include "math/fresnel.h"
 
-// The smallest roughness of a rough surface; smaller values act like this one.
+// The smallest roughness of a rough surface; smaller values act like this one. So the range of every roughness in the
+// tables of kinds begins at 0: scenes and textures hold zeros, and below the smallest one the derivative is 0.
 #define MICROFACET_ALPHA_MIN 1e-4f
 
 typedef struct Microfacet {

@@ -152,7 +152,7 @@ rey_result rey_boundaries_begin(Render *r) {
         if (r->terms & rey_boundary_term(i)) {
             bool check = moves || !boundary_sees(r->plan.sensor);
             result = check ? boundary_check(r->scene, r->plan.sensor, rey_boundary_term(i)) : REY_OK;
-            result = result == REY_OK ? boundary_begin(r, i, r->boundary + i) : result;
+            result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }
     watch_smooth_normals(r);

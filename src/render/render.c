@@ -325,6 +325,13 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     return rey_boundaries_begin(r);
 }
 
+rey_result rey_derivative_check(rey_scene *scene, const rey_render_def *def, rey_selection selection) {
+    double start = rey_seconds();
+    Render r;
+    rey_result result = derivative_begin(&r, scene, def, (TermRequest){.asked = true}, selection, MODE_REVERSE);
+    return rey_render_end(&r, result, start, NULL);
+}
+
 // The boundary terms of one set.
 static void run_boundaries(Render *r, int set, double *picture) {
     for (int i = 0; i < BOUNDARY_KINDS; i++) {

@@ -1,0 +1,134 @@
+// test_cli_words.c: what the command says where something is wrong or cannot be had.
+#include "command.h"
+
+static void write_words(const char *path, const char *words) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(words, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words) && !strstr(f->out, words)) {
+        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
+    }
+}
+
+// A job in the test's folder for the scenes of the test jobs; lines follow it.
+static void write_job(Fixture *f, const char *lines) {
+    static char text[2048];
+    snprintf(text, sizeof text, "folder: %s\nscene: start.xml\niterations: 0\nreport_spp: 2\n%s", TEST_JOBS, lines);
+    write_words("job.yaml", text);
+    if (access("target.exr", R_OK) != 0) {
+        expect(f, 0, "render " TEST_JOBS "/truth.xml -o target.exr --spp 4");
+    }
+}
+
+static JsonNode *fit_json(Fixture *f, int status, const char *sets) {
+    char arguments[1024];
+    snprintf(arguments, sizeof arguments, "fit job.yaml -o fit --overwrite --json --set views.0.target=$PWD/target.exr %s", sets);
+    return run_json(f, status, arguments);
+}
+
+// `params` and `grad` agree about what is refused, in the same words.
+static void refusals_are_the_same(void **state) {
+    Fixture *f = *state;
+    static const char *const scenes[] = {TEST_SCENE, TEST_SCENE " -D ball=glass"};
+    int refused = 0;
+    for (int s = 0; s < 2; s++) {
+        char arguments[1024], text[512];
+        snprintf(arguments, sizeof arguments, "params %s --json", scenes[s]);
+        JsonNode *node = run_json(f, 0, arguments);
+        for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
+            snprintf(text, sizeof text, "%s", json_text(p, "refused", ""));
+            snprintf(arguments, sizeof arguments, "grad %s --param %s --spp 1 -t 1", scenes[s], json_text(p, "name", ""));
+            expect(f, text[0] ? 1 : 0, arguments);
+            assert_non_null(strstr(f->words, text));
+            refused += text[0] != 0;
+        }
+        json_free(node);
+    }
+    assert_true(refused > 0);
+    expect_words(f, 0, "params %s -D ball=glass", "  refused: ");
+}
+
+// A jump that paths may not meet is told apart from the terms that are needed, in words and in JSON.
+static void what_may_be_needed_is_told(void **state) {
+    Fixture *f = *state;
+    write_words("bump.xml",
+                "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'><integer "
+                "name='width' value='4'/><integer name='height' value='4'/></film></sensor><bsdf type='bumpmap' id='b'>"
+                "<texture type='bitmap'><string name='filename' value='height.npy'/></texture><bsdf type='diffuse'/></bsdf>"
+                "<shape type='rectangle'><ref id='b'/></shape><emitter type='constant'/></scene>");
+    expect(f, 0, "render %s -o height.npy --spp 1");
+    expect_words(f, 0, "params bump.xml", "interior,primary,indirect  complete, unless paths meet the jump of 'terminator'");
+    JsonNode *node = run_json(f, 0, "params bump.xml --json");
+    bool found = false;
+    for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
+        if (json_get(p, "terms_if_met")->first) {
+            found = true;
+            assert_string_equal(json_get(p, "terms_if_met")->first->text, "terminator");
+        }
+        for (const JsonNode *term = json_get(p, "terms")->first; term; term = term->next) {
+            assert_string_not_equal(term->text, "terminator");
+        }
+    }
+    assert_true(found);
+    json_free(node);
+}
+
+// Names are the job's own, poses are poses, and what was not computed is not told.
+static void fits_show_what_the_job_says(void **state) {
+    Fixture *f = *state;
+    write_job(f, "views: [{target: none.exr}]\n"
+                 "parameters: [red.reflectance, {name: ball.to_world, parameterisation: rigid}]\ntruth: {scene: truth.xml}\n");
+    JsonNode *node = fit_json(f, 0, "");
+    assert_string_equal(json_text(json_get(node, "parameters")->first, "name", ""), "red.reflectance");
+    assert_true(json_get(node, "loss")->kind == JSON_NULL);
+    assert_true(json_value(json_get(node, "parameters")->first->next, "angle", 1) == 0);
+    json_free(node);
+    expect_words(f, 0, "fit job.yaml -o fit --overwrite --set views.0.target=$PWD/target.exr", "no loss");
+    assert_non_null(strstr(f->out, "0 0 0.6, turned 0 0 0 deg, scale 0.6"));
+    char page[OUTPUT_BYTES];
+    read_text("fit/report.html", page);
+    assert_null(strstr(page, ">-0<"));
+}
+
+// Where the job is wrong its line is told; where the command line is, the setting, and the exit status is that of usage.
+static void places_of_jobs_are_told(void **state) {
+    Fixture *f = *state;
+    write_job(f, "views:\n  - sensor: 0\n    target: none.exr\nparameters: [red.reflectance]\n");
+    expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:7: " TEST_JOBS "/none.exr: cannot open");
+    expect_words(f, 2, "fit job.yaml -o fit --set views.0.target=no.exr", "--set views.0.target=no.exr: " TEST_JOBS "/no.exr");
+    expect_words(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
+    expect_words(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
+    expect_words(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
+    JsonNode *node = fit_json(f, 2, "--set parameters.0=nothing");
+    assert_string_equal(json_text(node, "kind", ""), "usage");
+    json_free(node);
+    expect_words(f, 1, "fit none.yaml", "none.yaml: cannot open");
+    expect_words(f, 1, "render none.xml -o a.exr", "none.xml: cannot open the scene: No such file");
+}
+
+// Rows of a check are shown as they come, and once more in the table.
+static void checks_show_their_rows(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "check %s --param red.reflectance.value --param metal.alpha.value --spp 16");
+    const char *titles = strstr(f->words, "worst z");
+    assert_non_null(titles);
+    assert_non_null(strstr(titles, "red.reflectance.value"));
+    assert_non_null(strstr(titles, "metal.alpha.value"));
+    assert_non_null(strstr(f->out, "passed"));
+    expect(f, 0, "check %s --param red.reflectance.value --spp 16");
+    assert_null(strstr(f->words, "worst z"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(refusals_are_the_same),       cmocka_unit_test(what_may_be_needed_is_told),
+        cmocka_unit_test(fits_show_what_the_job_says), cmocka_unit_test(places_of_jobs_are_told),
+        cmocka_unit_test(checks_show_their_rows),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
