@@ -119,9 +119,8 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
                      ? rey_job_read_map(job, entry, "views", fields, view)
                      : rey_job_fail(job, entry, "views: expected entries such as {sensor: 0, target: photo.exr}");
         if (!result) {
-            const YamlNode *mask = rey_yaml_find(entry, "mask");
             view->target_at = rey_job_place(rey_yaml_find(entry, "target"));
-            view->mask_at = mask ? rey_job_place(mask) : view->at;
+            view->mask_at = rey_job_place(rey_yaml_find(entry, "mask"));
         }
     }
     return result;
@@ -430,6 +429,12 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     }
     if (!result) {
         result = rey_job_read_map(job, job->tree, "the job", job_fields, job);
+    }
+    if (!result) {
+        const YamlNode *truth = rey_yaml_find(job->tree, "truth");
+        job->scene_at = rey_job_place(rey_yaml_find(job->tree, "scene"));
+        job->load_at = rey_job_place(rey_yaml_find(job->tree, "load"));
+        job->truth_at = rey_job_place(truth ? rey_yaml_find(truth, "scene") : NULL);
     }
     job->optimizer.schedule.length_given = job->optimizer.schedule.length != 0;
     if (!result && !job->optimizer.schedule.length) {

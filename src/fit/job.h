@@ -85,6 +85,7 @@ typedef struct Job {
     const char *folder; // that paths are relative to
     const char *scene, *truth_scene, *output;
     const char *load; // scene file whose values the scene gets, or null
+    JobPlace scene_at, truth_at, load_at;
     rey_define *defines;
     int define_count;
     uint32_t seed;
@@ -119,8 +120,11 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
                                const char *const *overrides, int override_count, Job *job);
 
 // Records what is wrong with an entry: "job.yaml:12: ...", of an override "--set key=value: ...", which is no failure of the
-// job but of the command (REY_ERROR_ARGUMENT).
+// job but of the command (REY_ERROR_ARGUMENT), unless it names a file that cannot be read.
 rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const char *format, ...) PRINTF_LIKE(4, 5);
+
+// Puts the place that named a file before why it could not be read; passes every result on.
+rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result);
 
 // Path of a file that the job names; owned by the job, null (and a recorded message) when memory runs out.
 const char *rey_job_path(Job *job, const char *name);

@@ -17,7 +17,7 @@ rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...)
 }
 
 JobPlace rey_job_place(const YamlNode *node) {
-    return (JobPlace){node->line, node->set};
+    return node ? (JobPlace){node->line, node->set} : (JobPlace){0};
 }
 
 bool rey_job_is_real(const YamlNode *node, double *value) {
@@ -31,7 +31,7 @@ rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double 
         return rey_job_fail(job, node, "%s%sexpected a number", node->key ? node->key : "", node->key ? ": " : "");
     }
     if (value < low || value > high) {
-        return rey_job_fail(job, node, "%s = %g, expected %g to %g", node->key ? node->key : "value", value, low, high);
+        return rey_job_fail(job, node, "%s = %.10g, expected %.10g to %.10g", node->key ? node->key : "value", value, low, high);
     }
     *out = value;
     return REY_OK;

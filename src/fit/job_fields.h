@@ -24,7 +24,7 @@ typedef struct Field {
 
 // Records a message that starts with the node's file and line.
 rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
-JobPlace rey_job_place(const YamlNode *node);
+JobPlace rey_job_place(const YamlNode *node); // null: none
 bool rey_job_is_real(const YamlNode *node, double *value);
 rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double high, double *out);
 rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out);

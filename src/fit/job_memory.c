@@ -34,7 +34,11 @@ rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const c
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
     return at.line ? rey_fail(job->ctx, code, "%s:%d: %s", job->path, at.line, message)
-                   : rey_fail(job->ctx, REY_ERROR_ARGUMENT, "--set %.200s: %s", at.set, message);
+                   : rey_fail(job->ctx, code == REY_ERROR_IO ? code : REY_ERROR_ARGUMENT, "--set %.200s: %s", at.set, message);
+}
+
+rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result) {
+    return result == REY_ERROR_IO ? rey_job_fail_at(job, at, result, "%s", rey_error(job->ctx)) : result;
 }
 
 const char *rey_job_path(Job *job, const char *name) {

@@ -201,7 +201,7 @@ static rey_result load_truth(Fit *fit, rey_scene **out) {
     const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
     rey_result result = path ? rey_mitsuba_load(fit->ctx, path, fit->job.defines, fit->job.define_count, LOAD_SPARE, out)
                              : REY_ERROR_MEMORY;
-    return result ? result : rey_scene_update(*out);
+    return result ? rey_job_named_file(&fit->job, fit->job.truth_at, result) : rey_scene_update(*out);
 }
 
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {
