@@ -151,6 +151,15 @@ static void print_json(const FitResult *result) {
         json_object_end(&json);
     }
     json_array_end(&json);
+    json_array(&json, "held_out");
+    for (size_t i = 0; i < result->held_out.count; i++) {
+        const FitHeldOut *held = &ARRAY_AT(result->held_out, FitHeldOut, i);
+        json_object(&json, NULL);
+        json_integer(&json, "view", held->view);
+        json_number(&json, "psnr", held->psnr);
+        json_object_end(&json);
+    }
+    json_array_end(&json);
     json_string(&json, "output", result->output);
     json_string(&json, "report", result->report);
     json_string(&json, "scene", result->scene);
@@ -170,6 +179,10 @@ static void print_words(const FitResult *result) {
     if (result->nonfinite) {
         cli_note("warning: %lld sample%s not finite and left out of losses and gradients", (long long)result->nonfinite,
                  result->nonfinite == 1 ? " was" : "s were");
+    }
+    for (size_t i = 0; i < result->held_out.count; i++) {
+        const FitHeldOut *held = &ARRAY_AT(result->held_out, FitHeldOut, i);
+        printf("view %d, held out: PSNR %.1f dB\n", held->view, held->psnr);
     }
     if (result->report) {
         printf("report  %s\n", result->report);

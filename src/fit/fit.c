@@ -123,6 +123,9 @@ static rey_result open_fit(Fit *fit) {
     if (!result) {
         result = allocate(fit);
     }
+    if (!result) {
+        result = rey_levels_check_grids(fit);
+    }
     fit->state.history_width = HISTORY_VALUES;
     for (size_t k = 0; k < fit->unknowns.items.count; k++) {
         int64_t count = ARRAY_AT(fit->unknowns.items, Unknown, k).count;
@@ -247,6 +250,7 @@ void rey_fit_result_free(FitResult *result) {
         }
     }
     rey_array_free(result->ctx, &result->rows);
+    rey_array_free(result->ctx, &result->held_out);
     char *texts[] = {result->output, result->report, result->scene, result->note};
     for (int k = 0; k < COUNT_OF(texts); k++) {
         rey_free(result->ctx, texts[k]);

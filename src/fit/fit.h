@@ -37,10 +37,16 @@ typedef struct FitRow { // one unknown, in the final table
     int dims;
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
+    bool grid;                    // of voxels
     int64_t points[COLUMN_COUNT]; // of meshes whose vertices move as a surface, else 0; 0 also where a column has none
     double chamfer[COLUMN_COUNT]; // their mean distances from the truth, over the diagonal of its bounding box
     bool weighted; // mean absolute error over mean, each entry weighted by |d sum(I) / d entry| at the truth
 } FitRow;
+
+typedef struct FitHeldOut { // a view that was not fitted
+    int view;
+    double psnr; // of what the report shows of it [dB]
+} FitHeldOut;
 
 typedef struct FitResult {
     rey_context *ctx;
@@ -51,6 +57,7 @@ typedef struct FitResult {
     int64_t numbers;
     int64_t nonfinite; // samples of this run that were left out because they were not finite; 0 in a healthy fit
     Array rows;                    // FitRow
+    Array held_out;                // FitHeldOut; none without a report
     char *output, *report, *scene; // paths; null = not written
     char *note;                    // why the scene was not written, null = it was
     bool bad_override;             // the fit failed, and what is wrong is an override
@@ -118,9 +125,11 @@ void rey_views_free(Fit *fit);
 
 // Levels (levels.c): whether a view can be reduced as the job says; the pictures and films of a level.
 rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *view);
+// Whether there are grids where levels have a resolution.
+rey_result rey_levels_check_grids(Fit *fit);
 rey_result rey_levels_enter(Fit *fit, int level);
 void rey_levels_reduce(Fit *fit, int r);
-// Remeshes as the level says, and goes on in a scene that holds the new meshes (remesh_level.c).
+// Remeshes and resamples as the level says, and goes on in a scene that holds the new meshes and grids (remesh_level.c).
 rey_result rey_levels_remesh(Fit *fit, int level);
 // The job's scene, or that of a level: see FitState.meshed.
 rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);

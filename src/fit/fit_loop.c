@@ -22,16 +22,18 @@ static uint32_t mix(uint32_t a, uint32_t b) {
 }
 
 int rey_fit_batches(const Job *job) {
-    return job->views_per_iteration ? (job->view_count + job->views_per_iteration - 1) / job->views_per_iteration : 1;
+    return job->views_per_iteration ? (job->fitted_count + job->views_per_iteration - 1) / job->views_per_iteration : 1;
 }
 
 // The views of one iteration: an epoch goes through all of them in an order of its own, a pure function of the seed,
 // and its last batch may be smaller than the others.
 static int choose_batch(const Fit *fit, int iteration, int *order) {
-    int n = fit->job.view_count, m = fit->job.views_per_iteration ? fit->job.views_per_iteration : n;
+    int n = fit->job.fitted_count, m = fit->job.views_per_iteration ? fit->job.views_per_iteration : n, k = 0;
     int batches = rey_fit_batches(&fit->job), epoch = iteration / batches, first = iteration % batches * m;
-    for (int i = 0; i < n; i++) {
-        order[i] = i;
+    for (int i = 0; i < fit->job.view_count; i++) {
+        if (!fit->job.views[i].held_out) {
+            order[k++] = i;
+        }
     }
     if (m == n) {
         return n;

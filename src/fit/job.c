@@ -15,7 +15,7 @@
 NAMES(rey_loss_name, "l1", "l2", "relative_l2", "log_l2")
 NAMES(rey_optimizer_name, "adam", "sgd", "lbfgs")
 NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
-NAMES(rey_parameterisation_name, "identity", "log", "logit", "rigid", "similarity", "laplacian")
+NAMES(rey_parameterisation_name, "identity", "log", "logit", "softplus", "rigid", "similarity", "laplacian")
 NAMES(rey_moment_name, "per_entry", "shared", "uniform")
 
 // Letters, digits and underscores, the first no digit.
@@ -81,6 +81,7 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
         {.key = "from", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, from), .high = 1e9, .required = true},
         {.key = "edge_length", .type = FIELD_REAL, .offset = offsetof(JobLevel, edge_length), .low = 1e-12, .high = 1e12},
         {.key = "reduce", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, reduce), .low = 1, .high = 1024},
+        {.key = "resolution", .type = FIELD_INTEGER, .offset = offsetof(JobLevel, resolution), .low = 1, .high = 4096},
         {0},
     };
     JobLevel **levels = target;
@@ -99,12 +100,14 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
 }
 
 static rey_result read_views(Job *job, const YamlNode *node, void *target) {
+    static const char *const truths[] = {"false", "true", NULL};
     static const Field fields[] = {
         {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
         {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
         {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
         {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .low = 1e-9, .high = 1e9},
         {.key = "exposure", .type = FIELD_REAL, .offset = offsetof(JobView, exposure), .low = 1e-9, .high = 1e9},
+        {.key = "held_out", .type = FIELD_CHOICE, .offset = offsetof(JobView, held_out), .names = truths},
         {0},
     };
     JobView **views = target;
@@ -121,7 +124,11 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
         if (!result) {
             view->target_at = rey_job_place(rey_yaml_find(entry, "target"));
             view->mask_at = rey_job_place(rey_yaml_find(entry, "mask"));
+            job->fitted_count += !view->held_out;
         }
+    }
+    if (!result && job->fitted_count == 0) {
+        return rey_job_fail(job, node, "views: all are held out, expected at least one to fit");
     }
     return result;
 }
@@ -225,25 +232,43 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     return result;
 }
 
+#define WEIGHT(name, member) {.key = #name, .type = FIELD_REAL, .offset = offsetof(JobParameter, member.name), .high = 1e12}
 static rey_result read_regularisers(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
-        {.key = "laplacian", .type = FIELD_REAL, .offset = offsetof(Regularisers, laplacian), .high = 1e12},
-        {.key = "edge_length", .type = FIELD_REAL, .offset = offsetof(Regularisers, edge_length), .high = 1e12},
-        {.key = "normals", .type = FIELD_REAL, .offset = offsetof(Regularisers, normals), .high = 1e12},
+        WEIGHT(laplacian, regularisers),
+        WEIGHT(edge_length, regularisers),
+        WEIGHT(normals, regularisers),
+        WEIGHT(total_variation, grid_regularisers),
+        WEIGHT(sparsity, grid_regularisers),
         {0},
     };
     return rey_job_read_map(job, node, "regularisers", fields, target);
+}
+#undef WEIGHT
+
+// Those of meshes are for meshes, those of grids for all others.
+static rey_result check_regularisers(Job *job, const YamlNode *node, bool laplacian) {
+    static const char *const of_grids[] = {"total_variation", "sparsity"};
+    const YamlNode *given = rey_yaml_find(node, "regularisers");
+    for (const YamlNode *one = given ? given->child : NULL; one; one = one->next) {
+        bool grid = !strcmp(one->key, of_grids[0]) || !strcmp(one->key, of_grids[1]);
+        if (grid == laplacian) {
+            return rey_job_fail(job, one, laplacian ? "%s is for grids" : "%s is for 'parameterisation: laplacian'", one->key);
+        }
+    }
+    return REY_OK;
 }
 
 // What is said of laplacian alone, and what depends on it.
 static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter *p) {
     bool laplacian = p->parameterisation == PARAMETERISATION_LAPLACIAN;
-    for (int i = 0; i < 2 && !laplacian; i++) {
-        const char *key = i ? "smoothness" : "regularisers";
-        const YamlNode *given = rey_yaml_find(node, key);
-        if (given) {
-            return rey_job_fail(job, given, "%s is for 'parameterisation: laplacian'", key);
-        }
+    const YamlNode *given = rey_yaml_find(node, "smoothness");
+    if (given && !laplacian) {
+        return rey_job_fail(job, given, "smoothness is for 'parameterisation: laplacian'");
+    }
+    rey_result result = check_regularisers(job, node, laplacian);
+    if (result) {
+        return result;
     }
     if (laplacian && !isnan(p->bounds[0])) {
         return rey_job_fail(job, rey_yaml_find(node, "bounds"), "parameterisation laplacian has no bounds");
@@ -275,7 +300,6 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
         {.key = "smoothness", .type = FIELD_REAL, .offset = offsetof(JobParameter, smoothness), .high = 1e9},
         {.key = "regularisers",
          .type = FIELD_READER,
-         .offset = offsetof(JobParameter, regularisers),
          .read = read_regularisers},
         {0},
     };
@@ -411,7 +435,7 @@ static rey_result check_lbfgs(Job *job) {
     if (job->optimizer.average > 0) {
         return rey_job_fail(job, node, "lbfgs ends at its best point: it has no average");
     }
-    if (job->views_per_iteration && job->views_per_iteration != job->view_count) {
+    if (job->views_per_iteration && job->views_per_iteration != job->fitted_count) {
         return rey_job_fail(job, node, "lbfgs needs all views in every iteration");
     }
     return REY_OK;
@@ -446,10 +470,11 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     if (!result && job->optimizer.kind == OPTIMIZER_LBFGS) {
         result = check_lbfgs(job);
     }
-    if (!result && job->views_per_iteration > job->view_count) {
+    if (!result && job->views_per_iteration > job->fitted_count) {
         result = rey_job_fail(job, rey_yaml_find(job->tree, "views_per_iteration"),
-                         "views_per_iteration = %d, but the job has %d view%s", job->views_per_iteration,
-                         job->view_count, PLURAL(job->view_count));
+                         "views_per_iteration = %d, but the job has %d view%s%s", job->views_per_iteration,
+                         job->fitted_count, PLURAL(job->fitted_count),
+                         job->fitted_count < job->view_count ? " that are not held out" : "");
     }
     return result;
 }

@@ -1,6 +1,7 @@
 // job.h: what a fit job file says.
 #pragma once
 
+#include "fit/voxels.h"
 #include "fit/vertices.h"
 #include "fit/yaml.h"
 
@@ -17,6 +18,7 @@ typedef enum Parameterisation {
     PARAMETERISATION_IDENTITY,
     PARAMETERISATION_LOG,
     PARAMETERISATION_LOGIT,
+    PARAMETERISATION_SOFTPLUS,
     PARAMETERISATION_RIGID, // of poses: a rotation vector and a shift from the start
     PARAMETERISATION_SIMILARITY, // and a scale
     PARAMETERISATION_LAPLACIAN, // of meshes: preconditioned vertices
@@ -35,6 +37,7 @@ typedef struct JobView {
     const char *mask;   // picture file of weights, null = 1 everywhere
     double weight;      // of this view in the loss
     double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
+    int held_out;       // not fitted: the report says how well it is predicted
     JobPlace at, target_at, mask_at;
 } JobView;
 
@@ -46,6 +49,7 @@ typedef struct JobParameter {
     MomentKind moment;
     double smoothness;         // of laplacian: lambda
     Regularisers regularisers; // of laplacian
+    GridRegularisers grid_regularisers; // of the others, which must be grids if any is above 0
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none
@@ -60,6 +64,7 @@ typedef struct JobLevel { // from coarse to fine, from this iteration on
     int from;
     int reduce;         // every picture is so many times smaller in width and height
     double edge_length; // to which meshes are remeshed as it begins [scene units], 0 = they stay
+    int resolution;     // cells along the longest axis that grids are resampled to as it begins, 0 = they stay
 } JobLevel;
 
 typedef struct JobSchedule { // factor of every learning rate at iteration i
@@ -99,6 +104,7 @@ typedef struct Job {
     int level_count;
     JobView *views;
     int view_count;
+    int fitted_count; // of those that are not held out
     LossKind loss;
     double loss_epsilon;
     int terms; // REY_TERM_ bits that gradients may be made of; 0 = all that they need, or none at all

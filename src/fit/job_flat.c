@@ -52,6 +52,12 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
         line_real(t, KEY("regularisers.edge_length"), p->regularisers.edge_length);
         line_real(t, KEY("regularisers.normals"), p->regularisers.normals);
     }
+    if (p->grid_regularisers.total_variation > 0) {
+        line_real(t, KEY("regularisers.total_variation"), p->grid_regularisers.total_variation);
+    }
+    if (p->grid_regularisers.sparsity > 0) {
+        line_real(t, KEY("regularisers.sparsity"), p->grid_regularisers.sparsity);
+    }
     if (p->start_file) {
         line_text(t, KEY("start"), p->start_file);
     } else if (p->start_count == 1) {
@@ -104,8 +110,12 @@ static void flat_views(Text *t, const Job *job) {
             snprintf(key, sizeof key, "views.%d.mask", i);
             line_text(t, key, v->mask);
         }
+        if (v->held_out) {
+            snprintf(key, sizeof key, "views.%d.held_out", i);
+            line_text(t, key, "true");
+        }
     }
-    line_integer(t, "views_per_iteration", job->views_per_iteration ? job->views_per_iteration : job->view_count);
+    line_integer(t, "views_per_iteration", job->views_per_iteration ? job->views_per_iteration : job->fitted_count);
 }
 
 static void flat_terms(Text *t, int terms) {
@@ -145,6 +155,10 @@ static void flat_decisive(Text *t, const Job *job) {
         if (job->levels[i].edge_length > 0) {
             snprintf(key, sizeof key, "levels.%d.edge_length", i);
             line_real(t, key, job->levels[i].edge_length);
+        }
+        if (job->levels[i].resolution > 0) {
+            snprintf(key, sizeof key, "levels.%d.resolution", i);
+            line_integer(t, key, job->levels[i].resolution);
         }
     }
     flat_views(t, job);

@@ -30,6 +30,30 @@ rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *vi
     return REY_OK;
 }
 
+rey_result rey_levels_check_grids(Fit *fit) {
+    bool grids = false, levels = false;
+    for (int i = 0; i < fit->job.level_count; i++) {
+        levels = levels || fit->job.levels[i].resolution > 0;
+    }
+    for (size_t k = 0; k < fit->unknowns.items.count && levels; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        grids = grids || p->grid.nx;
+        for (int i = -1; i < fit->job.level_count && p->grid.nx; i++) {
+            int resolution = i < 0 ? 0 : fit->job.levels[i].resolution;
+            int64_t count = rey_voxels_count(resolution > 0 ? rey_voxels_resized(p->grid, resolution) : p->grid);
+            if (count <= HISTORY_LARGEST || count > INT32_MAX) {
+                return rey_fail(fit->ctx, REY_ERROR_ARGUMENT,
+                                "%s: levels with a 'resolution' make %s a grid of %lld numbers, expected %d or more",
+                                fit->job.path, p->name, (long long)count, HISTORY_LARGEST + 1);
+            }
+        }
+    }
+    return grids || !levels ? REY_OK
+                            : rey_fail(fit->ctx, REY_ERROR_ARGUMENT,
+                                       "%s: levels have a 'resolution', which is for grids, and the job has none",
+                                       fit->job.path);
+}
+
 // One pixel of a reduced view from r x r of the full one, from (x, y) on.
 static void reduce_pixel(const FitView *view, int x, int y, int r, float *target, float *mask) {
     double sum[3] = {0, 0, 0}, weight = 0;
@@ -94,7 +118,7 @@ void rey_levels_reduce(Fit *fit, int r) {
 rey_result rey_levels_enter(Fit *fit, int level) {
     const JobLevel *l = fit->job.level_count ? &fit->job.levels[level] : NULL;
     rey_result result = REY_OK;
-    if (l && l->edge_length > 0 && fit->state.meshed != level + 1) {
+    if (l && (l->edge_length > 0 || l->resolution > 0) && fit->state.meshed != level + 1) {
         rey_levels_reduce(fit, 1);
         result = rey_levels_remesh(fit, level);
     }

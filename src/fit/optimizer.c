@@ -9,6 +9,7 @@
 
 static const double PI_VALUE = 3.14159265358979323846;
 static const double LOGIT_MARGIN = 1e-6; // values stay this far, as a share of the range, inside their bounds
+static const double SOFTPLUS_FLOOR = 1e-6; // and so far above the lower one, where the variable would be infinite
 
 static bool is_pose(const Unknown *p) {
     return p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
@@ -20,6 +21,8 @@ static double to_value(const Unknown *p, double u) {
         return exp(u);
     case PARAMETERISATION_LOGIT:
         return p->low + (p->high - p->low) / (1 + exp(-u));
+    case PARAMETERISATION_SOFTPLUS:
+        return p->low + fmax(u, 0) + log1p(exp(-fabs(u)));
     default:
         return u;
     }
@@ -33,6 +36,9 @@ static double to_variable(const Unknown *p, double x) {
     case PARAMETERISATION_LOGIT:
         s = fmin(fmax((x - p->low) / (p->high - p->low), LOGIT_MARGIN), 1 - LOGIT_MARGIN);
         return log(s / (1 - s));
+    case PARAMETERISATION_SOFTPLUS: // log(e^x - 1)
+        s = fmax(x - p->low, SOFTPLUS_FLOOR);
+        return s + log(-expm1(-s));
     default:
         return x;
     }
@@ -47,6 +53,8 @@ static double value_derivative(const Unknown *p, double u) {
     case PARAMETERISATION_LOGIT:
         s = 1 / (1 + exp(-u));
         return (p->high - p->low) * s * (1 - s);
+    case PARAMETERISATION_SOFTPLUS:
+        return 1 / (1 + exp(-u));
     default:
         return 1;
     }
@@ -181,6 +189,9 @@ double rey_unknowns_regularise(Unknowns *u) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
         if (p->vertices) {
             sum += rey_vertices_regularise(p->vertices, u->value + p->offset, u->gradient + p->offset);
+        }
+        if (p->grid.nx) {
+            sum += rey_voxels_regularise(p->grid, p->regularisers, u->value + p->offset, u->gradient + p->offset);
         }
     }
     return sum;

@@ -15,6 +15,8 @@ typedef struct Unknown { // one parameter of the scene, or of a view
     Parameterisation parameterisation;
     MomentKind moment;
     Vertices *vertices; // of laplacian, owned; else null
+    GridSize grid;      // of grids, else all 0
+    GridRegularisers regularisers;
 } Unknown;
 
 typedef struct Unknowns {

@@ -1,5 +1,5 @@
-// remesh_level.c: levels with meshes of another fineness. What the scene's arrays hold cannot grow: the scene is saved with the
-// new meshes, and the fit goes on in what that file loads as; a resumed fit begins there.
+// remesh_level.c: levels with meshes and grids of another fineness. What the scene's arrays hold cannot grow: the scene is saved
+// with the new ones, and the fit goes on in what that file loads as; a resumed fit begins there.
 #include "fit/fit.h"
 #include "fit/remesh.h"
 #include "io/mitsuba.h"
@@ -63,12 +63,31 @@ static rey_result remesh_all(Fit *fit, double edge_length, Array *meshes) {
     return result;
 }
 
-// What the unknowns of the new scene share with those of the old one; vertices begin anew.
+static rey_result resample_all(Fit *fit, int resolution, Array *grids) {
+    for (size_t k = 0; k < fit->unknowns.items.count; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        if (!p->grid.nx) {
+            continue;
+        }
+        int32_t volume = fit->scene->view.textures[ARRAY_AT(fit->scene->params, Param, p->param).texture].volume;
+        GridSize size = rey_voxels_resized(p->grid, resolution);
+        SavedGrid *saved = rey_array_push(fit->ctx, grids, sizeof *saved, 1);
+        float *values = saved ? rey_alloc_array(fit->ctx, (size_t)rey_voxels_count(size), sizeof *values) : NULL;
+        if (!values) {
+            return REY_ERROR_MEMORY;
+        }
+        *saved = (SavedGrid){volume, size.nx, size.ny, size.nz, values};
+        rey_voxels_resample(p->grid, fit->scene->view.volumes[volume].wrap, fit->unknowns.value + p->offset, size, values);
+    }
+    return REY_OK;
+}
+
+// What the unknowns of the new scene share with those of the old one; vertices, and voxels of another number, begin anew.
 static void take_state(const Unknowns *from, Unknowns *to) {
     for (size_t k = 0; k < to->items.count; k++) {
         const Unknown *a = &ARRAY_AT(from->items, Unknown, k), *b = &ARRAY_AT(to->items, Unknown, k);
         size_t n = (size_t)b->count;
-        if (b->vertices) {
+        if (b->vertices || a->count != b->count) {
             for (int64_t i = b->offset; i < b->offset + b->count; i++) {
                 to->average[i] = (double)to->value[i];
             }
@@ -112,11 +131,19 @@ static rey_result change_scene(Fit *fit, int level) {
 }
 
 rey_result rey_levels_remesh(Fit *fit, int level) {
-    Array meshes = {0};
+    const JobLevel *l = &fit->job.levels[level];
+    Array meshes = {0}, grids = {0};
     char *path = level_path(fit, level);
-    rey_result result = path ? remesh_all(fit, fit->job.levels[level].edge_length, &meshes) : REY_ERROR_MEMORY;
+    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
+    if (!result && l->edge_length > 0) {
+        result = remesh_all(fit, l->edge_length, &meshes);
+    }
+    if (!result && l->resolution > 0) {
+        result = resample_all(fit, l->resolution, &grids);
+    }
     if (!result) {
-        result = rey_mitsuba_save_meshes(fit->scene, path, meshes.data, (int)meshes.count);
+        result = rey_mitsuba_save_parts(fit->scene, path,
+                                        (SavedParts){meshes.data, (int)meshes.count, grids.data, (int)grids.count});
     }
     if (!result) {
         result = change_scene(fit, level);
@@ -124,7 +151,11 @@ rey_result rey_levels_remesh(Fit *fit, int level) {
     for (size_t i = 0; i < meshes.count; i++) {
         rey_mesh_free(fit->ctx, &ARRAY_AT(meshes, SavedMesh, i).mesh);
     }
+    for (size_t i = 0; i < grids.count; i++) {
+        rey_free(fit->ctx, ARRAY_AT(grids, SavedGrid, i).values);
+    }
     rey_array_free(fit->ctx, &meshes);
+    rey_array_free(fit->ctx, &grids);
     rey_free(fit->ctx, path);
     return result;
 }

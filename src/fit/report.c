@@ -29,11 +29,11 @@ static void put_head(Fit *fit, const FitResult *out, Text *html) {
     rey_text_add(html, ".</p>\n");
 }
 
-static rey_result put_page(Fit *fit, const FitResult *out, Text *html) {
+static rey_result put_page(Fit *fit, FitResult *out, Text *html) {
     put_head(fit, out, html);
     rey_text_add(html, "<h2>Views</h2>\n");
     rey_text_bytes(html, rey_report_controls, strlen(rey_report_controls));
-    rey_result result = rey_report_views(fit, html);
+    rey_result result = rey_report_views(fit, out, html);
     if (!result) {
         result = rey_report_textures(fit, out, html);
     }

@@ -5,7 +5,7 @@
 #include "fit/text.h"
 
 // The pictures of every view: target, start, result, difference, and those on the way. Leaves the scene at the result.
-rey_result rey_report_views(Fit *fit, Text *html);
+rey_result rey_report_views(Fit *fit, FitResult *out, Text *html);
 // Textures and environment maps: truth, start, found, difference.
 rey_result rey_report_textures(Fit *fit, const FitResult *out, Text *html);
 

@@ -20,6 +20,33 @@ static double relative_error(const FitView *view, const float *image) {
     return all > 0 ? sqrt(off / all) : 0;
 }
 
+// Of a view that was held out: 10 log10 (largest number of the target)^2 / mean (I - R)^2, behind the mask [dB].
+static double peak_to_noise(const FitView *view, const float *image) {
+    double off = 0, weights = 0, largest = 0;
+    for (int64_t i = 0; i < (int64_t)view->width * view->height * 3; i++) {
+        double weight = view->mask ? (double)view->mask[i / 3] : 1;
+        if (weight > 0) {
+            double r = (double)view->target[i], d = (double)image[i] - r;
+            off += weight * d * d;
+            weights += weight;
+            largest = fmax(largest, r);
+        }
+    }
+    return weights > 0 && largest > 0 && off > 0 ? 10 * log10(largest * largest * weights / off) : 0;
+}
+
+static rey_result add_held_out(Fit *fit, int view, const float *image, FitResult *out) {
+    if (!fit->job.views[view].held_out) {
+        return REY_OK;
+    }
+    FitHeldOut *held = rey_array_push(fit->ctx, &out->held_out, sizeof *held, 1);
+    if (!held) {
+        return REY_ERROR_MEMORY;
+    }
+    *held = (FitHeldOut){view, peak_to_noise(&fit->views[view], image)};
+    return REY_OK;
+}
+
 static void comparison(Text *html, int view) {
     static const char *const names[] = {"target", "start", "result", "difference"};
     rey_text_add(html,
@@ -86,9 +113,10 @@ static rey_result strip(Fit *fit, int index, float exposure, const float *start,
 static rey_result view_section(Fit *fit, int index, const float *start, const float *found, Text *html) {
     const FitView *view = &fit->views[index];
     float exposure = rey_report_exposure(fit->ctx, view->target, (int64_t)view->width * view->height);
-    char caption[80];
-    rey_text_add(html, "<section><h3>View %d <span class=\"note\">sensor %d, %d &times; %d", index, view->sensor,
-                 view->width, view->height);
+    char caption[112];
+    bool held_out = fit->job.views[index].held_out;
+    rey_text_add(html, "<section><h3>View %d%s <span class=\"note\">sensor %d, %d &times; %d", index,
+                 held_out ? ", held out" : "", view->sensor, view->width, view->height);
     if (exposure < 1 || exposure > 1) {
         rey_text_add(html, ", shown at exposure &times;%.3g", (double)exposure);
     }
@@ -102,7 +130,10 @@ static rey_result view_section(Fit *fit, int index, const float *start, const fl
         result = rey_report_figure(html, "start", start, view->width, view->height, exposure, caption);
     }
     if (!result) {
-        snprintf(caption, sizeof caption, "result, error %.3g&thinsp;%%", 100 * relative_error(view, found));
+        int used = snprintf(caption, sizeof caption, "result, error %.3g&thinsp;%%", 100 * relative_error(view, found));
+        if (held_out) {
+            snprintf(caption + used, sizeof caption - (size_t)used, ", PSNR %.1f&thinsp;dB", peak_to_noise(view, found));
+        }
         result = rey_report_figure(html, "result", found, view->width, view->height, exposure, caption);
     }
     if (!result) {
@@ -147,7 +178,7 @@ static rey_result render_start(Fit *fit, float *images) {
     return result;
 }
 
-rey_result rey_report_views(Fit *fit, Text *html) {
+rey_result rey_report_views(Fit *fit, FitResult *out, Text *html) {
     int64_t floats = 0;
     for (int v = 0; v < fit->job.view_count; v++) {
         floats += (int64_t)fit->views[v].width * fit->views[v].height * 3;
@@ -163,14 +194,17 @@ rey_result rey_report_views(Fit *fit, Text *html) {
     }
     int64_t at = 0;
     for (int v = 0; v < fit->job.view_count && !result; v++) {
-        result = view_section(fit, v, start + at, found + at, html);
+        result = add_held_out(fit, v, found + at, out);
+        result = result ? result : view_section(fit, v, start + at, found + at, html);
         at += (int64_t)fit->views[v].width * fit->views[v].height * 3;
     }
     rey_text_add(html,
                  "<p class=\"note\">Error of a picture: root of the sum of (I &minus; R)&sup2; over that of R&sup2;, R "
                  "the target, I rendered with %d samples per pixel, whose noise it contains. Differences are means of "
-                 "the channels; their scale ends at the 99.5th percentile.</p>\n",
-                 fit->job.report_spp);
+                 "the channels; their scale ends at the 99.5th percentile.%s</p>\n",
+                 fit->job.report_spp,
+                 out->held_out.count ? " PSNR of views that were not fitted: 10 log<sub>10</sub> of the square of the target's "
+                                       "largest number over the mean of (I &minus; R)&sup2;." : "");
     rey_free(fit->ctx, start);
     rey_free(fit->ctx, found);
     return result;

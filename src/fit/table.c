@@ -20,6 +20,14 @@ static float *copy_floats(rey_context *ctx, const float *values, int64_t count) 
     return copy;
 }
 
+static bool was_resampled(const Fit *fit, const Unknown *p) {
+    bool resampled = false;
+    for (int i = 0; i < fit->state.meshed && p->grid.nx; i++) {
+        resampled = resampled || fit->job.levels[i].resolution > 0;
+    }
+    return resampled;
+}
+
 rey_result rey_fit_table(Fit *fit, FitResult *result) {
     const Unknowns *u = &fit->unknowns;
     for (size_t k = 0; k < u->items.count; k++) {
@@ -33,7 +41,8 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
                         .shape = {p->shape[0], p->shape[1], p->shape[2]},
                         .weighted = p->count > LARGEST_SMALL && !p->vertices};
         row->points[COLUMN_FOUND] = p->vertices ? p->vertices->mesh.point_count : 0;
-        bool other = p->vertices && fit->state.meshed; // the start had other vertices
+        row->grid = p->grid.nx != 0;
+        bool other = fit->state.meshed && (p->vertices || was_resampled(fit, p)); // the start had other vertices or voxels
         row->name = rey_strdup(fit->ctx, p->name);
         row->start = other ? NULL : copy_floats(fit->ctx, u->start + p->offset, p->count);
         row->found = copy_floats(fit->ctx, u->value + p->offset, p->count);

@@ -148,6 +148,17 @@ static rey_result add_vertices(Job *job, const rey_scene *scene, const JobParame
                                &unknown->vertices);
 }
 
+// Whether a parameter is a grid of voxels, and how large.
+static GridSize grid_size(const rey_scene *scene, int param) {
+    int32_t texture = ARRAY_AT(scene->params, Param, param).texture;
+    const TextureNode *t = texture >= 0 ? scene->view.textures + texture : NULL;
+    if (!t || t->kind != TEXTURE_VOLUME) {
+        return (GridSize){0};
+    }
+    const VolumeNode *v = scene->view.volumes + t->volume;
+    return (GridSize){v->nx, v->ny, v->nz, v->channels};
+}
+
 static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index,
                               Array *owners, Unknowns *u) {
     rey_param_info info;
@@ -186,8 +197,13 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
                          .shape = {info.shape[0], info.shape[1], info.shape[2]},
                          .learning_rate = p->learning_rate,
                          .parameterisation = p->parameterisation,
-                         .moment = p->moment};
+                         .moment = p->moment,
+                         .grid = grid_size(scene, param),
+                         .regularisers = p->grid_regularisers};
     u->count += info.count;
+    if (!unknown->grid.nx && (p->grid_regularisers.total_variation > 0 || p->grid_regularisers.sparsity > 0)) {
+        return fail_at(job, p, info.name, "total_variation and sparsity are for grids of voxels");
+    }
     if (p->parameterisation == PARAMETERISATION_LAPLACIAN) {
         result = add_vertices(job, scene, p, unknown);
     }
@@ -226,7 +242,8 @@ static rey_result match_exposures(Job *job, int index, Array *owners, Unknowns *
     for (int v = 0; v < job->view_count && !result; v++) {
         char name[40];
         snprintf(name, sizeof name, "views.%d.exposure", v);
-        if (strncmp(job->parameters[index].name, "views.", 6) || !glob_match(job->parameters[index].name, name)) {
+        if (strncmp(job->parameters[index].name, "views.", 6) || !glob_match(job->parameters[index].name, name) ||
+            job->views[v].held_out) {
             continue;
         }
         char *owned = rey_job_alloc(job, sizeof name, 1);

@@ -124,18 +124,17 @@ static rey_result write_all(Writer *w, const char *path) {
 }
 
 rey_result rey_mitsuba_save(const rey_scene *scene, const char *path) {
-    return rey_mitsuba_save_meshes(scene, path, NULL, 0);
+    return rey_mitsuba_save_parts(scene, path, (SavedParts){0});
 }
 
-rey_result rey_mitsuba_save_meshes(const rey_scene *scene, const char *path, const SavedMesh *meshes, int count) {
+rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, SavedParts parts) {
     char folder[3800], stem[1000];
     const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
     const char *dot = strrchr(file, '.');
     snprintf(stem, sizeof stem, "%.*s_data", (int)(dot ? dot - file : (long)strlen(file)), file);
     snprintf(folder, sizeof folder, "%.*s%s", (int)(file - path), path, stem);
     Writer w = {.ctx = scene->ctx, .scene = scene, .source = scene->document, .folder = folder, .folder_name = stem};
-    w.meshes = meshes;
-    w.mesh_count = count;
+    w.parts = parts;
     rey_result result = write_all(&w, path);
     rey_save_free_files(&w);
     rey_array_free(w.ctx, &w.edits);

@@ -12,4 +12,16 @@ typedef struct SavedMesh {
     int32_t shape;
     rey_mesh mesh;
 } SavedMesh;
-rey_result rey_mitsuba_save_meshes(const rey_scene *scene, const char *path, const SavedMesh *meshes, int count);
+// A grid that takes the place of a volume's, whose values have been set; of its channels.
+typedef struct SavedGrid {
+    int32_t volume;
+    int32_t nx, ny, nz;
+    float *values; // channel fastest, then x, y, z
+} SavedGrid;
+typedef struct SavedParts {
+    const SavedMesh *meshes;
+    int mesh_count;
+    const SavedGrid *grids;
+    int grid_count;
+} SavedParts;
+rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, SavedParts parts);

@@ -328,6 +328,12 @@ static rey_result write_voxels(Writer *w, int depth, int32_t volume) {
     TRY(rey_save_new_file(w, depth, "volume", ".vol", path));
     rey_save_matrix(w, depth, "to_world", theta(w, v->to_world));
     rey_vol vol = {v->nx, v->ny, v->nz, v->channels, {0, 0, 0, 1, 1, 1}, w->scene->view.theta + v->theta};
+    for (int i = 0; i < w->parts.grid_count; i++) {
+        const SavedGrid *grid = &w->parts.grids[i];
+        if (grid->volume == volume) {
+            vol = (rey_vol){grid->nx, grid->ny, grid->nz, v->channels, {0, 0, 0, 1, 1, 1}, grid->values};
+        }
+    }
     return rey_vol_write(w->ctx, path, &vol);
 }
 
@@ -372,9 +378,9 @@ static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     if (shape->normals < 0) {
         rey_save_line(w, depth, "<boolean name=\"face_normals\" value=\"true\"/>");
     }
-    for (int i = 0; i < w->mesh_count; i++) {
-        if (w->meshes[i].shape == shape - view->shapes) {
-            return rey_mesh_write_ply(w->ctx, path, &w->meshes[i].mesh);
+    for (int i = 0; i < w->parts.mesh_count; i++) {
+        if (w->parts.meshes[i].shape == shape - view->shapes) {
+            return rey_mesh_write_ply(w->ctx, path, &w->parts.meshes[i].mesh);
         }
     }
     rey_mesh mesh = {.vertex_count = shape->vertex_count, .face_count = shape->triangle_count};

@@ -39,8 +39,7 @@ typedef struct Writer {
     const char *folder_name; // the same, as the XML names it
     Array files;             // DataFile
     Array edits;             // Edit
-    const SavedMesh *meshes; // in the place of shapes' own
-    int mesh_count;
+    SavedParts parts;        // in the place of the scene's own
     int32_t *first_edit;     // per node: entry of `edits`, -1 = none
     int32_t *texture_sources; // per texture: entry of the source's textures, -1 = none
     Names paths;             // of nodes, by number
