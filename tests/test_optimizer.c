@@ -157,8 +157,112 @@ static void test_lbfgs_keeps_bounds(void **unused) {
     free(state);
 }
 
+/* ---- media --------------------------------------------------------------------------------------------- */
+
+enum { CHANNELS = 3, MEDIUM = 2 * CHANNELS + 1 };
+
+// Some function of extinction, albedo and g, with its gradient.
+static double bowl(const double *x, double *gradient) {
+    double sum = 0;
+    for (int i = 0; i < MEDIUM; i++) {
+        double d = x[i] - 0.2 * i, cross = x[(i + 1) % MEDIUM];
+        sum += 0.5 * d * d + 0.3 * x[i] * cross;
+    }
+    for (int i = 0; i < MEDIUM && gradient; i++) {
+        gradient[i] = x[i] - 0.2 * i + 0.3 * (x[(i + 1) % MEDIUM] + x[(i + MEDIUM - 1) % MEDIUM]);
+    }
+    return sum;
+}
+
+// What scattering's variables say, in double.
+static void medium_of(const Scattering *s, const double *variable, double *x) {
+    double g = s->g < 0 ? s->known_g : tanh(variable[s->g]);
+    for (int i = 0; i < CHANNELS; i++) {
+        double absorption = exp(variable[s->sigma_t + i]), scattering = exp(variable[s->albedo + i]) / (1 - g);
+        x[s->sigma_t + i] = absorption + scattering;
+        x[s->albedo + i] = scattering / (absorption + scattering);
+    }
+    x[2 * CHANNELS] = g;
+}
+
+static void test_scattering(void **unused) {
+    UNUSED(unused);
+    Scattering media[2] = {{.count = CHANNELS, .sigma_t = 0, .albedo = CHANNELS, .g = 2 * CHANNELS},
+                           {.count = CHANNELS, .sigma_t = 0, .albedo = CHANNELS, .g = -1, .known_g = 0.6}};
+    for (int which = 0; which < 2; which++) {
+        const Scattering *s = &media[which];
+        const float value[MEDIUM] = {5, 3, 0.5f, 0.9f, 0.99f, 0.2f, 0.6f};
+        float again[MEDIUM] = {0, 0, 0, 0, 0, 0, 0.6f};
+        double variable[MEDIUM] = {0}, x[MEDIUM], gradient[MEDIUM], scratch[MEDIUM];
+        rey_scattering_begin(s, value, variable);
+        rey_scattering_follow(s, variable, again);
+        for (int i = 0; i < MEDIUM; i++) {
+            assert_float_equal((double)again[i], (double)value[i], 1e-5);
+        }
+        medium_of(s, variable, x);
+        bowl(x, gradient);
+        rey_scattering_gradient(s, variable, gradient);
+        for (int i = 0; i < MEDIUM - which; i++) {
+            const double held = variable[i], step = 1e-5;
+            variable[i] = held + step;
+            medium_of(s, variable, scratch);
+            double more = bowl(scratch, NULL);
+            variable[i] = held - step;
+            medium_of(s, variable, scratch);
+            double less = bowl(scratch, NULL);
+            variable[i] = held;
+            assert_float_equal(gradient[i], (more - less) / (2 * step), 1e-6);
+            assert_true(fabs(gradient[i]) > 1e-3);
+        }
+    }
+}
+
+// Similar media have the same two coefficients.
+static void test_similarity(void **unused) {
+    UNUSED(unused);
+    double a[2], b[2];
+    rey_scattering_coefficients(5, 0.9, 0.8, &a[0], &a[1]);    // sigma_a 0.5, sigma_s 4.5
+    rey_scattering_coefficients(1.4, 0.9 / 1.4, 0, &b[0], &b[1]); // sigma_a 0.5, sigma_s 0.9
+    assert_float_equal(a[0], b[0], 1e-12);
+    assert_float_equal(a[1], b[1], 1e-12);
+}
+
+// Shares stay shares; those that began at 0 come back.
+static void test_simplex(void **unused) {
+    UNUSED(unused);
+    enum { SHARES = 4 };
+    const double truth[SHARES] = {0.1, 0, 0.6, 0.3};
+    for (int kind = 0; kind < OPTIMIZER_LBFGS; kind++) {
+        float start[SHARES] = {2, 4, 0, 2}, value[SHARES];
+        double numbers[5][SHARES] = {{0}};
+        Unknown item = {.count = SHARES, .low = 0, .high = INFINITY, .parameterisation = PARAMETERISATION_SIMPLEX,
+                        .moment = MOMENT_SHARED};
+        Unknowns u = {.items = {&item, 1, 1}, .count = SHARES, .start = start, .value = value, .variable = numbers[0],
+                      .first = numbers[1], .second = numbers[2], .average = numbers[3], .gradient = numbers[4]};
+        JobOptimizer o = {.kind = (OptimizerKind)kind, .learning_rate = kind == OPTIMIZER_ADAM ? 0.1 : 0.5, .beta1 = 0.9, .beta2 = 0.9,
+                          .epsilon = 1e-12, .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 800}};
+        rey_unknowns_begin(&u);
+        assert_float_equal((double)value[1], 0.5, 1e-5);
+        for (int i = 0; i < 800; i++) {
+            double sum = 0;
+            for (int k = 0; k < SHARES; k++) {
+                u.gradient[k] = 2 * ((double)value[k] - truth[k]) + 3; // the 3 is no change
+                sum += (double)value[k];
+            }
+            assert_float_equal(sum, 1, 1e-5);
+            rey_optimizer_step(&o, &u, i, 0);
+        }
+        for (int k = 0; k < SHARES; k++) {
+            assert_float_equal((double)value[k], truth[k], 0.01);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scattering),
+        cmocka_unit_test(test_similarity),
+        cmocka_unit_test(test_simplex),
         cmocka_unit_test(test_optimizers_find_minimum),
         cmocka_unit_test(test_average),
         cmocka_unit_test(test_lbfgs_follows_valley),

@@ -38,6 +38,7 @@ typedef struct FitRow { // one unknown, in the final table
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
     bool grid;                    // of voxels
+    bool derived;                 // from other rows: absorption and reduced scattering of a medium; these rows stand last
     int64_t points[COLUMN_COUNT]; // of meshes whose vertices move as a surface, else 0; 0 also where a column has none
     double chamfer[COLUMN_COUNT]; // their mean distances from the truth, over the diagonal of its bounding box
     bool weighted; // mean absolute error over mean, each entry weighted by |d sum(I) / d entry| at the truth

@@ -15,7 +15,8 @@
 NAMES(rey_loss_name, "l1", "l2", "relative_l2", "log_l2")
 NAMES(rey_optimizer_name, "adam", "sgd", "lbfgs")
 NAMES(rey_schedule_name, "constant", "cosine", "exponential", "step")
-NAMES(rey_parameterisation_name, "identity", "log", "logit", "softplus", "rigid", "similarity", "laplacian")
+NAMES(rey_parameterisation_name, "identity", "log", "logit", "softplus", "rigid", "similarity", "laplacian",
+      "scattering", "simplex")
 NAMES(rey_moment_name, "per_entry", "shared", "uniform")
 
 // Letters, digits and underscores, the first no digit.
@@ -270,16 +271,26 @@ static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter 
     if (result) {
         return result;
     }
-    if (laplacian && !isnan(p->bounds[0])) {
-        return rey_job_fail(job, rey_yaml_find(node, "bounds"), "parameterisation laplacian has no bounds");
+    bool scattering = p->parameterisation == PARAMETERISATION_SCATTERING;
+    bool simplex = p->parameterisation == PARAMETERISATION_SIMPLEX;
+    if ((laplacian || scattering || simplex) && !isnan(p->bounds[0])) {
+        return rey_job_fail(job, rey_yaml_find(node, "bounds"), "parameterisation %s has no bounds",
+                            rey_parameterisation_name((int)p->parameterisation));
+    }
+    if (scattering && (given = rey_yaml_find(node, "start")) != NULL) {
+        return rey_job_fail(job, given, "parameterisation scattering starts with what the scene has");
+    }
+    if (!scattering && (given = rey_yaml_find(node, "g")) != NULL) {
+        return rey_job_fail(job, given, "g is for 'parameterisation: scattering'");
     }
     if (p->moment == MOMENT_COUNT) {
-        p->moment = laplacian ? MOMENT_UNIFORM : MOMENT_PER_ENTRY;
+        p->moment = laplacian ? MOMENT_UNIFORM : simplex ? MOMENT_SHARED : MOMENT_PER_ENTRY;
     }
     return REY_OK;
 }
 
 static rey_result read_parameters(Job *job, const YamlNode *node, void *target) {
+    static const char *const of_g[] = {"free", "known", NULL};
     static const Field fields[] = {
         {.key = "name", .type = FIELD_TEXT, .offset = offsetof(JobParameter, name), .required = true},
         {.key = "learning_rate",
@@ -297,6 +308,7 @@ static rey_result read_parameters(Job *job, const YamlNode *node, void *target) 
          .offset = offsetof(JobParameter, moment),
          .names = rey_moment_name_list},
         {.key = "start", .type = FIELD_READER, .offset = 0, .read = read_start},
+        {.key = "g", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, known_g), .names = of_g},
         {.key = "smoothness", .type = FIELD_REAL, .offset = offsetof(JobParameter, smoothness), .high = 1e9},
         {.key = "regularisers",
          .type = FIELD_READER,
@@ -431,6 +443,11 @@ static rey_result check_lbfgs(Job *job) {
     const YamlNode *node = rey_yaml_find(job->tree, "optimizer");
     if (job->optimizer.schedule.kind != SCHEDULE_CONSTANT) {
         return rey_job_fail(job, node, "lbfgs finds the lengths of its steps by itself: it has no schedule");
+    }
+    for (int i = 0; i < job->parameter_count; i++) {
+        if (job->parameters[i].parameterisation == PARAMETERISATION_SIMPLEX) {
+            return rey_job_fail(job, node, "lbfgs does not move what is on a simplex: adam and sgd do");
+        }
     }
     if (job->optimizer.average > 0) {
         return rey_job_fail(job, node, "lbfgs ends at its best point: it has no average");

@@ -22,6 +22,8 @@ typedef enum Parameterisation {
     PARAMETERISATION_RIGID, // of poses: a rotation vector and a shift from the start
     PARAMETERISATION_SIMILARITY, // and a scale
     PARAMETERISATION_LAPLACIAN, // of meshes: preconditioned vertices
+    PARAMETERISATION_SCATTERING, // of media: absorption, reduced scattering and mean cosine
+    PARAMETERISATION_SIMPLEX, // shares whose sum is 1, multiplied by exponentials of gradients
     PARAMETERISATION_COUNT
 } Parameterisation;
 typedef enum MomentKind { MOMENT_PER_ENTRY, MOMENT_SHARED, MOMENT_UNIFORM, MOMENT_COUNT } MomentKind;
@@ -50,6 +52,7 @@ typedef struct JobParameter {
     double smoothness;         // of laplacian: lambda
     Regularisers regularisers; // of laplacian
     GridRegularisers grid_regularisers; // of the others, which must be grids if any is above 0
+    int known_g;            // of scattering: the mean cosine stays what it is
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none

@@ -58,6 +58,9 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
     if (p->grid_regularisers.sparsity > 0) {
         line_real(t, KEY("regularisers.sparsity"), p->grid_regularisers.sparsity);
     }
+    if (p->known_g) {
+        line_text(t, KEY("g"), "known");
+    }
     if (p->start_file) {
         line_text(t, KEY("start"), p->start_file);
     } else if (p->start_count == 1) {

@@ -9,10 +9,20 @@
 
 static const double PI_VALUE = 3.14159265358979323846;
 static const double LOGIT_MARGIN = 1e-6; // values stay this far, as a share of the range, inside their bounds
+static const double SHARE_FLOOR = 1e-6; // least share of a simplex
 static const double SOFTPLUS_FLOOR = 1e-6; // and so far above the lower one, where the variable would be infinite
 
 static bool is_pose(const Unknown *p) {
     return p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
+}
+
+static bool is_medium(const Unknown *p) {
+    return p->parameterisation == PARAMETERISATION_SCATTERING;
+}
+
+// Whose numbers are no functions of a variable each.
+static bool moves_together(const Unknown *p) {
+    return is_pose(p) || p->vertices || is_medium(p) || p->parameterisation == PARAMETERISATION_SIMPLEX;
 }
 
 static double to_value(const Unknown *p, double u) {
@@ -72,6 +82,46 @@ static float round_inside(const Unknown *p, double x) {
     return f;
 }
 
+// Shares with the sum 1; variables are their logarithms.
+static void simplex_begin(const Unknown *p, float *start, double *variable, float *value) {
+    double sum = 0;
+    for (int64_t i = 0; i < p->count; i++) {
+        sum += fmax((double)start[i], SHARE_FLOOR);
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        double share = fmax((double)start[i], SHARE_FLOOR) / sum;
+        variable[i] = log(share);
+        start[i] = value[i] = (float)share;
+    }
+}
+
+static void simplex_follow(const Unknown *p, double *variable, float *value) {
+    double most = variable[0], sum = 0;
+    for (int64_t i = 1; i < p->count; i++) {
+        most = fmax(most, variable[i]);
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        sum += exp(variable[i] - most);
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        variable[i] = fmax(variable[i] - most - log(sum), log(SHARE_FLOOR));
+        value[i] = (float)exp(variable[i]);
+    }
+}
+
+// Exponentiated gradient [kivinen1997]: w_i is multiplied by exp(-rate g_i), without the derivative of w_i, which would hold small
+// shares where they are. What all shares have in common is no change.
+static void simplex_gradient(const Unknown *p, const float *value, double *g) {
+    double mean = 0, sum = 0;
+    for (int64_t i = 0; i < p->count; i++) {
+        mean += (double)value[i] * g[i];
+        sum += (double)value[i];
+    }
+    for (int64_t i = 0; i < p->count; i++) {
+        g[i] -= mean / sum;
+    }
+}
+
 void rey_unknowns_begin(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
@@ -79,15 +129,20 @@ void rey_unknowns_begin(Unknowns *u) {
             rey_vertices_begin(p->vertices, u->start + p->offset, u->variable + p->offset);
             memcpy(u->value + p->offset, u->start + p->offset, (size_t)p->count * sizeof *u->value);
         }
-        for (int64_t i = p->offset; i < p->offset + p->count && !p->vertices; i++) {
-            if (is_pose(p)) {
-                u->variable[i] = 0;
-                u->value[i] = u->start[i];
-                continue;
-            }
+        if (p->parameterisation == PARAMETERISATION_SIMPLEX) {
+            simplex_begin(p, u->start + p->offset, u->variable + p->offset, u->value + p->offset);
+        }
+        for (int64_t i = p->offset; i < p->offset + p->count && !moves_together(p); i++) {
             u->variable[i] = to_variable(p, fmin(fmax((double)u->start[i], p->low), p->high));
             u->start[i] = u->value[i] = round_inside(p, to_value(p, u->variable[i]));
         }
+        for (int64_t i = p->offset; i < p->offset + p->count && (is_pose(p) || is_medium(p)); i++) {
+            u->variable[i] = 0;
+            u->value[i] = u->start[i];
+        }
+    }
+    for (size_t k = 0; k < u->media.count; k++) {
+        rey_scattering_begin(&ARRAY_AT(u->media, Scattering, k), u->value, u->variable);
     }
 }
 
@@ -156,6 +211,9 @@ static double to_variable_gradient(const Unknowns *u, const Unknown *p, double *
     if (p->vertices) {
         rey_vertices_gradient(p->vertices, g);
     }
+    if (p->parameterisation == PARAMETERISATION_SIMPLEX) {
+        simplex_gradient(p, u->value + p->offset, g);
+    }
     for (int64_t i = 0; i < p->count; i++) {
         g[i] *= value_derivative(p, u->variable[p->offset + i]);
         square += g[i] * g[i];
@@ -172,6 +230,13 @@ static void follow_variables(Unknowns *u, const Unknown *p) {
     }
     if (p->vertices) {
         rey_vertices_follow(p->vertices, variable, u->value + p->offset);
+        return;
+    }
+    if (p->parameterisation == PARAMETERISATION_SIMPLEX) {
+        simplex_follow(p, variable, u->value + p->offset);
+        return;
+    }
+    if (is_medium(p)) {
         return;
     }
     for (int64_t i = 0; i < p->count; i++) {
@@ -216,13 +281,16 @@ static void follow_all(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         follow_variables(u, &ARRAY_AT(u->items, Unknown, k));
     }
+    for (size_t k = 0; k < u->media.count; k++) {
+        rey_scattering_follow(&ARRAY_AT(u->media, Scattering, k), u->variable, u->value);
+    }
 }
 
 // Entries that lie on a bound which the gradient pushes against do not take part.
 static void hold_bounds(Unknowns *u) {
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
-        for (int64_t i = p->offset; i < p->offset + p->count && !is_pose(p) && !p->vertices; i++) {
+        for (int64_t i = p->offset; i < p->offset + p->count && !moves_together(p); i++) {
             double x = (double)u->value[i], g = u->gradient[i];
             if ((g > 0 && x <= p->low) || (g < 0 && x >= p->high)) {
                 u->gradient[i] = 0;
@@ -253,6 +321,9 @@ void rey_optimizer_restart(const JobOptimizer *o, Unknowns *u) {
 
 double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration, double loss) {
     double factor = rey_schedule_factor(&o->schedule, iteration), norm = 0;
+    for (size_t k = 0; k < u->media.count; k++) {
+        rey_scattering_gradient(&ARRAY_AT(u->media, Scattering, k), u->variable, u->gradient);
+    }
     for (size_t k = 0; k < u->items.count; k++) {
         const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
         double *variable = u->variable + p->offset, *g = u->gradient + p->offset;

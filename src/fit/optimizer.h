@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/job.h"
+#include "fit/scattering.h"
 
 typedef struct Unknown { // one parameter of the scene, or of a view
     int param;           // its index; -1 = the exposure of a view
@@ -22,6 +23,7 @@ typedef struct Unknown { // one parameter of the scene, or of a view
 typedef struct Unknowns {
     rey_context *ctx;
     Array items;            // Unknown
+    Array media;            // Scattering: of those whose parameterisation it is
     int *params;            // indices of those that are the scene's, for rey_selection
     int param_count;
     int64_t count;          // numbers in all

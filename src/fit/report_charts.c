@@ -236,7 +236,7 @@ void rey_report_histories(const Fit *fit, const FitResult *out, Text *html) {
     rey_text_add(html, "<div class=\"charts\">");
     for (size_t i = 0; i < out->rows.count; i++) {
         const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
-        if (row->count > HISTORY_LARGEST) {
+        if (row->count > HISTORY_LARGEST || row->derived) {
             continue;
         }
         Chart chart = {

@@ -66,7 +66,7 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
     } else {
         rey_text_add(html, "<td class=\"n\">&ndash;</td><td>");
     }
-    if (row->count <= HISTORY_LARGEST) {
+    if (row->count <= HISTORY_LARGEST && !row->derived) {
         rey_report_sparkline(fit, column, row->count, row->truth, html);
     }
     rey_text_add(html, "</td></tr>\n");

@@ -28,6 +28,43 @@ static bool was_resampled(const Fit *fit, const Unknown *p) {
     return resampled;
 }
 
+enum { ABSORPTION, REDUCED, MEDIUM_ROWS };
+static const char *const medium_rows[MEDIUM_ROWS] = {"sigma_a", "reduced_sigma_s"};
+
+// One of the two from all numbers of the unknowns; null when there is no memory.
+static float *medium_values(rey_context *ctx, const Scattering *s, const float *values, int which) {
+    float *out = rey_alloc_array(ctx, (size_t)s->count, sizeof *out);
+    double g = s->g < 0 ? s->known_g : (double)values[s->g];
+    for (int64_t i = 0; i < s->count && out; i++) {
+        double coefficients[MEDIUM_ROWS];
+        rey_scattering_coefficients((double)values[s->sigma_t + i], (double)values[s->albedo + i], g, &coefficients[ABSORPTION],
+                                    &coefficients[REDUCED]);
+        out[i] = (float)coefficients[which];
+    }
+    return out;
+}
+
+static rey_result add_medium(Fit *fit, const Scattering *s, FitResult *result) {
+    const Unknowns *u = &fit->unknowns;
+    for (int which = 0; which < MEDIUM_ROWS; which++) {
+        FitRow *row = rey_array_push(fit->ctx, &result->rows, sizeof *row, 1);
+        size_t size = strlen(s->name) + 32;
+        if (!row) {
+            return REY_ERROR_MEMORY;
+        }
+        *row = (FitRow){.name = rey_alloc(fit->ctx, size), .count = s->count, .derived = true};
+        if (row->name) {
+            snprintf(row->name, size, "%s.%s", s->name, medium_rows[which]);
+        }
+        row->start = medium_values(fit->ctx, s, u->start, which);
+        row->found = medium_values(fit->ctx, s, u->value, which);
+        if (!row->name || !row->start || !row->found) {
+            return REY_ERROR_MEMORY;
+        }
+    }
+    return REY_OK;
+}
+
 rey_result rey_fit_table(Fit *fit, FitResult *result) {
     const Unknowns *u = &fit->unknowns;
     for (size_t k = 0; k < u->items.count; k++) {
@@ -50,7 +87,12 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
             return REY_ERROR_MEMORY;
         }
     }
-    return REY_OK;
+    rey_result added = REY_OK;
+    for (size_t k = 0; k < u->media.count && !added; k++) {
+        const Scattering *s = &ARRAY_AT(u->media, Scattering, k);
+        added = s->count <= LARGEST_SMALL ? add_medium(fit, s, result) : REY_OK;
+    }
+    return added;
 }
 
 // Adds the views' |d sum(I) / d entry|, entry by entry of the row's parameter, to weights.
@@ -162,9 +204,48 @@ static rey_result judge_mesh(Fit *fit, rey_scene *truth, FitRow *row) {
     return result;
 }
 
+static const float *values_of(const rey_scene *scene, const char *medium, const char *ending, int64_t count) {
+    char name[1024];
+    rey_param_info info;
+    snprintf(name, sizeof name, "%s.%s", medium, ending);
+    int param = rey_param_find(scene, name);
+    return param < 0 || rey_param_get_info(scene, param, &info) || info.count != count ? NULL : rey_param_values(scene, param);
+}
+
+// The truth of a row that follows from others; none where the truth has another number of coefficients.
+static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
+    for (size_t k = 0; k < fit->unknowns.media.count; k++) {
+        const Scattering *s = &ARRAY_AT(fit->unknowns.media, Scattering, k);
+        size_t length = strlen(s->name);
+        const float *sigma_t = values_of(truth, s->name, "sigma_t.value.value", row->count);
+        const float *albedo = values_of(truth, s->name, "albedo.value.value", row->count);
+        const float *g = values_of(truth, s->name, "phase_function.g.value", 1);
+        if (strncmp(row->name, s->name, length) || row->name[length] != '.' || !sigma_t || !albedo) {
+            continue;
+        }
+        int which = !strcmp(row->name + length + 1, medium_rows[REDUCED]);
+        row->truth = rey_alloc_array(fit->ctx, (size_t)row->count, sizeof *row->truth);
+        if (!row->truth) {
+            return REY_ERROR_MEMORY;
+        }
+        for (int64_t i = 0; i < row->count; i++) {
+            double coefficients[MEDIUM_ROWS];
+            rey_scattering_coefficients((double)sigma_t[i], (double)albedo[i], g ? (double)*g : 0, &coefficients[ABSORPTION],
+                                        &coefficients[REDUCED]);
+            row->truth[i] = (float)coefficients[which];
+        }
+        row->error = worst_error(row);
+        return REY_OK;
+    }
+    return REY_OK;
+}
+
 static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRow *row) {
     int param = rey_param_find(truth, row->name); // none of an exposure's name
     rey_param_info info;
+    if (row->derived) {
+        return judge_derived(fit, truth, row);
+    }
     if (row->points[COLUMN_FOUND]) {
         return judge_mesh(fit, truth, row);
     }

@@ -172,6 +172,9 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (!info.terms || !enough) {
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
+    if (p->parameterisation == PARAMETERISATION_SIMPLEX && info.count < 2) {
+        return fail_at(job, p, info.name, "parameterisation simplex is for two or more shares");
+    }
     bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
     if (pose && info.count != RIGID_VALUES) {
         return fail_at(job, p, info.name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
@@ -253,8 +256,63 @@ static rey_result match_exposures(Job *job, int index, Array *owners, Unknowns *
     return result;
 }
 
+// What a medium's parameter is to scattering.
+enum { SCATTERING_SIGMA_T, SCATTERING_ALBEDO, SCATTERING_G, SCATTERING_ROLES };
+static int scattering_role(const char *medium, const char *name) {
+    size_t length = strlen(medium);
+    if (strncmp(name, medium, length) || name[length] != '.') {
+        return -1;
+    }
+    static const char *const endings[][SCATTERING_ROLES] = {{"sigma_t.value.value", "albedo.value.value", "phase_function.g.value"},
+                                                            {"sigma_t.data", "albedo.data", "phase_function.g.value"}};
+    for (int i = 0; i < 2 * SCATTERING_ROLES; i++) {
+        if (!strcmp(name + length + 1, endings[i / SCATTERING_ROLES][i % SCATTERING_ROLES])) {
+            return i % SCATTERING_ROLES;
+        }
+    }
+    return -1;
+}
+
+static rey_result match_medium(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
+    const JobParameter *p = &job->parameters[index];
+    int64_t offsets[SCATTERING_ROLES] = {-1, -1, -1}, counts[SCATTERING_ROLES] = {0};
+    Scattering s = {.name = p->name};
+    for (int i = 0; i < rey_param_count(scene); i++) {
+        rey_param_info info;
+        rey_result result = rey_param_get_info(scene, i, &info);
+        int role = result ? -1 : scattering_role(p->name, info.name);
+        if (role == SCATTERING_G && p->known_g) {
+            s.known_g = (double)rey_param_values(scene, i)[0];
+        } else if (role >= 0) {
+            offsets[role] = u->count;
+            counts[role] = info.count;
+            result = add_unknown(job, scene, i, p, index, owners, u);
+        }
+        if (result) {
+            return result;
+        }
+    }
+    if (offsets[SCATTERING_SIGMA_T] < 0 || counts[SCATTERING_SIGMA_T] != counts[SCATTERING_ALBEDO]) {
+        return fail_at(job, p, p->name, "parameterisation scattering is for media, such as NAME.interior_medium, whose "
+                                        "sigma_t and albedo have as many numbers");
+    }
+    s.count = counts[SCATTERING_SIGMA_T];
+    s.sigma_t = offsets[SCATTERING_SIGMA_T];
+    s.albedo = offsets[SCATTERING_ALBEDO];
+    s.g = offsets[SCATTERING_G];
+    Scattering *kept = rey_array_push(job->ctx, &u->media, sizeof *kept, 1);
+    if (!kept) {
+        return REY_ERROR_MEMORY;
+    }
+    *kept = s;
+    return REY_OK;
+}
+
 static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
     const JobParameter *p = &job->parameters[index];
+    if (p->parameterisation == PARAMETERISATION_SCATTERING) {
+        return match_medium(job, scene, index, owners, u);
+    }
     size_t before = u->items.count;
     bool exposures;
     rey_result result = match_exposures(job, index, owners, u, &exposures);
@@ -344,6 +402,7 @@ void rey_unknowns_free(Unknowns *u) {
             rey_vertices_free(u->ctx, ARRAY_AT(u->items, Unknown, i).vertices);
         }
         rey_array_free(u->ctx, &u->items);
+        rey_array_free(u->ctx, &u->media);
         *u = (Unknowns){0};
     }
 }
