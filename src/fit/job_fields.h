@@ -22,6 +22,13 @@ typedef struct Field {
     bool required;
 } Field;
 
+// A table of names, ended by null, and the function that reads it.
+#define NAMES(function, ...)                                                                                           \
+    static const char *const function##_list[] = {__VA_ARGS__, NULL};                                                  \
+    const char *function(int kind) {                                                                                   \
+        return function##_list[kind];                                                                                  \
+    }
+
 // Records a message that starts with the node's file and line.
 rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
 JobPlace rey_job_place(const YamlNode *node); // null: none
@@ -33,3 +40,5 @@ rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node
 rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base);
 // Memory for the entries of a list of at least one.
 rey_result rey_job_open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count);
+// The entries of `parameters` (job_parameters.c); target: JobParameter **.
+rey_result rey_job_read_parameters(Job *job, const YamlNode *node, void *target);

@@ -4,7 +4,7 @@
 #include <math.h>
 
 static const double LEAST = 1e-9;     // coefficients whose logarithm is asked for
-static const double MOST_COSINE = 0.998; // g and -g at most: sigma_s = sigma_s' / (1 - g)
+static const double MOST_COSINE = 0.998; // of g and of -g: sigma_s is sigma_s' over 1 - g
 
 static double cosine_of(const Scattering *s, const double *variable) {
     return s->g < 0 ? s->known_g : fmin(fmax(tanh(variable[s->g]), -MOST_COSINE), MOST_COSINE);
