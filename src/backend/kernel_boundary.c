@@ -27,7 +27,9 @@ static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole,
         int32_t found = primary_find(t, b, pinhole, b->first + at, count, kept, 0);
         half = (found + LANES - 1) / LANES * LANES;
         primary_start(t, b, pinhole, b->first + at, kept, found, half);
+        primary_look(t, b, pinhole, found, half);
         path_forward(t, begin);
+        t->placed = false;
         for (int32_t i = 0; i < found && b->job.mode == MODE_REVERSE; i++) {
             float delta[SPEC_N], x = (float)t->ws.film_x[i], y = (float)t->ws.film_y[i];
             film_worth(t->sensor, filter, b->job.adjoint, x, y, (int32_t)floorf(x), (int32_t)floorf(y), delta);

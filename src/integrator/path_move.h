@@ -73,14 +73,14 @@ KFN Vec3 segment_adj(Vec3 w, Float distance, Vec3 n, Float c, Vec3 dw, Vec3 *dar
 static NOINLINE void surfaces_move_adj(const Tracer *t, const Hit *hit, const SurfaceAdj *d, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t id = scene->shapes[i_lane(hit->shape, m_first(left))].group;
+        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_select(left, hit->shape, i_set(first)), group), i_set(id));
         if (!(t->job->live[id] & LIVE_MOTION)) {
             continue;
         }
         Hit h = *hit;
-        h.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, m_first(mine))));
+        h.shape = i_select(mine, hit->shape, i_set(first));
         h.prim = i_select(mine, hit->prim, i_set(0));
         h.instance = i_select(mine, hit->instance, i_set(0));
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
@@ -96,9 +96,9 @@ KFN void points_move_adj(const Tracer *t, const Hit *hit, Vec3 dp, Vec3 darea, S
     surfaces_move_adj(t, hit, &d, sink, m);
 }
 
-// The hit of a light sample: its point, and of meshes the barycentrics there.
-KFN Hit light_hit(const SceneView *scene, Int shape, Int prim, Vec3 p, Vec3 *n) {
-    Hit hit = {shape, prim, f_set(0), f_set(0), p, i_set(0)};
+// A point of a surface, such as a light sample, as a hit: of meshes with the barycentrics there.
+KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec3 p, Vec3 *n) {
+    Hit hit = {shape, prim, f_set(0), f_set(0), p, instance};
     *n = v3_zero();
     hit.shape = i_max(shape, i_set(0));
     for (Mask left = mi_lt(i_set(-1), shape), mine; m_any(left); left = left & ~mine) {
@@ -108,8 +108,10 @@ KFN Hit light_hit(const SceneView *scene, Int shape, Int prim, Vec3 p, Vec3 *n) 
         Hit h = hit;
         h.shape = i_select(mine, shape, i_set(first));
         h.prim = i_select(mine, prim, i_set(0));
+        h.instance = i_select(mine, instance, i_set(0));
         if (group->shape_kind == SHAPE_MESH) {
-            Interaction corner = mesh_interaction(scene, 0, &h); // dp_du and dp_dv are the edges
+            // dp_du and dp_dv are the edges
+            Interaction corner = mesh_interaction(scene, group->shape_flags & SHAPE_INSTANCED, &h);
             Vec3 q = v3_sub(p, corner.p), cross = v3_cross(corner.dp_du, corner.dp_dv);
             Float r = f_safe_rcp(v3_dot(cross, cross));
             h.u = v3_dot(v3_cross(q, corner.dp_dv), cross) * r;
@@ -131,7 +133,7 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
     if (m_any(attached)) {
         Vec3 n, darea, p = v3_madd(s->si.p, s->light_distance, s->light_d);
         Int prim = i_select(attached, s->light_prim, i_set(0));
-        Hit hit = light_hit(scene, i_select(attached, shape, i_set(-1)), prim, p, &n);
+        Hit hit = point_hit(scene, i_select(attached, shape, i_set(-1)), prim, i_set(0), p, &n);
         Vec3 dr = segment_adj(s->light_d, s->light_distance, n, v->lit, v->light.d, &darea);
         points_move_adj(t, &hit, dr, darea, sink, attached);
         dp = v3_select(attached, v3_neg(dr), dp);

@@ -85,7 +85,7 @@ static rey_result reserve_workspaces(Render *r) {
 // fiftieth as noisy; what happens where normals turn away is smaller than what happens at silhouettes.
 static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
-                                                  [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4};
+                                                  [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -108,8 +108,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     int32_t edge_count = plan->job.edge_count;
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
-                              .fans = r->fans.data, .cdf = plan->cdf,
-                              .edge_count = edge_count,
+                              .fans = r->fans.data, .meetings = r->meetings.data, .cdf = plan->cdf,
+                              .edge_count = edge_count, .round = plan->job.round,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
     plan->job.job.y = r->plan.y;

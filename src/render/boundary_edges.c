@@ -262,6 +262,15 @@ static double see_terminator(const SceneView *view, const Projection *p, const d
     return can_turn(q, n, eye, p->lens) ? see_triangle(p, q) : 0;
 }
 
+static double see_meeting(const Render *r, const Projection *p, EdgeRecord *e) {
+    const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
+    double ends[2][3];
+    for (int k = 0; k < 6; k++) {
+        ends[k / 3][k % 3] = (double)m->ends[k];
+    }
+    return see_line(p, ends[0], ends[1], e);
+}
+
 // A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
 static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
     const float *m = view->theta + view->shapes[e->shape].to_world;
@@ -274,13 +283,33 @@ static double see_round(const SceneView *view, const Projection *p, const EdgeRe
     return fabs(p->scale_x) * 6 * size / distance * (double)(e->last - e->first) + 0.01;
 }
 
-// Whether the selection moves what an edge looks like.
-static bool edge_moves(const Render *r, const EdgeRecord *e) {
+// Whether the selection moves a shape.
+static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
     const PathJob *job = &r->job;
-    const ShapeRecord *shape = r->scene->view.shapes + e->shape;
-    return job->any_camera || job->points_at[e->shape] >= 0 || job->pose_at[e->shape] >= 0 ||
-           (shape->collection >= 0 && job->instance_at[e->instance] >= 0) ||
-           (e->kind == EDGE_TERMINATOR && job->normals_at[e->shape] >= 0);
+    return job->points_at[id] >= 0 || job->pose_at[id] >= 0 ||
+           (r->scene->view.shapes[id].collection >= 0 && job->instance_at[instance] >= 0);
+}
+
+// The same, as the sensor sees it.
+static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
+    const Render *r = render;
+    return r->job.any_camera || shape_moves_itself(r, id, instance);
+}
+
+// Whether it moves what an edge looks like. Meetings were looked for where something moves.
+static bool edge_moves(const Render *r, const EdgeRecord *e) {
+    return e->kind == EDGE_MEETING || moves_on_film(r, e->shape, e->instance) ||
+           (e->kind == EDGE_TERMINATOR && r->job.normals_at[e->shape] >= 0);
+}
+
+// The length of a curve in the world, where what meets there can move.
+static double meeting_weight(const Render *r, const EdgeRecord *e) {
+    const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
+    double length2 = 0;
+    for (int k = 0; k < 3; k++) {
+        length2 += (double)(m->ends[3 + k] - m->ends[k]) * (double)(m->ends[3 + k] - m->ends[k]);
+    }
+    return shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]) ? sqrt(length2) : 0;
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
@@ -303,7 +332,7 @@ static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *
     return REY_OK;
 }
 
-static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, Array *kept, Array *weights) {
+static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool *round, Array *kept, Array *weights) {
     if (!(weight > 0)) {
         return REY_OK;
     }
@@ -314,6 +343,7 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, Array
     }
     *edge = *e;
     *number = (float)weight;
+    *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE;
     return REY_OK;
 }
 
@@ -370,7 +400,7 @@ static Weigher weigher_of(const Render *r, int32_t kind) {
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
     double factor = edge_moves(r, e) ? 1 : w->still;
-    if (factor == 0) {
+    if (factor == 0 || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
     }
     bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;
@@ -378,6 +408,8 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     switch (e->kind) {
+    case EDGE_MEETING:
+        return w->kind == BOUNDARY_PRIMARY ? see_meeting(r, &w->projection, e) : meeting_weight(r, e);
     case EDGE_TERMINATOR:
         return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
     case EDGE_MESH:
@@ -388,6 +420,18 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     }
 }
 
+// Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
+static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
+    rey_result result = r->meetings.count ? REY_OK : rey_meetings_find(r->scene, moves_on_film, r, &r->meetings);
+    for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
+        EdgeRecord e = {.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
+                        .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};
+        double weight = edge_weight(r, w, &e);
+        result = keep_edge(r, &e, weight, &plan->job.round, kept, weights);
+    }
+    return result;
+}
+
 rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
     const Weigher w = weigher_of(r, kind);
     Array kept = {0}, weights = {0};
@@ -395,7 +439,10 @@ rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
     for (size_t i = 0; i < r->edges.count && result == REY_OK; i++) {
         EdgeRecord e = ARRAY_AT(r->edges, EdgeRecord, i);
         double weight = edge_weight(r, &w, &e);
-        result = keep_edge(r, &e, weight, &kept, &weights);
+        result = keep_edge(r, &e, weight, &plan->job.round, &kept, &weights);
+    }
+    if (result == REY_OK && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_MEETING)) {
+        result = keep_meetings(r, &w, plan, &kept, &weights);
     }
     if (result == REY_OK) {
         result = accumulate(r, plan, &kept, &weights);

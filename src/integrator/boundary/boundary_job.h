@@ -3,18 +3,21 @@
 
 #include "integrator/job.h"
 #include "shape/edges.h"
+#include "shape/meetings.h"
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
-// whose geometric normals do (turning.h).
-enum { BOUNDARY_PRIMARY, BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_KINDS };
+// whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h).
+enum { BOUNDARY_PRIMARY, BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_MEETING, BOUNDARY_KINDS };
 
 typedef struct BoundaryJob {
     PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
     int32_t kind;             // BOUNDARY_
     const EdgeRecord *edges;
     const int32_t *fans;      // see EdgeRecord
+    const MeetingRecord *meetings;
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;
+    bool round;               // there are outlines of round surfaces among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
 } BoundaryJob;

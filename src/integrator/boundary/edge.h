@@ -3,6 +3,7 @@
 
 #include "integrator/boundary/boundary_job.h"
 #include "integrator/boundary/facet.h"
+#include "integrator/path_move.h"
 
 // A point x(t) of an edge, attached to its surface.
 typedef struct EdgePoint {
@@ -14,11 +15,18 @@ typedef struct EdgePoint {
     Int fan, fan_count; // see EdgeRecord; 0 where none
     Vec3 origin;        // of a mesh's edge: its first vertex, in its own space
     Mask round;         // which points it has depends on the eye
+    Vec3 inner;         // of round ones: the point beside it whose normal is turned to the eye by OUTLINE_TURN
     Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
     // Where the shading normal n turns away from the viewer, along F = n . view = 0: n, the vector to the viewer, and how far
     // over the surface F rises by 1. Elsewhere 0.
     Vec3 normal, view, rise;
+    Mask meeting;       // where the surface passes through that of the hit `met`; across: the normals of both
+    Hit met;
+    Vec3 across[2];
 } EdgePoint;
+
+// Radians.
+#define OUTLINE_TURN 1e-3f
 
 #define EDGE_FIELD(job, i, field)                                                                                      \
     i_gather((const int32_t *)(job)->edges,                                                                            \
@@ -26,6 +34,13 @@ typedef struct EdgePoint {
 #define EDGE_FLOAT(job, i, field)                                                                                      \
     f_gather((const float *)(job)->edges,                                                                              \
              (i) * (int32_t)(sizeof(EdgeRecord) / 4) + (int32_t)(offsetof(EdgeRecord, field) / 4))
+
+#define MEETING_INT(job, i, field)                                                                                     \
+    i_gather((const int32_t *)(job)->meetings,                                                                         \
+             (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4))
+#define MEETING_FLOAT(job, i, field, k)                                                                                \
+    f_gather((const float *)(job)->meetings,                                                                           \
+             (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4) + (k))
 
 KFN Int edge_choose(const BoundaryJob *b, Float u, Float *probability) {
     Int low = i_set(0), high = i_set(b->edge_count - 1);
@@ -115,6 +130,9 @@ static void edge_of_outline(const SceneView *scene, Float t, Vec3 eye, bool para
     out->p = v3_select(m, v3_add(centre, outwards), out->p);
     out->tangent = v3_select(m, tangent, out->tangent);
     out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
+    Vec3 view = v3_normalize(v3_sub(away, parallel ? v3_zero() : outwards));
+    Vec3 turned = v3_normalize(v3_madd(outwards, OUTLINE_TURN * radius, view));
+    out->inner = v3_select(m, v3_madd(centre, radius, turned), out->inner);
 }
 
 // A side of a cylinder, seen from `eye` or along it: the line at the angle at which the view touches the unit circle.
@@ -138,6 +156,9 @@ static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->tangent = v3_select(m, pose_column(scene, at, 2), out->tangent);
     Vec3 outwards = v3_madd(v3_scale(pose_column(scene, at, 0), cx), cy, pose_column(scene, at, 1));
     out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
+    // The same angle on to the middle of what the eye sees, the direction (x, y).
+    Float nx = cx + OUTLINE_TURN * x * r, ny = cy + OUTLINE_TURN * y * r, unit = f_safe_rcp(f_sqrt(nx * nx + ny * ny));
+    out->inner = v3_select(m, pose_to_world(scene, at, v3(nx * unit, ny * unit, t)), out->inner);
 }
 
 // Where a shading normal is at right angles to the direction to `eye`, or to `eye` itself where the view is parallel.
@@ -165,6 +186,64 @@ static void edge_of_terminator(const SceneView *scene, Float t, Vec3 eye, bool p
     out->probability = f_select(m, f_zero_unless(found, out->probability * (1.0f / 6)), out->probability);
 }
 
+KFN Vec3 meeting_end(const BoundaryJob *b, Int i, int end) {
+    return v3(MEETING_FLOAT(b, i, ends, 3 * end), MEETING_FLOAT(b, i, ends, 3 * end + 1),
+              MEETING_FLOAT(b, i, ends, 3 * end + 2));
+}
+
+// The value of one of the two surfaces of a meeting at x, and its gradient.
+static Float meeting_surface(const BoundaryJob *b, Int i, int which, Vec3 x, Vec3 *gradient) {
+    Float y[3], g[3], value = MEETING_FLOAT(b, i, surface[which].constant, 0);
+    y[0] = x.x - MEETING_FLOAT(b, i, surface[which].centre, 0);
+    y[1] = x.y - MEETING_FLOAT(b, i, surface[which].centre, 1);
+    y[2] = x.z - MEETING_FLOAT(b, i, surface[which].centre, 2);
+    for (int k = 0; k < 3; k++) {
+        int p = (k + 1) % 3, q = (k + 2) % 3;
+        Float my = MEETING_FLOAT(b, i, surface[which].matrix, k) * y[k] +
+                   MEETING_FLOAT(b, i, surface[which].matrix, 3 + q) * y[p] +
+                   MEETING_FLOAT(b, i, surface[which].matrix, 3 + p) * y[q];
+        Float linear = MEETING_FLOAT(b, i, surface[which].linear, k);
+        g[k] = my + linear;
+        value = value + (0.5f * my + linear) * y[k];
+    }
+    *gradient = v3(g[0], g[1], g[2]);
+    return value;
+}
+
+// The curve along which two surfaces pass through each other: its point in the plane through p(t), on the straight line between
+// its ends, at right angles to that line.
+static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
+    Int i = i_select(m, EDGE_FIELD(b, e, prim), i_set(0));
+    Vec3 from = meeting_end(b, i, 0), along = v3_sub(meeting_end(b, i, 1), from), p = v3_madd(from, t, along), g[2];
+    for (int step = 0; step < 3; step++) {
+        Float f0 = meeting_surface(b, i, 0, p, g), f1 = meeting_surface(b, i, 1, p, g + 1);
+        Vec3 back = v3_sub(v3_scale(v3_cross(along, g[0]), f1), v3_scale(v3_cross(along, g[1]), f0));
+        Float r = f_safe_rcp(v3_dot(along, v3_cross(g[0], g[1])));
+        p = v3_madd(p, -r, back);
+    }
+    Vec3 tangent = v3_cross(g[0], g[1]);
+    tangent = v3_scale(tangent, v3_dot(along, along) * f_safe_rcp(v3_dot(along, tangent)));
+    Hit *hits[2] = {&out->hit, &out->met};
+    for (int k = 0; k < 2; k++) {
+        Vec3 normal;
+        Hit hit = point_hit(scene, i_select(m, MEETING_INT(b, i, shape[k]), i_set(-1)), MEETING_INT(b, i, prim[k]),
+                            MEETING_INT(b, i, instance[k]), p, &normal);
+        hits[k]->shape = i_select(m, hit.shape, hits[k]->shape);
+        hits[k]->prim = i_select(m, hit.prim, hits[k]->prim);
+        hits[k]->instance = i_select(m, hit.instance, hits[k]->instance);
+        hits[k]->u = f_select(m, hit.u, hits[k]->u);
+        hits[k]->v = f_select(m, hit.v, hits[k]->v);
+        out->across[k] = v3_normalize(g[k]);
+    }
+    out->met.p = p;
+    out->p = v3_select(m, p, out->p);
+    out->tangent = v3_select(m, tangent, out->tangent);
+    // Never a silhouette: whoever sees it sees both.
+    out->side[0] = v3_select(m, v3_cross(tangent, g[0]), out->side[0]);
+    out->side[1] = v3_select(m, v3_neg(out->side[0]), out->side[1]);
+    out->open = out->open & ~m;
+}
+
 // A point of a random edge; u in the unit square.
 static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob *b, Vec2 u, Vec3 eye, bool parallel) {
     EdgePoint out;
@@ -173,7 +252,8 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.hit = (Hit){EDGE_FIELD(b, e, shape), i_set(0), f_set(0), f_set(0), v3_zero(), EDGE_FIELD(b, e, instance)};
     out.probability = out.probability * f_safe_rcp(range);
     out.p = out.tangent = out.side[0] = out.side[1] = v3_zero();
-    out.normal = out.view = out.rise = v3_zero();
+    out.normal = out.view = out.rise = out.across[0] = out.across[1] = v3_zero();
+    out.inner = v3_zero();
     out.open = m_set(true);
     out.other = EDGE_FIELD(b, e, other);
     out.fan = EDGE_FIELD(b, e, fan);
@@ -182,6 +262,8 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
     Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE));
     Mask side = mi_eq(kind, i_set(EDGE_SIDE)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
+    out.meeting = mi_eq(kind, i_set(EDGE_MEETING));
+    out.met = out.hit;
     if (m_any(mesh)) {
         edge_of_mesh(scene, b, e, t, mesh, &out);
     }
@@ -197,6 +279,9 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     if (m_any(terminator)) {
         out.hit.prim = i_select(terminator, EDGE_FIELD(b, e, prim), out.hit.prim);
         edge_of_terminator(scene, t, eye, parallel, terminator, &out);
+    }
+    if (m_any(out.meeting)) {
+        edge_of_meeting(scene, b, e, t, out.meeting, &out);
     }
     out.round = outline | side;
     out.hit.p = out.p;

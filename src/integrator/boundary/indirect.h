@@ -6,7 +6,7 @@
 // NOT differentiated: what moves behind smooth mirrors and glass, and edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/turning.h"
+#include "integrator/boundary/meeting.h"
 #include "integrator/film.h"
 
 typedef struct Indirect {
@@ -48,9 +48,11 @@ static void far_start(Tracer *t, const Segments *q) {
 static void far_paths(Indirect *in, int32_t *begin) {
     Tracer *t = in->t;
     Segments *q = &in->q;
-    t->placed = in->b->kind == BOUNDARY_TERMINATOR;
-    if (t->placed) {
+    t->placed = in->b->kind == BOUNDARY_TERMINATOR || in->b->kind == BOUNDARY_MEETING;
+    if (in->b->kind == BOUNDARY_TERMINATOR) {
         turning_start(t, q, far_half(q));
+    } else if (in->b->kind == BOUNDARY_MEETING) {
+        meetings_start(t, q);
     } else {
         far_start(t, q);
     }
@@ -94,6 +96,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     case BOUNDARY_TERMINATOR:
         return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
     case BOUNDARY_HORIZON:
+    case BOUNDARY_MEETING:
         return reflected;
     default:
         reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
@@ -225,7 +228,7 @@ static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Vec2 l
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_select(left, hit->shape, i_set(first)), group), i_set(id));
         bool moves = t->job->live[id] & LIVE_MOTION;
         if (!moves && !sink->any_camera) {
             continue;
@@ -336,9 +339,29 @@ static void turnings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     segments_near_adj(in, k, &near, apart, seen, unseen, sink, m);
 }
 
+// The same of the two surfaces of meetings. Where near points are has no part in it.
+static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    bool forward = in->b->job.mode == MODE_FORWARD;
+    Mask m = m_first_n(q->count - k);
+    Float worth = forward ? f_set(1) : f_load(q->seen + k) + f_load(q->unseen + k);
+    m = m & m_finite(worth);
+    Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
+    Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
+    points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
+    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, m);
+    if (forward) {
+        Float all = sink_taken(sink);
+        f_store(q->seen + k, all);
+        f_store(q->unseen + k, all);
+    }
+}
+
 static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
     if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_MEETING) {
+        meetings_move_adj(in, k, sink);
     } else {
         turnings_move_adj(in, k, sink);
     }
@@ -350,6 +373,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     Segments *q = &in->q;
     if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_find(t, in->b, first, count, q);
+    } else if (in->b->kind == BOUNDARY_MEETING) {
+        meetings_find(t, in->b, first, count, q);
     } else {
         turnings_find(t, in->b, first, count, q);
     }

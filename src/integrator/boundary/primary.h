@@ -8,7 +8,6 @@
 #include "integrator/boundary/edge.h"
 #include "integrator/boundary/view.h"
 #include "integrator/film.h"
-#include "integrator/path_move.h"
 
 // Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
 #define PRIMARY_STEP 2e-3f
@@ -74,6 +73,10 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
         Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
                                   (near & mi_eq(e->other, i_set(EDGE_ANY))));
+        if (m_any(e->meeting)) {
+            Mask other = mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
+            faces = faces | (e->meeting & near & other);
+        }
         own[side] = (silhouette & own[side]) | faces;
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
     }
@@ -129,6 +132,40 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
     t->job->paths += 2 * count;
 }
 
+// Finds the first vertices of those paths. Beside the outline of a round surface its normal turns with the root of the distance,
+// which no step would resolve: there the vertex is the point that is all but on the outline.
+static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int32_t count, int32_t half) {
+    trace_stage(t, 0);
+    for (int32_t k = 0; k < count && b->round; k += LANES) {
+        PrimarySample s;
+        primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
+        Mask above = m_gt(v3_dot(s.edge.side[0], s.n), f_set(0)), round = s.edge.round & m_first_n(count - k);
+        for (int side = 0; side < 2 && m_any(round); side++) {
+            int32_t at = side * half + k;
+            Mask inside = round & (side ? above : ~above);
+            const Workspace *ws = &t->ws;
+            Hit hit = {i_select(inside, s.edge.hit.shape, i_load(ws->hit_shape + at)),
+                       i_select(inside, i_set(0), i_load(ws->hit_prim + at)),
+                       f_zero_unless(~inside, f_load(ws->hit_u + at)),
+                       f_zero_unless(~inside, f_load(ws->hit_v + at)),
+                       v3_select(inside, s.edge.inner, record_v3(ws->hit_x, ws->hit_y, ws->hit_z, at)),
+                       i_select(inside, s.edge.hit.instance, i_load(ws->hit_instance + at))};
+            hit_store(t, at, &hit);
+        }
+    }
+    t->placed = true;
+}
+
+// Where two surfaces with normals a and b pass through each other, their curve moves across itself as both say:
+// n = x a + y b, and x a . (velocity of the one) + y b . (velocity of the other).
+static void primary_meeting_adj(Tracer *t, const PrimarySample *s, Vec3 along, Vec3 *first, Sink *sink) {
+    Mask m = s->m & s->edge.meeting;
+    Vec3 a = s->edge.across[0], b = s->edge.across[1];
+    Float c = v3_dot(a, b), r = f_safe_rcp(1.0f - c * c), na = v3_dot(along, a), nb = v3_dot(along, b);
+    *first = v3_select(m, v3_scale(a, (na - c * nb) * r), *first);
+    points_move_adj(t, &s->edge.met, v3_scale(b, (nb - c * na) * r), v3_zero(), sink, m);
+}
+
 // Adds the motion of the edges along n, worth `worth`. A terminator is where F = n . view is 0: where F grows, it moves back over
 // the surface, down the slope.
 static void primary_move_adj(Tracer *t, const PrimarySample *s, Float worth, bool parallel, Sink *sink) {
@@ -136,7 +173,7 @@ static void primary_move_adj(Tracer *t, const PrimarySample *s, Float worth, boo
     SurfaceAdj d = surface_adj_zero();
     Float df = -v3_dot(along, s->edge.rise);
     RayAdj ray = {s->edge.p, v3_neg(along), v3_zero()};
-    d.p = along;
+    d.p = v3_select(s->edge.meeting, v3_zero(), along);
     d.n = v3_scale(s->edge.view, df);
     if (parallel) { // view = - direction
         ray.direction = v3_scale(s->edge.normal, -df);
@@ -145,6 +182,9 @@ static void primary_move_adj(Tracer *t, const PrimarySample *s, Float worth, boo
         d.p = v3_sub(d.p, toward);
         ray.position = v3_add(ray.position, toward);
         ray.direction = v3_scale(toward, -s->seen.distance);
+    }
+    if (m_any(s->edge.meeting)) {
+        primary_meeting_adj(t, s, along, &d.p, sink);
     }
     surfaces_move_adj(t, &s->edge.hit, &d, sink, s->m);
     if (sink->any_camera) {

@@ -9,7 +9,6 @@
 
 #include "integrator/boundary/edge.h"
 #include "integrator/boundary/view.h"
-#include "integrator/path_move.h"
 
 // Beside the numbers of edges: the light, and where on it or which direction.
 #define DIMENSION_EDGE_SEGMENT 0x80000002u
@@ -27,10 +26,11 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 #define SEGMENT_HIT(I, x) I(x##_shape) I(x##_prim) I(x##_instance)
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
 // ends; what the
-// near point's share of the derivative is worth where it is seen by the camera, and elsewhere.
+// near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting: what its
+// motion is worth.
 #define SEGMENT_FLOATS(F)                                                                                              \
-    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) SEGMENT_POINT(F, near)            \
-        SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
+    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
+        SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
 #define SEGMENT_INTS(I) I(number) I(lit) I(source) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light)
 
@@ -82,7 +82,8 @@ static void segment_to_light(const Tracer *t, const BoundaryJob *b, const Sample
     Mask round = s->m & s->edge.round, endless = mi_eq((i_set(EMITTER_INFINITE_KINDS) >> kind) & 1, i_set(1));
     Vec3 end = v3_madd(reference, l.distance, l.d), normal = v3_zero();
     s->attached = s->m & l.valid & mi_lt(i_set(-1), shape);
-    s->far = light_hit(scene, i_select(s->attached, shape, i_set(-1)), i_select(s->attached, l.prim, i_set(0)), end, &normal);
+    s->far = point_hit(scene, i_select(s->attached, shape, i_set(-1)), i_select(s->attached, l.prim, i_set(0)),
+                       i_set(0), end, &normal);
     Float factor = f_set(1);
     if (m_any(round)) {
         Vec3 eye = v3_select(endless, segment_far_eye(scene, reference, l.d), end);

@@ -1,0 +1,25 @@
+// meetings.h: the curves along which two surfaces pass through each other.
+#pragma once
+
+#include "scene/scene.h"
+
+// A surface near a curve: f(x) = y . M y / 2 + n . y + constant = 0 with y = x - centre, so that a plane has M = 0.
+typedef struct Quadric {
+    float centre[3], linear[3], constant;
+    float matrix[6]; // xx yy zz yz zx xy
+} Quadric;
+
+// A piece of such a curve, close to the straight line between its ends.
+typedef struct MeetingRecord {
+    int32_t shape[2], prim[2];
+    int32_t instance[2]; // of shapes with SHAPE_INSTANCED, else 0
+    float ends[6];       // two points
+    Quadric surface[2];
+} MeetingRecord;
+
+// Whether a shape (of an instance) can move.
+typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
+
+// Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without
+// passing through, to 1e-4 of its size, does not meet. Grids of distances and curves have none yet.
+rey_result rey_meetings_find(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings);

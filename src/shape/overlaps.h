@@ -1,0 +1,14 @@
+// overlaps.h: which of many boxes overlap.
+#pragma once
+
+#include "base/context.h"
+
+typedef struct Box {
+    float low[3], high[3];
+    int32_t moves; // pairs of boxes that both stand still are left out
+} Box;
+
+// Called once for each pair first < second, in an order that depends on the boxes alone; anything but REY_OK ends the search.
+typedef rey_result OverlapFn(void *user, int32_t first, int32_t second);
+
+rey_result rey_overlaps_find(rey_context *ctx, const Box *boxes, int32_t count, OverlapFn *found, void *user);
