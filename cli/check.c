@@ -202,6 +202,14 @@ static rey_result try_one_side(Work *w, Check *check, bool central) {
     return result;
 }
 
+// Puts the values back; what failed before keeps its words.
+static rey_result restore(Work *w, const Direction *d, rey_result result) {
+    char message[2048];
+    snprintf(message, sizeof message, "%s", rey_error(w->session.ctx));
+    rey_result restored = set_values(w, d, w->original);
+    return result ? rey_fail(w->session.ctx, result, "%s", message) : restored;
+}
+
 // Derivative and difference of 16 sample sets, from a step on.
 static rey_result attempt(Work *w, Check *check) {
     const Direction *d = &check->direction;
@@ -222,8 +230,7 @@ static rey_result attempt(Work *w, Check *check) {
     if (!result && !agrees(&check->result)) {
         result = try_one_side(w, check, central);
     }
-    rey_result restored = set_values(w, d, w->original);
-    return result ? result : restored;
+    return restore(w, d, result);
 }
 
 // Sixteen sets that miss rare bright samples are alike, and wrong alike: what would be called wrong is looked at again
