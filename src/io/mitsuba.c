@@ -190,6 +190,7 @@ static void name_further_terms(Builder *b) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
         p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
         p->terms |= p->normals >= 0 ? moving & REY_TERM_TERMINATOR : 0;
+        p->terms |= p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) ? moving & REY_TERM_SPECULAR : 0; // its shadows
         bool mirror = p->normals >= 0
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);

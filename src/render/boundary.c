@@ -30,6 +30,32 @@ static bool has_steps(const SceneView *view) {
     return false;
 }
 
+// Whether the light of a projector's picture ends abruptly: unless its outermost texels are black.
+static bool ends_lit(const SceneView *view, const TextureNode *t) {
+    bool lit = t->kind != TEXTURE_BITMAP || t->to_uv >= 0;
+    for (int32_t i = 0; i < t->width * t->height && !lit; i++) {
+        int32_t x = i % t->width, y = i / t->width;
+        bool outermost = x == 0 || y == 0 || x == t->width - 1 || y == t->height - 1;
+        for (int32_t c = 0; c < t->channels && outermost; c++) {
+            lit |= view->theta[t->theta + (int64_t)t->channels * i + c] != 0;
+        }
+    }
+    return lit;
+}
+
+// Whether a light has a border at which it ends abruptly.
+static bool has_border(const SceneView *view, const EmitterRecord *e) {
+    const TextureNode *textures = view->textures;
+    if (e->kind == EMITTER_PROJECTOR) {
+        return ends_lit(view, textures + e->slot[SLOT(Projector, irradiance)]);
+    }
+    if (e->kind == EMITTER_SPOT) {
+        float cutoff = view->theta[textures[e->slot[SLOT(Spot, cutoff_angle)]].theta];
+        return view->theta[textures[e->slot[SLOT(Spot, beam_width)]].theta] >= cutoff * (1 - 1e-3f);
+    }
+    return false;
+}
+
 static bool boundary_sees(const SensorRecord *sensor) {
     return sensor->kind == SENSOR_PERSPECTIVE || sensor->kind == SENSOR_THINLENS || sensor->kind == SENSOR_ORTHOGRAPHIC;
 }
@@ -37,8 +63,10 @@ static bool boundary_sees(const SensorRecord *sensor) {
 int rey_boundary_term(int32_t kind) { return kind == BOUNDARY_PRIMARY ? REY_TERM_PRIMARY : REY_TERM_INDIRECT; }
 
 // Whether a term of a selection can be computed; records why not.
-static rey_result boundary_check(rey_scene *scene, const SensorRecord *sensor, int term) {
+static rey_result boundary_check(const Render *r, int term) {
+    rey_scene *scene = r->scene;
     const SceneView *view = &scene->view;
+    const SensorRecord *sensor = r->plan.sensor;
     if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic");
     }
@@ -58,6 +86,14 @@ static rey_result boundary_check(rey_scene *scene, const SensorRecord *sensor, i
     for (int64_t i = 0; i < view->emitters_count; i++) {
         if (view->emitters[i].kind == EMITTER_DIRECTIONALAREA) {
             return refuse(scene, term, "the emitter 'directionalarea', and the scene has one of them");
+        }
+        bool moves = r->job.any_motion;
+        for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
+            moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
+        }
+        if (moves && has_border(view, view->emitters + i)) {
+            return refuse(scene, term, "the border of a projector's picture that is not black there, and of a spot whose "
+                                       "beam_width is its cutoff_angle, and the scene has one of them");
         }
     }
     return REY_OK;
@@ -151,7 +187,7 @@ rey_result rey_boundaries_begin(Render *r) {
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
         if (r->terms & rey_boundary_term(i)) {
             bool check = moves || !boundary_sees(r->plan.sensor);
-            result = check ? boundary_check(r->scene, r->plan.sensor, rey_boundary_term(i)) : REY_OK;
+            result = check ? boundary_check(r, rey_boundary_term(i)) : REY_OK;
             result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }

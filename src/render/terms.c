@@ -83,7 +83,8 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
                             "changes what they let through and scatter, and moves the shadows in them",
                             info.name);
         }
-        bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->terms & REY_TERM_SPECULAR);
+        bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
+                      (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
         if (points && surfaces_read_volumes(&scene->view)) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
