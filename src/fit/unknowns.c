@@ -186,6 +186,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
             return fail_at(job, p, info.name, why);
         }
     }
+    bool several = strchr(p->name, '*') || p->parameterisation == PARAMETERISATION_SCATTERING;
     Unknown *unknown = rey_array_push(job->ctx, &u->items, sizeof *unknown, 1);
     int *owner = unknown ? rey_array_push(job->ctx, owners, sizeof *owner, 1) : NULL;
     if (!owner) {
@@ -193,7 +194,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     }
     *owner = job_index;
     *unknown = (Unknown){.param = param,
-                         .name = strchr(p->name, '*') ? info.name : p->name, // aliases stay what the job calls them
+                         .name = several ? info.name : p->name, // aliases stay what the job calls them
                          .offset = u->count,
                          .count = info.count,
                          .dims = info.dims,
