@@ -17,8 +17,11 @@ LIMITS = {
     "camera": {"camera.to_world": 0.01, "camera.x_fov": 0.01},
     "glass": {"pebble.to_world": 0.02, "group.shape_0.bsdf.eta.value": 0.01},
     "shape": {"creature.positions": 0.004},
+    "smoke": {},
 }
 LEAST_POINTS = {"shape": 5000}
+LEAST_PSNR = {"smoke": 30}  # of every view that is held out [dB]
+
 
 
 def judge(name, result):
@@ -30,6 +33,12 @@ def judge(name, result):
             wrong.append("%s: %s is off by %s, expected at most %g" % (name, parameter, error, limit))
         if found[parameter]["count"] < 3 * LEAST_POINTS.get(name, 0):
             wrong.append("%s: %s has %d numbers" % (name, parameter, found[parameter]["count"]))
+    if name in LEAST_PSNR and not result["held_out"]:
+        wrong.append("%s: no view was held out" % name)
+    for view in result["held_out"]:
+        if not view["psnr"] >= LEAST_PSNR.get(name, 0):
+            wrong.append("%s: view %d, held out, has a PSNR of %g dB, expected %g" % (name, view["view"], view["psnr"],
+                                                                                   LEAST_PSNR[name]))
     return wrong
 
 
@@ -39,6 +48,8 @@ def show(name, result):
         text = lambda key: " ".join("%.4g" % x for x in p[key]) if key in p and len(p[key]) < 4 else "%d numbers" % p["count"]
         print("  %-34s truth %-12s start %-12s found %-12s error %.3f %%" % (p["name"], text("truth"), text("start"), text("found"),
                                                                           100 * (p["error"] or 0)))
+    for view in result["held_out"]:
+        print("  view %d, held out: PSNR %.1f dB" % (view["view"], view["psnr"]))
     sys.stdout.flush()
 
 
