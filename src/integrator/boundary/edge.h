@@ -156,8 +156,9 @@ static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->tangent = v3_select(m, pose_column(scene, at, 2), out->tangent);
     Vec3 outwards = v3_madd(v3_scale(pose_column(scene, at, 0), cx), cy, pose_column(scene, at, 1));
     out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
-    // The same angle on to the middle of what the eye sees, the direction (x, y).
-    Float nx = cx + OUTLINE_TURN * x * r, ny = cy + OUTLINE_TURN * y * r, unit = f_safe_rcp(f_sqrt(nx * nx + ny * ny));
+    // Turned to the middle of what the eye sees: (x, y), which parallel views look along.
+    Float turn = (parallel ? -OUTLINE_TURN : OUTLINE_TURN) * r, nx = cx + turn * x, ny = cy + turn * y;
+    Float unit = f_safe_rcp(f_sqrt(nx * nx + ny * ny));
     out->inner = v3_select(m, pose_to_world(scene, at, v3(nx * unit, ny * unit, t)), out->inner);
 }
 
