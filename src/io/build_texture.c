@@ -2,6 +2,7 @@
 #include "io/build.h"
 #include "io/lenient.h"
 #include "io/load.h"
+#include "scene/texels.h"
 
 #include <math.h>
 #include <string.h>
@@ -115,25 +116,63 @@ static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path,
     return REY_OK;
 }
 
+// Packed numbers get their place in theta when the scene is whole.
+static rey_result add_packed(Builder *b, const PackedImage *packed, int64_t count, TextureNode *t) {
+    rey_scene *scene = b->scene;
+    int64_t bytes = count * rey_texel_bytes(packed->storage), words = (bytes + 3) / 4;
+    if (scene->build.levels.count == 0) {
+        int32_t first = rey_scene_append(scene, &scene->build.levels, sizeof(float), LEVELS_COUNT);
+        if (first < 0) {
+            return REY_ERROR_MEMORY;
+        }
+        rey_pack_levels(&ARRAY_AT(scene->build.levels, float, first));
+    }
+    if (4 * ((int64_t)scene->build.texels.count + words) > INT32_MAX) {
+        return rey_fail(b->ctx, REY_ERROR_UNSUPPORTED, "the scene's bitmaps hold more than 2^31 bytes; format=\"variant\" stores "
+                                                       "them as floats");
+    }
+    int32_t at = rey_scene_append(scene, &scene->build.texels, sizeof(int32_t), words);
+    if (at < 0) {
+        return REY_ERROR_MEMORY;
+    }
+    memcpy(&ARRAY_AT(scene->build.texels, int32_t, at), packed->bytes, (size_t)bytes);
+    t->storage = packed->storage;
+    t->texels = at * (4 / rey_texel_bytes(packed->storage));
+    return REY_OK;
+}
+
+static rey_result add_texels(Builder *b, const LoadedFile *file, int64_t count, int32_t *out) {
+    float *theta;
+    TextureNode packed = {0};
+    if (file->packed.bytes) {
+        TRY(add_packed(b, &file->packed, count, &packed));
+    }
+    TRY(build_add_texture(b, TEXTURE_BITMAP, file->packed.bytes ? 0 : count, out, &theta));
+    if (file->packed.bytes) {
+        TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
+        t->storage = packed.storage;
+        t->texels = packed.texels;
+    } else {
+        memcpy(theta, file->image.data, (size_t)count * sizeof *theta);
+    }
+    return REY_OK;
+}
+
 static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out) {
     static const char *const filters[] = {"nearest", "bilinear"}, *const wraps[] = {"repeat", "mirror", "clamp"};
-    static const char *const formats[] = {"auto", "variant", "float16", "uint8"};
-    int filter, wrap, format;
+    int filter, wrap;
     bool accel;
     LoadedFile file;
     TRY(rey_xml_get_choice(b->ctx, node, "filter_type", filters, 2, FILTER_BILINEAR, &filter));
     TRY(rey_xml_get_choice(b->ctx, node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
-    TRY(rey_xml_get_choice(b->ctx, node, "format", formats, 4, 0, &format));
     TRY(rey_xml_get_bool(b->ctx, node, "accel", true, &accel));
     rey_result result = load_take(b->ctx, b->source->document, b->ahead, node, &file);
     const rey_image image = file.image;
-    float *theta;
     int64_t count = (int64_t)image.width * image.height * image.channels;
     if (result == REY_OK) {
-        result = build_add_texture(b, TEXTURE_BITMAP, count, out, &theta);
+        result = add_texels(b, &file, count, out);
     }
     if (result == REY_OK) {
-        memcpy(theta, image.data, (size_t)count * sizeof *theta);
         TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
         t->width = image.width;
         t->height = image.height;

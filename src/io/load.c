@@ -65,11 +65,23 @@ static rey_result mesh_request(rey_context *ctx, rey_xml_node *node, FileRequest
     return result;
 }
 
+// 'variant' is what the renderer computes with.
+static rey_result bitmap_request(rey_context *ctx, rey_xml_node *node, FileRequest *out) {
+    static const char *const formats[] = {"auto", "variant", "float16", "uint8"};
+    int format = 0;
+    rey_result result = rey_xml_get_bool(ctx, node, "raw", false, &out->raw);
+    if (result == REY_OK) {
+        result = rey_xml_get_choice(ctx, node, "format", formats, COUNT_OF(formats), 0, &format);
+    }
+    out->floats = format == 1;
+    return result;
+}
+
 rey_result load_request(rey_context *ctx, const rey_xml_document *document, rey_xml_node *node, FileRequest *out) {
     int plugin = find_plugin(node);
     *out = (FileRequest){.kind = file_plugins[plugin].kind, .read = file_plugins[plugin].read, .at = node->at};
     rey_result result = out->kind == FILE_MESH     ? mesh_request(ctx, node, out)
-                        : out->kind == FILE_BITMAP ? rey_xml_get_bool(ctx, node, "raw", false, &out->raw)
+                        : out->kind == FILE_BITMAP ? bitmap_request(ctx, node, out)
                                                    : REY_OK;
     if (result == REY_OK) {
         result = rey_xml_resolve_file(ctx, document, node, "filename", &out->path);
@@ -170,13 +182,17 @@ static rey_result envmap_pad(rey_context *ctx, rey_image *image) {
     return REY_OK;
 }
 
-static rey_result read_image(rey_context *ctx, const FileRequest *request, rey_image *image) {
+static rey_result read_image(rey_context *ctx, const FileRequest *request, LoadedFile *out) {
+    rey_image *image = &out->image;
     bool sky = request->kind == FILE_ENVMAP;
     rey_result result = rey_image_read(ctx, request->path, image);
     if (result == REY_OK && (sky || image->channels != 1)) {
         result = rey_image_to_rgb(ctx, image);
     }
-    if (result != REY_OK) {
+    if (result == REY_OK && request->kind == FILE_BITMAP && !request->floats) {
+        result = rey_image_pack(ctx, image, image->srgb && !request->raw, &out->packed);
+    }
+    if (result != REY_OK || out->packed.bytes) {
         return result;
     }
     if (image->srgb && !request->raw) {
@@ -196,10 +212,12 @@ rey_result load_read(rey_context *ctx, const FileRequest *request, LoadedFile *o
     *out = (LoadedFile){0};
     return rey_xml_named_file(ctx, request->at,
                               request->kind == FILE_MESH ? read_mesh(ctx, request, out)
-                                                         : read_image(ctx, request, &out->image));
+                                                         : read_image(ctx, request, out));
 }
 
 void load_free(rey_context *ctx, LoadedFile *file) {
     rey_mesh_free(ctx, &file->mesh);
     rey_image_free(ctx, &file->image);
+    rey_free(ctx, file->packed.bytes);
+    file->packed = (PackedImage){0};
 }

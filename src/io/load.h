@@ -4,6 +4,7 @@
 
 #include "io/image.h"
 #include "io/mesh.h"
+#include "io/pack.h"
 #include "io/xml.h"
 
 typedef enum FileKind { FILE_NONE, FILE_MESH, FILE_BITMAP, FILE_ENVMAP } FileKind;
@@ -16,13 +17,14 @@ typedef struct FileRequest {
     bool flip_tex_coords, flat_normals;        // meshes
     int shape_index;
     double to_world[16];
-    bool raw;                                  // pictures: values are not to be decoded
+    bool raw, floats;                          // pictures: values are not to be decoded; not to be packed
 } FileRequest;
 
 typedef struct LoadedFile {
     rey_mesh mesh;       // in the world
     bool smooth_normals; // that were computed here
-    rey_image image;     // linear, finite
+    rey_image image;     // linear, finite; without data where they are
+    PackedImage packed;
 } LoadedFile;
 
 // What a node reads: FILE_NONE for nodes that read none of these.

@@ -1,5 +1,5 @@
 // params.c: named parameters: ranges of theta with a name, a shape, a range and the terms that a derivative needs.
-#include "scene/scene.h"
+#include "scene/texels.h"
 
 #include <string.h>
 
@@ -113,6 +113,9 @@ const char *rey_param_nearest(const rey_scene *scene, const char *name) {
 
 const float *rey_param_values(const rey_scene *scene, int param) {
     const Param *p = param_at(scene, param);
+    if (p && p->texture >= 0) {
+        rey_texels_promote((rey_scene *)(uintptr_t)scene, p->texture, true);
+    }
     return p ? scene->view.theta + p->theta : NULL;
 }
 
@@ -156,6 +159,9 @@ rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s[%lld] = %g, expected a number in [%g, %g]", p->name,
                             (long long)i, (double)values[i], (double)p->low, (double)p->high);
         }
+    }
+    if (p->texture >= 0) {
+        rey_texels_promote(scene, p->texture, false);
     }
     memmove(scene->view.theta + p->theta, values, (size_t)count * sizeof *values);
     p->version++;

@@ -1,5 +1,5 @@
 // scene.c: life cycle of the flat scene: arrays grow while it is loaded and stay where they are afterwards.
-#include "scene/scene.h"
+#include "scene/texels.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -60,17 +60,19 @@ rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) {
 }
 
 // Makes an array fit: entries behind the end that wide loads may touch, and little more. Most arrays fit already, so that
-// what a scene is made of is not copied.
-static rey_result settle(rey_scene *scene, Array *array, size_t item_bytes) {
-    size_t count = array->count, wanted = count + ARRAY_TAIL;
-    if (count == 0 || (array->capacity >= wanted && array->capacity - wanted <= wanted / 4)) {
+// what a scene is made of is not copied. more: entries for which there must be room besides.
+static rey_result settle(rey_scene *scene, Array *array, size_t item_bytes, size_t more) {
+    size_t count = array->count, wanted = count + ARRAY_TAIL + more;
+    if (wanted == ARRAY_TAIL || (array->capacity >= wanted && array->capacity - wanted <= wanted / 4)) {
         return REY_OK;
     }
     Array exact = {0};
     if (!rey_array_push(scene->ctx, &exact, item_bytes, wanted)) {
         return REY_ERROR_MEMORY;
     }
-    memcpy(exact.data, array->data, count * item_bytes);
+    if (count) {
+        memcpy(exact.data, array->data, count * item_bytes);
+    }
     exact.count = count;
     rey_array_free(scene->ctx, array);
     *array = exact;
@@ -79,6 +81,11 @@ static rey_result settle(rey_scene *scene, Array *array, size_t item_bytes) {
 
 rey_result rey_scene_freeze(rey_scene *scene) {
     size_t largest = 0;
+    int64_t packed;
+    rey_result result = rey_texels_place(scene, &packed);
+    if (result != REY_OK) {
+        return result;
+    }
 #define ARRAY(type, name, comment) largest = sizeof(type) > largest ? sizeof(type) : largest;
 #include "scene/arrays.inl"
 #undef ARRAY
@@ -96,14 +103,16 @@ rey_result rey_scene_freeze(rey_scene *scene) {
         return REY_ERROR_MEMORY;
     }
 #define ARRAY(type, name, comment)                                                                                     \
-    if (settle(scene, &scene->build.name, sizeof(type)) != REY_OK) {                                                   \
+    if (settle(scene, &scene->build.name, sizeof(type),                                                                \
+               (void *)&scene->build.name == (void *)&scene->build.theta ? (size_t)packed : 0) != REY_OK) {                                                   \
         return REY_ERROR_MEMORY;                                                                                       \
     }                                                                                                                  \
-    scene->view.name = scene->build.name.count ? scene->build.name.data : scene->arena;                                \
+    scene->view.name = scene->build.name.data ? scene->build.name.data : scene->arena;                                  \
     scene->view.name##_count = (int64_t)scene->build.name.count;                                                       \
     scene->arena_bytes += scene->build.name.capacity * sizeof(type);
 #include "scene/arrays.inl"
 #undef ARRAY
+    scene->arena_bytes -= (size_t)packed * sizeof(float); // as long as nothing is written there
     memset(scene->dirty_shapes, 1, (size_t)scene->view.shapes_count);
     memset(scene->dirty_instances, 1, (size_t)scene->view.instances_count);
     memset(scene->dirty_bsdfs, 1, (size_t)scene->view.bsdfs_count);

@@ -19,6 +19,8 @@ enum {
 // What a black body derives from its temperature, in theta: colour, derivative, the temperature that these belong to; and
 // the wavelengths that it emits.
 enum { BLACKBODY_SLOPE = 3, BLACKBODY_BUILT = 6, BLACKBODY_RANGE = 7, BLACKBODY_NUMBERS = 9 };
+// How the numbers of a bitmap are stored: floats in theta; or, until somebody changes them, in `texels` (texels.h).
+enum { TEXELS_FLOAT, TEXELS_BYTE, TEXELS_SRGB, TEXELS_HALF };
 enum { FILTER_NEAREST, FILTER_BILINEAR };
 enum { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
 
@@ -32,6 +34,7 @@ typedef struct TextureNode {
     int32_t attribute; // mesh_attribute: its first entry in `attributes`
     int32_t per_face;
     int32_t volume;    // volume: whose voxels these are
+    int32_t storage, texels; // bitmap: TEXELS_, and its first number in `texels`, counted in its own numbers
 } TextureNode;
 
 typedef struct BsdfNode {

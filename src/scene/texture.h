@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scene/attribute.h"
+#include "scene/texels.h"
 #include "scene/volume.h"
 
 KFN Vec2 texture_map_uv(const SceneView *scene, const TextureNode *t, Vec2 uv) {
@@ -73,14 +74,39 @@ KFN Float footprint_weight(const Footprint *f, int corner) {
     return (corner & 1 ? f->fx : 1.0f - f->fx) * (corner & 2 ? f->fy : 1.0f - f->fy);
 }
 
+KFN Float level_at(const SceneView *scene, Int index) {
+#ifdef REAL_DOUBLE
+    return (Float)scene->levels[index];
+#else
+    return f_gather(scene->levels, index);
+#endif
+}
+
+// Number `index` of a packed bitmap.
+static NOINLINE Float packed_texel(const SceneView *scene, const TextureNode *t, Int index) {
+    Int n = index + t->texels;
+    if (t->storage == TEXELS_HALF) {
+        Int half = i_gather(scene->texels, n >> 1) >> ((n & 1) << 4), exponent = half >> 10 & 31;
+        Int mantissa = (half & 1023) + (i_min(exponent, i_set(1)) << 10);
+        Float value = f_from_i(mantissa) * level_at(scene, exponent + LEVELS_HALF);
+        return f_select(mi_eq(half & 0x8000, i_set(0)), value, -value);
+    }
+    Int byte = i_gather(scene->texels, n >> 2) >> ((n & 3) << 3) & 255;
+    return level_at(scene, byte + (t->storage == TEXELS_SRGB ? LEVELS_SRGB : LEVELS_BYTE));
+}
+
+KFN Float texel_number(const SceneView *scene, const TextureNode *t, Int index) {
+    return t->storage == TEXELS_FLOAT ? theta_at(scene, index + t->theta) : packed_texel(scene, t, index);
+}
+
 KFN Spec bitmap_texel(const SceneView *scene, const TextureNode *t, Int at) {
-    Int index = at * t->channels + t->theta;
+    Int index = at * t->channels;
     if (t->channels == 1) {
-        return spec_set(theta_at(scene, index));
+        return spec_set(texel_number(scene, t, index));
     }
     Spec s;
     for (int c = 0; c < SPEC_N; c++) {
-        s.c[c] = theta_at(scene, index + c);
+        s.c[c] = texel_number(scene, t, index + c);
     }
     return s;
 }

@@ -78,9 +78,8 @@ rey_result rey_values_copy(rey_scene *scene, const rey_scene *from, const char *
         int own = -1;
         result = when == phase ? find_own(scene, from, (int)i, path, &own) : REY_OK;
         if (result == REY_OK && own >= 0) {
-            const float *values = from->view.theta + p->theta;
-            const Param *q = &ARRAY_AT(scene->params, Param, own);
-            if (memcmp(scene->view.theta + q->theta, values, (size_t)p->count * sizeof *values) != 0) {
+            const float *values = rey_param_values(from, (int)i);
+            if (memcmp(rey_param_values(scene, own), values, (size_t)p->count * sizeof *values) != 0) {
                 result = rey_scene_set(scene, own, values, p->count);
             }
         }

@@ -1,0 +1,52 @@
+// texels.c: packed textures, and what becomes of them when somebody changes them.
+#include "scene/texels.h"
+
+int rey_texel_bytes(int32_t storage) { return storage == TEXELS_FLOAT ? 4 : storage == TEXELS_HALF ? 2 : 1; }
+
+static int64_t number_count(const TextureNode *t) { return (int64_t)t->width * t->height * t->channels; }
+
+rey_result rey_texels_place(rey_scene *scene, int64_t *numbers) {
+    const int64_t first = (int64_t)scene->build.theta.count;
+    TextureNode *textures = scene->build.textures.data;
+    *numbers = 0;
+    for (size_t i = 0; i < scene->build.textures.count; i++) {
+        TextureNode *t = textures + i;
+        if (t->storage != TEXELS_FLOAT) {
+            if (first + *numbers + number_count(t) > INT32_MAX) {
+                return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the scene holds more than 2^31 numbers of one kind");
+            }
+            t->theta = (int32_t)(first + *numbers);
+            *numbers += number_count(t);
+        }
+    }
+    for (size_t i = 0; i < scene->params.count; i++) {
+        Param *p = &ARRAY_AT(scene->params, Param, i);
+        if (p->texture >= 0 && textures[p->texture].storage != TEXELS_FLOAT) {
+            p->theta = textures[p->texture].theta;
+        }
+    }
+    return REY_OK;
+}
+
+static float half_value(const float *levels, uint32_t bits) {
+    uint32_t exponent = bits >> 10 & 31;
+    float value = (float)((bits & 1023) + (exponent ? 1024 : 0)) * levels[LEVELS_HALF + exponent];
+    return bits >> 15 ? -value : value;
+}
+
+void rey_texels_promote(rey_scene *scene, int32_t texture, bool unpack) {
+    TextureNode *t = (TextureNode *)(uintptr_t)(scene->view.textures + texture);
+    if (t->storage == TEXELS_FLOAT) {
+        return;
+    }
+    const float *levels = scene->view.levels;
+    const unsigned char *bytes = (const unsigned char *)scene->view.texels + (int64_t)t->texels * rey_texel_bytes(t->storage);
+    float *out = scene->view.theta + t->theta;
+    for (int64_t i = 0; i < number_count(t) && unpack; i++) {
+        out[i] = t->storage == TEXELS_HALF   ? half_value(levels, (uint32_t)bytes[2 * i] | (uint32_t)bytes[2 * i + 1] << 8)
+                 : t->storage == TEXELS_BYTE ? levels[LEVELS_BYTE + bytes[i]]
+                                             : levels[LEVELS_SRGB + bytes[i]];
+    }
+    scene->arena_bytes += (size_t)number_count(t) * sizeof *out;
+    t->storage = TEXELS_FLOAT;
+}
