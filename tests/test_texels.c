@@ -1,5 +1,6 @@
 // test_texels.c: bitmaps that lie in 8 or 16 bits until somebody changes them: the same numbers, pictures and gradients to the
 // bit as floats, in less memory.
+#include "base/parallel.h"
 #include "io/image.h"
 #include "io/pack.h"
 #include "reynolds/reynolds.h"
@@ -78,12 +79,14 @@ static int64_t bytes_of(const rey_scene *scene) {
 }
 
 // The same scene with packed texels and with floats: what each number takes, and that nothing else differs.
-static void compare(const char *file, const char *more, int per_number) {
+static void compare_lanes(const char *file, const char *more, int per_number, int lanes) {
     static float packed_image[PIXELS], float_image[PIXELS];
     static double packed_gradient[NUMBERS], float_gradient[NUMBERS];
     char variant[256];
     rey_context *ctx;
-    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    rey_context_def def = rey_default_context_def();
+    def.lanes = lanes;
+    assert_int_equal(rey_context_create(&def, &ctx), REY_OK);
     snprintf(variant, sizeof variant, "%s<string name='format' value='variant'/>", more);
     rey_scene *floats = open_wall(ctx, file, variant), *packed = open_wall(ctx, file, more);
     int param = rey_param_find(packed, "wall.reflectance.data");
@@ -118,6 +121,13 @@ static void compare(const char *file, const char *more, int per_number) {
     rey_scene_destroy(packed);
     rey_scene_destroy(floats);
     rey_context_destroy(ctx);
+}
+
+static void compare(const char *file, const char *more, int per_number) {
+    const int widest = rey_widest_lanes();
+    for (int lanes = 1; lanes <= widest; lanes = lanes == 1 ? 8 : 2 * lanes) {
+        compare_lanes(file, more, per_number, lanes);
+    }
     unlink(picture);
 }
 
