@@ -127,6 +127,9 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         if (t->job->live_extinctions) {
             probe_stage(t, begin, count);
         }
+        if (t->job->live_borders) {
+            border_stage(t, begin, count);
+        }
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);
         }

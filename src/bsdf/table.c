@@ -47,6 +47,8 @@ bool rey_bsdf_bends(int kind) {
            kind == BSDF_MASK || kind == BSDF_NULL;
 }
 
+bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
+
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 
 int32_t rey_bsdf_table_size(int kind) {

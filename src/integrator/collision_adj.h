@@ -51,20 +51,27 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, s->beta);
     Spec lit = spec_zero_unless(s->connected, spec_mul(worth, s->lit)), onward = spec_mul(worth, s->onward);
+    LightMove move = light_move_zero();
     if (t->job->live_lights && m_any(s->connected)) {
         Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
         lights_adj(scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                   spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), NULL, sink);
+                   spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), sink->any_places ? &move : NULL, sink);
+    }
+    if (sink->any_places && m_any(s->connected)) {
+        Vec3 unused = v3_zero();
+        phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &unused, &move.d);
+        lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
     }
     if (live & LIVE_ALBEDO) {
         const VolumeNode *albedo = scene->volumes + s->at.medium->albedo;
         Spec d = spec_add(spec_scale(lit, s->light_phase), spec_scale(onward, s->phase));
-        volume_adj(scene, albedo, volume_to_local(scene, albedo, s->hit.p, 1), spec_zero_unless(s->m, d),
-                   sink->texture_at[albedo->texture], NULL, sink, s->m);
+        volume_world_adj(scene, albedo, s->hit.p, spec_zero_unless(s->m, d), sink, s->m);
     }
     if (live & LIVE_PHASE) {
         Vec3 dwi = v3_zero(), dwo = v3_zero();
-        phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &dwo);
+        if (!sink->any_places) {
+            phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &dwo);
+        }
         phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), sink, s->scattered, &dwi, &dwo);
     }
 }
@@ -83,8 +90,8 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         if (live_passing) {
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
-            passage_adj(t, &walk, s.transmittance, spec_zero_unless(s.connected, spec_scale(dt, s.light_phase)), slot,
-                        batch->bounce, sink);
+            connection_passage_adj(t, &walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p, s.light,
+                                   s.connected, s.light_d, s.light_distance, sink);
         }
         forward_flush(t, sink, slot, c, s.m);
     }

@@ -80,7 +80,7 @@ KFN void record_flight(Tracer *t, const Flights *f, int32_t count, int32_t bounc
     }
     Records *r = &t->ws.records;
     i_store(r->slot + at, f->slot);
-    i_store(r->lobe + at, i_gather(t->ws.paths[t->current].depth, f->at));
+    i_store(r->depth + at, i_gather(t->ws.paths[t->current].depth, f->at));
     i_store(r->prim + at, f->flight.real);
     f_store(r->px + at, f->o.x);
     f_store(r->py + at, f->o.y);

@@ -3,10 +3,10 @@
 //   -w L + w(s) albedo(s) (what is scattered at s towards the path),
 // and the emission that is met behind s is lost as well. The first part is found at points of its own, the second one at
 // collisions and at the path's probe (probe.h). Nothing is divided by an extinction or a throughput.
-// NOT differentiated: the choice of distances, channels and real collisions; where media lie.
+// NOT differentiated: the choice of distances, channels and real collisions. Where media lie: border.h.
 #pragma once
 
-#include "integrator/probe.h"
+#include "integrator/border.h"
 
 enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
 
@@ -14,14 +14,13 @@ enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
 static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Spec d, Sink *sink, Mask m) {
     const VolumeNode *v = scene->volumes + medium->sigma_t;
     const int32_t at = sink->texture_at[v->texture], scale_at = sink->texture_at[medium->scale_texture];
-    Vec3 q = volume_to_local(scene, v, p, 1);
     d = spec_zero_unless(m, d);
     // extinction = scale sigma_t
-    if (at >= 0) {
-        volume_adj(scene, v, q, spec_scale(d, f_set((real)scene->theta[medium->scale])), at, NULL, sink, m);
+    if (at >= 0 || volume_moves(scene, v, sink)) {
+        volume_world_adj(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale])), sink, m);
     }
     if (scale_at >= 0) {
-        sink_add_uniform(sink, scale_at, spec_dot(d, volume_eval(scene, v, q)), m);
+        sink_add_uniform(sink, scale_at, spec_dot(d, volume_eval(scene, v, volume_to_local(scene, v, p, 1))), m);
     }
 }
 
@@ -103,15 +102,14 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
     }
     if (live & LIVE_GLOW) {
         const VolumeNode *emission = scene->volumes + a->medium->emission;
-        Vec3 p = volume_to_local(scene, emission, v3_madd(a->f.o, a->emission_at, a->f.d), 1);
-        volume_adj(scene, emission, p, spec_zero_unless(m, spec_mul(worth, a->emission_weight)),
-                   sink->texture_at[emission->texture], NULL, sink, m);
+        Vec3 p = v3_madd(a->f.o, a->emission_at, a->f.d);
+        volume_world_adj(scene, emission, p, spec_zero_unless(m, spec_mul(worth, a->emission_weight)), sink, m);
     }
 }
 
 static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
-    if (!(live & (LIVE_EXTINCTION | LIVE_GLOW))) {
+    if (!(live & (LIVE_EXTINCTION | LIVE_GLOW | LIVE_BORDER))) {
         return;
     }
     FlightAdj a = flight_adj_load(t, batch, suffix);
@@ -121,6 +119,9 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
     for (int c = 0; c < drives(t); c++) {
         flight_adj(t, &a, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), sink);
         forward_flush(t, sink, slot, c, finite);
+    }
+    if (live & LIVE_BORDER) {
+        border_box_sweep(t, batch, a.onward, a.emission, finite, sink);
     }
 }
 

@@ -13,7 +13,7 @@ static inline bool mode_records(int32_t mode) {
 
 // What of a group depends on the selected parameters; and what of a medium.
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
-enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8 };
+enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8, LIVE_BORDER = 16 };
 
 typedef struct PathJob {
     const SceneView *scene;
@@ -33,10 +33,12 @@ typedef struct PathJob {
     double *gradient;
     const float *tangent;
     const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at, *place_at;
-    const int32_t *points_at, *pose_at, *instance_at, *camera_at;
+    const int32_t *points_at, *pose_at, *instance_at, *camera_at, *volume_at;
     bool any_normals, any_attributes, any_places, any_motion, any_camera;
+    bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
     bool live_extinctions;        // that of some medium depends on the selection
+    bool live_borders;            // so does where some medium begins and ends
     bool live_lights;             // some emitter depends on the selection
     bool watch_turned;            // the selection turns shading normals: note which way they face
     bool watch_smooth;            // also those of smooth meshes, whose jumps no boundary term takes into account

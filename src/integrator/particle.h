@@ -70,6 +70,7 @@ typedef struct Landing {
     BsdfSurface surface;
     Vec3 wl, dp_dv;
     Float cosine; // of the surface itself
+    const Group *group;
 } Landing;
 
 // Lanes of m whose ray reaches the sensor; lights that hide do not stand in the way.
@@ -196,13 +197,21 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     if (record >= 0) {
         record_onward(t, record, &w);
     }
-    return particle_append(&t->ws.paths[1 - t->current], next_count, interaction_offset(&at->si, w.d), w.d, w.beta, w.eta2,
-                           w.roulette, at->v.slot, m);
+    Paths *next = &t->ws.paths[1 - t->current];
+    Vec3 o = interaction_offset(&at->si, w.d);
+    if (t->scene->has_media) {
+        Mask passed = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+        o = v3_select(passed, interaction_behind(&at->si, w.d), o);
+        i_compress(next->medium + next_count, medium_behind(at->group, at->si.ng, w.d, at->v.medium), m);
+        i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
+    }
+    return particle_append(next, next_count, o, w.d, w.beta, w.eta2, w.roulette, at->v.slot, m);
 }
 
 // Fills what follows from the vertex.
 KFN void landing_look(const Tracer *t, const Group *group, Landing *at) {
     const SceneView *scene = t->scene;
+    at->group = group;
     at->si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at->v.hit);
     at->wl = frame_to_local(&at->si.sh, v3_neg(at->v.d));
     at->cosine = f_abs(v3_dot(at->si.ng, at->v.d));

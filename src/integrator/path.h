@@ -115,7 +115,11 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
     w.d = frame_to_world(&si->sh, w.sample.wo);
-    append_paths(t, v, si->p, interaction_offset(si, w.d), &w, medium_behind(group, si->ng, w.d, v->medium), next_count);
+    Vec3 o = interaction_offset(si, w.d);
+    if (scene->has_media) {
+        o = v3_select(w.passed, interaction_behind(si, w.d), o);
+    }
+    append_paths(t, v, si->p, o, &w, medium_behind(group, si->ng, w.d, v->medium), next_count);
     if (keeps_coverage(t)) {
         Mask passes = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
         cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);

@@ -168,7 +168,8 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         if (live_passing) {
             // L += f Le w_l T
             Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
-            passage_adj(t, &walk, transmittance, spec_zero_unless(s.connected, dt), slot, batch->bounce, sink);
+            connection_passage_adj(t, &walk, transmittance, dt, slot, batch->bounce, s.si.p, s.light, s.connected, s.light_d,
+                                   s.light_distance, sink);
         }
         forward_flush(t, sink, slot, c, s.m);
     }
@@ -217,6 +218,9 @@ static void path_backward(Tracer *t) {
         if (batch->tag == VERTEX_MEDIUM) {
             collision_sweep(t, batch, slot, suffix, finite, live_passing, &sink);
             continue;
+        }
+        if (border_is_live(t, batch)) {
+            border_surface_sweep(t, batch, suffix, finite, &sink);
         }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
         if (job->live[batch->group] || job->live_lights || live_passing) {

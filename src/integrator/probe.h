@@ -83,6 +83,24 @@ static void probe_choose(Tracer *t, int32_t count) {
     }
 }
 
+// The state of n paths that collide at once where they begin, beside what is particular to each of them.
+static void probes_begin(Tracer *t, int32_t n) {
+    Workspace *ws = &t->ws;
+    Paths *p = &ws->paths[0];
+    for (int32_t k = 0; k < n; k += LANES) {
+        f_store(p->tmax + k, f_set(INFINITY));
+        f_store(p->eta2 + k, f_set(1));
+        f_store(p->roulette + k, f_set(1));
+        f_store(p->pdf + k, f_set(PDF_DELTA));
+        spec_store(p->beta, k, spec_set(f_set(1)));
+        i_store(ws->hit_shape + k, i_set(-1));
+        i_store(ws->hit_prim + k, i_set(0));
+        i_store(ws->hit_instance + k, i_set(0));
+    }
+    t->active = n;
+    t->current = 0;
+}
+
 // Starts a path at the point of each chosen flight whose medium is asked for, as if it had collided there.
 static void probe_start(Tracer *t, int32_t count) {
     Workspace *ws = &t->ws;
@@ -104,34 +122,20 @@ static void probe_start(Tracer *t, int32_t count) {
         v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, o, m);
         i_compress(ws->hit_group + n, medium + ((int32_t)t->scene->groups_count + 1), m);
         i_compress(p->medium + n, medium, m);
-        i_compress(p->depth + n, i_gather(r->lobe, record), m);
+        i_compress(p->depth + n, i_gather(r->depth, record), m);
         i_compress(p->slot + n, slot, m);
         n += m_count(m);
     }
-    for (int32_t k = 0; k < n; k += LANES) {
-        f_store(p->tmax + k, f_set(INFINITY));
-        f_store(p->eta2 + k, f_set(1));
-        f_store(p->roulette + k, f_set(1));
-        f_store(p->pdf + k, f_set(PDF_DELTA));
-        spec_store(p->beta, k, spec_set(f_set(1)));
-        i_store(ws->hit_shape + k, i_set(-1));
-        i_store(ws->hit_prim + k, i_set(0));
-        i_store(ws->hit_instance + k, i_set(0));
-    }
-    t->active = n;
-    t->current = 0;
+    probes_begin(t, n);
 }
 
-// Runs the paths of the probes; ws.scattered becomes what each of them brought. The records stay as they are.
-static void probe_stage(Tracer *t, int32_t *begin, int32_t count) {
+// Runs the paths of probes; `out` becomes what each of them brought. The records stay as they are.
+static void probes_run(Tracer *t, int32_t *begin, int32_t count, uint32_t salt, SpecRows out) {
     const uint32_t scramble = t->job->scramble;
-    const Tracer before = *t;
     const int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (int32_t)t->scene->media_count;
-    probe_choose(t, count);
-    probe_start(t, count);
     t->derivative = false;
     t->floor = 0;
-    t->job->scramble = rng_mix(scramble, 0x70726f62u); // random numbers of their own
+    t->job->scramble = rng_mix(scramble, salt); // random numbers of their own
     for (int c = 0; c < SPEC_N; c++) {
         memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
     }
@@ -150,8 +154,15 @@ static void probe_stage(Tracer *t, int32_t *begin, int32_t count) {
     t->first_bounce = 1;
     path_forward(t, begin);
     for (int c = 0; c < SPEC_N; c++) {
-        memcpy(t->ws.scattered[c], t->ws.radiance[c], (size_t)count * sizeof(real));
+        memcpy(out[c], t->ws.radiance[c], (size_t)count * sizeof(real));
     }
-    *t = before;
     t->job->scramble = scramble;
+}
+
+static void probe_stage(Tracer *t, int32_t *begin, int32_t count) {
+    const Tracer before = *t;
+    probe_choose(t, count);
+    probe_start(t, count);
+    probes_run(t, begin, count, 0x70726f62u, t->ws.scattered);
+    *t = before;
 }

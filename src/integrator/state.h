@@ -34,10 +34,12 @@ enum {
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw)
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
-#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium)
+#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)
 
 // Of a camera sample: where it lies on the film, and its alpha.
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
+
+#define BORDER_FLOATS(F) F(border_total) F(border_worth) F(border_x) F(border_y) F(border_z) F(border_dx) F(border_dy) F(border_dz)
 
 #define MOVE_FLOATS(F) F(next_px) F(next_py) F(next_pz) F(next_nx) F(next_ny) F(next_nz)
 
@@ -97,6 +99,10 @@ typedef struct Workspace {
     int32_t *probe, *probe_medium;
     real *probe_total, *probe_worth, *probe_at;
     SpecRows scattered;
+    // the same of the border that has the path's probe (border.h); which side of it that is on, and where
+    int32_t *border, *border_side, *border_medium, *border_depth;
+    BORDER_FLOATS(DECLARE_FLOAT)
+    SpecRows border_scattered;
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
@@ -134,6 +140,12 @@ static inline size_t workspace_layout_probes(Workspace *ws, char *block, size_t 
     CARVE(ws->probe_worth, n)
     CARVE(ws->probe_at, n)
     CARVE_SPEC(ws->scattered, n)
+    CARVE(ws->border, n)
+    CARVE(ws->border_side, n)
+    CARVE(ws->border_medium, n)
+    CARVE(ws->border_depth, n)
+    BORDER_FLOATS(CARVE_SAMPLE)
+    CARVE_SPEC(ws->border_scattered, n)
     return at;
 }
 

@@ -116,6 +116,8 @@ static Sink sink_of(const PathJob *job) {
                   .pose_at = job->pose_at,
                   .instance_at = job->instance_at,
                   .camera_at = job->camera_at,
+                  .volume_at = job->volume_at,
+                  .any_volumes = job->any_volumes,
                   .any_motion = job->any_motion,
                   .any_camera = job->any_camera,
                   .watch_turned = job->watch_turned,

@@ -63,6 +63,7 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec e
     i_store(r->instance + at, v->hit.instance);
     i_store(r->slot + at, v->slot);
     i_store(r->medium + at, v->medium);
+    i_store(r->depth + at, v->depth);
     i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
     f_store(r->u + at, v->hit.u);
     f_store(r->v + at, v->hit.v);

@@ -1,7 +1,7 @@
 // walk_adj.h: adjoints of what shadow rays pass, surfaces and media, and finding them again.
 #pragma once
 
-#include "integrator/flight_adj.h"
+#include "integrator/passage_move.h"
 #include "integrator/path_move.h"
 
 // Accumulates the adjoint dt of the product of what a walk's surfaces let through.
@@ -54,12 +54,44 @@ static NOINLINE Spec walk_again(Tracer *t, const Ray *ray, Int slot, Int medium,
     return walk_transmittance(t, *ray, m, t->scene->has_media ? &fog : NULL, &blocked, walk);
 }
 
-// Accumulates the adjoint dt of a walk's transmittance, whose value is `transmittance`.
-static void passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce, Sink *sink) {
+// Accumulates the adjoint dt of a walk's transmittance, whose value is `transmittance`; turn: as passage_move_adj.
+static void passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce, Turn *turn,
+                        Sink *sink) {
     walk_adj(t, walk, spec_mul(dt, walk->clear), sink);
+    SampleKey key = stream_key(t, slot, bounce, STREAM_SHADOW_PROBE);
     if (t->job->live_extinctions) {
-        SampleKey key = stream_key(t, slot, bounce, STREAM_SHADOW_PROBE);
         fog_adj(t, walk, transmittance, dt, &key, sink);
+    }
+    if (t->job->live_borders || turn) {
+        passage_move_adj(t, walk, transmittance, dt, &key, turn, sink);
+    }
+}
+
+// Whether lights move and what media let through with them.
+KFN bool lights_turn(const Tracer *t) { return t->job->any_places && t->scene->has_media; }
+
+// Lights at a point whose place is selected.
+KFN Mask points_that_move(const Tracer *t, Int light) {
+    const SceneView *scene = t->scene;
+    light = i_max(light, i_set(0));
+    Mask moves = m_set(false);
+    for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
+        moves = moves | mi_lt(i_set(-1), i_gather(t->job->place_at, light * MAX_EMITTER_SLOTS + k));
+    }
+    return moves & light_is_delta(scene, light) & ~mi_eq(EMITTER_FIELD(scene, light, kind), i_set(EMITTER_DIRECTIONAL));
+}
+
+// passage_adj, and what the turning of the shadow rays makes of where their lights are.
+static void connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
+                                   Vec3 p, Int light, Mask connected, Vec3 light_d, Float light_distance, Sink *sink) {
+    bool turns = lights_turn(t);
+    Turn turn = {p, v3_zero(), f_set(0), turns ? connected & points_that_move(t, light) : m_set(false)};
+    passage_adj(t, walk, transmittance, spec_zero_unless(connected, dt), slot, bounce, turns ? &turn : NULL, sink);
+    if (turns && m_any(connected)) {
+        LightMove move = light_move_zero();
+        move.d = v3_select(connected, turn.d, v3_zero());
+        move.distance = f_zero_unless(connected, turn.distance);
+        lights_move_adj(t->scene, light, connected, p, light_d, light_distance, &move, sink);
     }
 }
 
@@ -70,5 +102,5 @@ KFN bool passing_is_live(const Tracer *t) {
             return true;
         }
     }
-    return t->job->live_extinctions;
+    return t->job->live_extinctions || t->job->live_borders || lights_turn(t);
 }

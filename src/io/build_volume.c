@@ -27,7 +27,6 @@ static rey_result add_volume(Builder *b, VolumeNode volume, int32_t *out) {
 // Where a volume stands, with the parameter `path`.to_world, which places the box (null = the unit cube).
 static rey_result build_place(Builder *b, rey_xml_node *node, const char *path, const float *box, int32_t id,
                               VolumeNode *volume) {
-    static const char *const why = "moving a volume moves the border of its box, where what fills it jumps";
     double m[16];
     TRY(rey_xml_get_transform(b->ctx, node, "to_world", m));
     for (int k = 0; k < 3 && box; k++) { // the box lies from box[0 to 2] to box[3 to 5]
@@ -41,8 +40,7 @@ static rey_result build_place(Builder *b, rey_xml_node *node, const char *path, 
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the volume's to_world%s cannot be inverted",
                             box ? " with the box of its file" : "");
     }
-    Param pose = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT, .why = why,
-                  .volume = id};
+    Param pose = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR, .volume = id};
     TRY(build_pose(b, m, path, pose, &volume->to_world));
     volume->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), 12);
     return volume->table < 0 ? REY_ERROR_MEMORY : REY_OK;

@@ -24,26 +24,34 @@ KFN void slab(Float o, Float d, Float *low, Float *high) {
     *high = f_min(*high, f_select(parallel, never, f_max(a, b)));
 }
 
-// Narrows [low, high] down to the part of a ray that lies in the medium: in the box along the world's axes around the cube of
-// its extinction, as the format has it. Voxels at the cube's border reach to that box; volumes that repeat end with the cube.
+// A heterogeneous medium fills a box along the world's axes around the cube of its extinction, as the format has it, and the
+// voxels at the cube's border reach to that box. With volumes that repeat it ends with the cube.
+KFN bool medium_fills_box(const VolumeNode *v) { return v->table >= 0 && (v->kind == VOLUME_CONSTANT || v->wrap == WRAP_CLAMP); }
+
+// Where that box begins along an axis, and its size.
+KFN void medium_box(const SceneView *scene, const VolumeNode *v, int axis, real *corner, real *size) {
+    const float *row = scene->theta + v->to_world + 4 * axis;
+    real x = (real)row[0], y = (real)row[1], z = (real)row[2];
+    *size = (x < 0 ? -x : x) + (y < 0 ? -y : y) + (z < 0 ? -z : z);
+    *corner = (real)0.5 * (x + y + z - *size) + (real)row[3];
+}
+
+// Narrows [low, high] down to the part of a ray that lies in the medium.
 KFN void medium_span(const SceneView *scene, const MediumNode *medium, const VolumeNode *v, Vec3 o, Vec3 d, Float *low,
                      Float *high) {
     if (!medium->bounded) {
         return;
     }
-    bool placed = v->table >= 0, reaches = v->kind == VOLUME_CONSTANT || v->wrap == WRAP_CLAMP;
-    if (placed && !reaches) {
+    const bool box = medium_fills_box(v);
+    if (v->table >= 0 && !box) {
         o = volume_to_local(scene, v, o, 1);
         d = volume_to_local(scene, v, d, 0);
     }
     const Float p[3] = {o.x, o.y, o.z}, q[3] = {d.x, d.y, d.z};
     for (int k = 0; k < 3; k++) {
         real corner = 0, size = 1;
-        if (placed && reaches) {
-            const float *row = scene->theta + v->to_world + 4 * k;
-            real x = (real)row[0], y = (real)row[1], z = (real)row[2];
-            size = (x < 0 ? -x : x) + (y < 0 ? -y : y) + (z < 0 ? -z : z);
-            corner = (real)0.5 * (x + y + z - size) + (real)row[3];
+        if (box) {
+            medium_box(scene, v, k, &corner, &size);
         }
         slab((p[k] - corner) * (1 / size), q[k] * (1 / size), low, high);
     }

@@ -71,8 +71,13 @@ KFN PhaseMatrix phase_fetch_MATRIX(const PhaseCall *call, int32_t slot) {
 KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d, Sink *sink, Mask m) {
     const VolumeNode *grid = phase_matrix_grid(call, slot);
     int32_t at = sink->texture_at[slot];
-    if (grid && at >= 0) {
-        gridvolume_adj_six(grid, volume_to_local(call->scene, grid, call->at.hit->p, 1), d.m, at, sink, m);
+    if (grid) {
+        Vec3 q = volume_to_local(call->scene, grid, call->at.hit->p, 1), dq = v3_zero();
+        bool moves = volume_moves(call->scene, grid, sink);
+        gridvolume_adj_six(call->scene, grid, q, d.m, at, moves ? &dq : NULL, sink, m);
+        if (moves) {
+            volume_place_adj(call->scene, grid, q, dq, sink, m);
+        }
         return;
     }
     for (int i = 0; i < 6 && at >= 0; i++) {

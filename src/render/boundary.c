@@ -141,7 +141,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
         plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
         result = plan->films ? REY_OK : REY_ERROR_MEMORY;
     }
-    int32_t edge_count = plan->job.edge_count;
+    // In media only silhouettes are known, and what else there is does not depend on lights.
+    int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .cdf = plan->cdf,

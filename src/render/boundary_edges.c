@@ -2,6 +2,7 @@
 // their length there. Where this is a guess (lenses, round shapes), it decides the noise only.
 #include "render/boundary_edges.h"
 
+#include "bsdf/table.h"
 #include "sensor/kinds.h"
 #include "shape/affine.h"
 #include "shape/shape.h"
@@ -400,7 +401,8 @@ static Weigher weigher_of(const Render *r, int32_t kind) {
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
     double factor = edge_moves(r, e) ? 1 : w->still;
-    if (factor == 0 || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
+    bool hides = !view->has_media || !rey_bsdf_passes(view->bsdfs[view->shapes[e->shape].bsdf].kind);
+    if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
     }
     bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;

@@ -9,7 +9,8 @@ static bool texture_live(const SceneView *view, const PathJob *job, int32_t id) 
     }
     const TextureNode *node = view->textures + id;
     return job->texture_at[id] >= 0 || job->to_uv_at[id] >= 0 ||
-           (node->kind == TEXTURE_ATTRIBUTE && job->any_attributes) || texture_live(view, job, node->child[0]) ||
+           (node->kind == TEXTURE_ATTRIBUTE && job->any_attributes) ||
+           (node->kind == TEXTURE_VOLUME && job->volume_at[node->volume] >= 0) || texture_live(view, job, node->child[0]) ||
            texture_live(view, job, node->child[1]);
 }
 
@@ -60,7 +61,8 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
     bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture);
     return (extinction ? LIVE_EXTINCTION : 0) | (volume_live(view, job, medium->albedo) ? LIVE_ALBEDO : 0) |
            (phase_live(view, job, medium->phase) ? LIVE_PHASE : 0) |
-           (volume_live(view, job, medium->emission) ? LIVE_GLOW : 0);
+           (volume_live(view, job, medium->emission) ? LIVE_GLOW : 0) |
+           (medium->bounded && job->volume_at[medium->sigma_t] >= 0 ? LIVE_BORDER : 0);
 }
 
 // Groups of surfaces of which something selected moves a point or a vertex normal.
@@ -86,7 +88,9 @@ void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
     for (int64_t i = 0; i < view->media_count && view->has_media; i++) {
         live[view->groups_count + i] = medium_live(view, job, view->media + i);
         job->live_extinctions |= (live[view->groups_count + i] & LIVE_EXTINCTION) != 0;
+        job->live_borders |= (live[view->groups_count + i] & LIVE_BORDER) != 0;
     }
+    job->live_borders |= job->any_borders;
     job->live = live;
     job->live_lights |= job->any_motion;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {

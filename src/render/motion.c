@@ -1,6 +1,7 @@
 // motion.c: which motions derivatives know, and vertex normals that follow their vertices.
 #include "render/motion.h"
 
+#include "bsdf/table.h"
 #include "sensor/kinds.h"
 #include "shape/normals.h"
 #include "shape/shape.h"
@@ -58,16 +59,32 @@ static int32_t camera_theta(const SensorRecord *s, int32_t number) {
     }
 }
 
+static bool only_separates(const SceneView *view, const ShapeRecord *shape) {
+    return shape->emitter < 0 && shape_moves(shape->kind) && rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+}
+
+bool rey_moves_border(const SceneView *view, const Param *p) {
+    if (p->geometry >= 0) {
+        return view->has_media && only_separates(view, view->shapes + p->geometry);
+    }
+    bool all = view->has_media && p->instance >= 0;
+    for (int64_t i = 0; i < view->shapes_count && all; i++) {
+        all = view->shapes[i].collection != view->instances[p->instance].group || only_separates(view, view->shapes + i);
+    }
+    return all;
+}
+
 int32_t *rey_motion_slot(Render *r, const Param *p) {
     const SceneView *view = &r->scene->view;
     PathJob *job = &r->job;
+    bool *moves = rey_moves_border(view, p) ? &job->any_borders : &job->any_motion;
     if (p->geometry >= 0) {
         bool pose = p->theta == view->shapes[p->geometry].to_world;
-        job->any_motion = true;
+        *moves = true;
         return (int32_t *)(uintptr_t)(pose ? job->pose_at : job->points_at) + p->geometry;
     }
     if (p->instance >= 0) {
-        job->any_motion = true;
+        *moves = true;
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
     if (p->camera >= 0 && camera_theta(r->plan.sensor, p->camera) == p->theta) {

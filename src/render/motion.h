@@ -6,6 +6,10 @@
 // Whether the kernels know the interior term of a parameter that moves something, as the sensor sees it.
 bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p);
 
+// Whether the parameter moves nothing but surfaces that light passes undeviated and undimmed: in scenes with media these are
+// where media end, and neither the path's vertices nor what hides light are among them.
+bool rey_moves_border(const SceneView *view, const Param *p);
+
 // Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
 int32_t *rey_motion_slot(Render *r, const Param *p);
 

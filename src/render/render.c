@@ -167,7 +167,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
     r->faces |= job->faces;
-    r->stats.missing_terms = r->faces == (FACES_ALIKE | FACES_AWAY) ? REY_TERM_TERMINATOR : 0;
+    r->stats.missing_terms = (r->faces & FACES_BOTH) == FACES_BOTH ? REY_TERM_TERMINATOR : 0;
     r->stats.trace_seconds += job->trace_seconds;
     r->stats.thread_seconds += seconds;
     r->done += 1;
@@ -235,7 +235,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     enum { PAD = 16 };
     int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
     int64_t n = 2 * textures + 3 * shapes + view->instances_count + CAMERA_NUMBERS + view->attributes_count + places +
-                view->groups_count + view->media_count + PAD;
+                view->volumes_count + view->groups_count + view->media_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
@@ -247,6 +247,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.pose_at = r->job.points_at + shapes;
     r->job.instance_at = r->job.pose_at + shapes;
     r->job.camera_at = r->job.instance_at + view->instances_count;
+    r->job.volume_at = r->job.camera_at + CAMERA_NUMBERS;
     r->job.normals_at = normals_at;
     int64_t at = 0;
     for (int i = 0; i < selection.count; i++) {
@@ -256,6 +257,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
                         : p->normals >= 0 ? &normals_at[p->normals]
                         : p->attribute >= 0 ? &attribute_at[p->attribute]
                         : p->emitter >= 0 ? &place_at[MAX_EMITTER_SLOTS * p->emitter + p->place]
+                        : p->volume >= 0  ? (int32_t *)(uintptr_t)r->job.volume_at + p->volume
                                           : rey_motion_slot(r, p);
         if (slot && *slot >= 0) {
             return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "%s is selected twice", p->name);
@@ -266,8 +268,9 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_normals |= p->normals >= 0;
         r->job.any_attributes |= p->attribute >= 0;
         r->job.any_places |= p->emitter >= 0;
+        r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
-        r->job.any_motion |= p->emitter < 0 && (p->terms & REY_TERM_SPECULAR);
+        r->job.any_motion |= p->emitter < 0 && (p->terms & REY_TERM_SPECULAR) && !rey_moves_border(view, p);
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
         if (at > INT32_MAX / 2) {
@@ -281,7 +284,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.to_uv_at = to_uv_at;
     r->job.attribute_at = attribute_at;
     r->job.place_at = place_at;
-    rey_live_groups(view, &r->job, (int32_t *)(uintptr_t)r->job.camera_at + CAMERA_NUMBERS);
+    rey_live_groups(view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + view->volumes_count);
     return REY_OK;
 }
 
@@ -343,23 +346,6 @@ static void run_boundaries(Render *r, int set, double *picture) {
             rey_terms_book(r, set, rey_boundary_term(i), picture);
         }
     }
-}
-
-// Refuses a gradient whose paths met a jump that no term covers.
-static rey_result derivative_end(const Render *r, rey_result result, rey_selection selection) {
-    if (result != REY_OK || r->def.terms || !(r->stats.missing_terms & REY_TERM_TERMINATOR)) {
-        return result;
-    }
-    const Param *p = NULL;
-    for (int i = 0; i < selection.count && (!p || !(p->terms & REY_TERM_TERMINATOR)); i++) {
-        const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
-        p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
-    }
-    return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the gradient of %s needs the term 'terminator', which does not exist yet: paths met shading "
-                    "normals that face the viewer as the surface does and others that do not, and the picture jumps "
-                    "between them. --terms interior gives the part that does",
-                    p ? p->name : "");
 }
 
 // The adjoint of the film's sums: of each pixel over samples and filter norm.
@@ -445,7 +431,7 @@ rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermReques
             }
         }
     }
-    result = derivative_end(&r, result, selection);
+    result = rey_terms_end(&r, result, selection);
     return rey_render_end(&r, result, start, stats);
 }
 
@@ -493,6 +479,6 @@ rey_result rey_jvp_terms(rey_scene *scene, const rey_render_def *def, TermReques
         }
     }
     rey_free(scene->ctx, pictures);
-    result = derivative_end(&r, result, selection);
+    result = rey_terms_end(&r, result, selection);
     return rey_render_end(&r, result, start, stats);
 }

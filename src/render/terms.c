@@ -1,7 +1,9 @@
 // terms.c: which terms a selection needs, which exist, and what each brings.
 #include "render/terms.h"
 
+#include "bsdf/table.h"
 #include "render/motion.h"
+#include "scene/sink.h"
 
 #include <string.h>
 
@@ -25,19 +27,59 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
     }
-    if (p->volume >= 0) {
-        return 0;
-    }
     if (p->normals >= 0) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     }
     return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
 }
 
-// In media everything that moves changes the light on its way, and boundaries of shadows lie in the air.
-static bool moves(const Param *p) {
-    return p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || p->volume >= 0 ||
-           (p->terms & REY_TERM_SPECULAR);
+// Whether some medium's extinction jumps from voxel to voxel.
+static bool has_jumping_media(const SceneView *view) {
+    for (int64_t i = 0; i < view->media_count; i++) {
+        const VolumeNode *v = view->volumes + view->media[i].sigma_t;
+        if (v->kind == VOLUME_GRID && v->filter == FILTER_NEAREST) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool bends_within(const SceneView *view, int32_t bsdf) {
+    const BsdfNode *node = view->bsdfs + bsdf;
+    bool bends = rey_bsdf_bends(node->kind);
+    for (int i = 0; i < MAX_CHILDREN && !bends; i++) {
+        bends = node->child[i] >= 0 && bends_within(view, node->child[i]);
+    }
+    return bends;
+}
+
+// The terms that a parameter needs. Where media end, at surfaces of the kind null, shadows are not seen in mirrors.
+static int terms_needed(const SceneView *view, const Param *p, int terms) {
+    bool bends = false;
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        int32_t bsdf = view->shapes[i].bsdf;
+        bends |= !rey_bsdf_passes(view->bsdfs[bsdf].kind) && bends_within(view, bsdf);
+    }
+    return view->has_media && p->emitter >= 0 && !bends ? terms & ~REY_TERM_SPECULAR : terms;
+}
+
+// What of a parameter's derivative is not known because of volumes or media, null where all is.
+static const char *gap_in_media(const SceneView *view, const Param *p) {
+    const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
+    if (volume && volume->kind == VOLUME_GRID && volume->filter == FILTER_NEAREST) {
+        return "with filter_type=\"nearest\" the volume jumps from voxel to voxel, and with \"trilinear\" it does not";
+    }
+    if (!view->has_media || rey_moves_border(view, p)) {
+        return NULL;
+    }
+    if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR))) {
+        return "in scenes with participating media, what moves changes what they let through and scatter, and moves the shadows in "
+               "them. Known are volumes, surfaces of the kind 'null', at which media end, and lights";
+    }
+    if (p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) && has_jumping_media(view)) {
+        return "in participating media with filter_type=\"nearest\", light that moves passes jumps from voxel to voxel";
+    }
+    return NULL;
 }
 
 static bool is_volume(const SceneView *view, int32_t texture) {
@@ -77,11 +119,12 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
-        if (scene->view.has_media && moves(p)) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "no term of the gradient of %s exists yet in scenes with participating media: what moves "
-                            "changes what they let through and scatter, and moves the shadows in them",
-                            info.name);
+        const char *gap = gap_in_media(&scene->view, p);
+        if (gap) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
+        }
+        if (rey_moves_border(&scene->view, p)) {
+            continue; // such surfaces have no silhouettes
         }
         bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                       (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
@@ -91,7 +134,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
                             "move look them up elsewhere", info.name);
         }
         int known = terms_known(scene, def, p);
-        int missing = info.terms & ~known;
+        int needs = terms_needed(&scene->view, p, info.terms), missing = needs & ~known;
         bool interior = known & REY_TERM_INTERIOR;
         if (missing && !def->terms) {
             int bit = missing & -missing;
@@ -103,13 +146,34 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
-        *needed |= info.terms;
+        *needed |= needs;
     }
     if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
         int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;
+}
+
+rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
+    if (result == REY_OK && (r->faces & LIGHT_WITHIN)) {
+        return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                        "the gradient of lights at a point that lie within a participating medium does not exist yet: as they "
+                        "move, so must the points next to them from which their light is scattered");
+    }
+    if (result != REY_OK || r->def.terms || !(r->stats.missing_terms & REY_TERM_TERMINATOR)) {
+        return result;
+    }
+    const Param *p = NULL;
+    for (int i = 0; i < selection.count && (!p || !(p->terms & REY_TERM_TERMINATOR)); i++) {
+        const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
+        p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
+    }
+    return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                    "the gradient of %s needs the term 'terminator', which does not exist yet: paths met shading "
+                    "normals that face the viewer as the surface does and others that do not, and the picture jumps "
+                    "between them. --terms interior gives the part that does",
+                    p ? p->name : "");
 }
 
 void rey_terms_book(Render *r, int set, int term, const double *picture) {

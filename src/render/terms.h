@@ -6,6 +6,9 @@
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed);
 
+// `result`, unless all went well but paths met what no term covers: then refuses the gradient.
+rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection);
+
 // Books what has come together in a set since the last call, or since the set began where the term is `interior`, for a
 // term. picture: of the forward mode; in reverse mode the shards' gradients count.
 void rey_terms_book(Render *r, int set, int term, const double *picture);

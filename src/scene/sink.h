@@ -7,7 +7,9 @@
 #include "scene/scene.h"
 
 // Which way shading normals that depend on the selection were met: as the surface faces, or the other way round.
-enum { FACES_ALIKE = 1, FACES_AWAY = 2 };
+enum { FACES_ALIKE = 1, FACES_AWAY = 2, FACES_BOTH = 3 };
+// Beside these: a light at a point that moves was met within a medium.
+enum { LIGHT_WITHIN = 4 };
 
 typedef struct Sink {
     double *gradient;          // reverse, else null
@@ -21,6 +23,8 @@ typedef struct Sink {
     const int32_t *pose_at;     // per shape: its to_world
     const int32_t *instance_at; // per instance: its to_world
     const int32_t *camera_at;   // CAMERA_ numbers
+    const int32_t *volume_at;   // per volume: its to_world
+    bool any_volumes;
     bool any_normals, any_attributes, any_places;
     bool any_motion, any_camera; // surfaces or the sensor move; the sensor does
     Vec2 *at;          // gathers the adjoint of the barycentrics at which attributes are read; null = not asked for

@@ -181,7 +181,7 @@ KFN Spec volume_texture_eval(const SceneView *scene, const TextureNode *t, const
 KFN void volume_texture_adj(const SceneView *scene, int32_t id, const Hit *hit, Spec d, Sink *sink, Mask m) {
     const VolumeNode *v = scene->volumes + scene->textures[id].volume;
     if (hit) {
-        volume_adj(scene, v, volume_to_local(scene, v, hit->p, 1), d, sink->texture_at[id], NULL, sink, m);
+        volume_world_adj(scene, v, hit->p, d, sink, m);
     }
 }
 
@@ -243,7 +243,7 @@ KFN Float texture_eval_real(const SceneView *scene, int32_t id, TexCoord uv) {
 KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
     const TextureNode *t = scene->textures + id;
     return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD ||
-           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY;
+           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY || (t->kind == TEXTURE_VOLUME && sink->any_volumes);
 }
 
 KFN void blackbody_adj(const SceneView *scene, const TextureNode *t, Spec d, Sink *sink, Mask m) {

@@ -1,5 +1,5 @@
 // volume.h: fields over space, and their adjoints: to the values, and to the point, through which to_world moves.
-// NOT differentiated: jumps of nearest voxels and of the cube's border under a point that moves.
+// NOT differentiated: jumps of nearest voxels, and of a medium at the border of its box (integrator/border.h).
 #pragma once
 
 #include "scene/hit.h"
@@ -61,6 +61,21 @@ KFN Spec gridvolume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
     return value;
 }
 
+// The slope of sum_k w_k along_k, with respect to the point. w_k is linear in each of f = n p - 1/2 - floor.
+KFN Vec3 voxels_slope(const VolumeNode *v, const Voxels *s, const Float *along) {
+    const int32_t n[3] = {v->nx, v->ny, v->nz};
+    Float slope[3] = {f_set(0), f_set(0), f_set(0)};
+    for (int k = 0; k < 8 && s->count == 8; k++) {
+        for (int axis = 0; axis < 3; axis++) {
+            Voxels flat = *s;
+            flat.f[axis] = k >> axis & 1 ? f_set(1) : f_set(0);
+            Float rest = voxel_weight(&flat, k) * along[k] * (real)n[axis];
+            slope[axis] = slope[axis] + (k >> axis & 1 ? rest : -rest);
+        }
+    }
+    return v3(slope[0], slope[1], slope[2]);
+}
+
 // at: where the values begin in the sink, -1 = not asked for; dp may be null.
 KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, int32_t at, Vec3 *dp, Sink *sink,
                         Mask m) {
@@ -76,19 +91,8 @@ KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spe
         }
         along[k] = dp ? spec_dot(d, voxel_value(scene, v, s.at[k])) : f_set(0);
     }
-    const int32_t n[3] = {v->nx, v->ny, v->nz};
-    Float slope[3] = {f_set(0), f_set(0), f_set(0)};
-    for (int k = 0; k < 8 && dp && s.count == 8; k++) {
-        // w_k is linear in each of f = n p - 1/2 - floor
-        for (int axis = 0; axis < 3; axis++) {
-            Voxels flat = s;
-            flat.f[axis] = k >> axis & 1 ? f_set(1) : f_set(0);
-            Float rest = voxel_weight(&flat, k) * along[k] * (real)n[axis];
-            slope[axis] = slope[axis] + (k >> axis & 1 ? rest : -rest);
-        }
-    }
     if (dp) {
-        v3_acc(dp, v3(slope[0], slope[1], slope[2]));
+        v3_acc(dp, voxels_slope(v, &s, along));
     }
 }
 
@@ -117,13 +121,23 @@ KFN void gridvolume_eval_six(const SceneView *scene, const VolumeNode *v, Vec3 p
     }
 }
 
-KFN void gridvolume_adj_six(const VolumeNode *v, Vec3 p, const Float *d, int32_t at, Sink *sink, Mask m) {
+// As gridvolume_adj.
+KFN void gridvolume_adj_six(const SceneView *scene, const VolumeNode *v, Vec3 p, const Float *d, int32_t at, Vec3 *dp,
+                            Sink *sink, Mask m) {
     Voxels s = voxels_around(v, p);
+    Float along[8];
     for (int k = 0; k < s.count; k++) {
         Float w = s.count == 1 ? f_set(1) : voxel_weight(&s, k);
+        along[k] = f_set(0);
         for (int i = 0; i < 6; i++) {
-            sink_add(sink, s.at[k] + (at + i), w * d[i], m);
+            if (at >= 0) {
+                sink_add(sink, s.at[k] + (at + i), w * d[i], m);
+            }
+            along[k] = along[k] + d[i] * theta_at(scene, s.at[k] + (v->theta + i));
         }
+    }
+    if (dp) {
+        v3_acc(dp, voxels_slope(v, &s, along));
     }
 }
 
@@ -173,5 +187,54 @@ KFN void volume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d,
 #undef VOLUME
     default:
         break;
+    }
+}
+
+// ---- in the world ------------------------------------------------------------------------------------------------
+
+KFN bool volume_moves(const SceneView *scene, const VolumeNode *v, const Sink *sink) {
+    return sink->any_volumes && sink->volume_at[v - scene->volumes] >= 0;
+}
+
+// The adjoint of a point of the world, given that in the volume's space.
+KFN Vec3 volume_to_world_adj(const SceneView *scene, const VolumeNode *v, Vec3 dq) {
+    if (v->table < 0) {
+        return dq;
+    }
+    const float *r = scene->tables + v->table;
+    return v3(r[0] * dq.x + r[4] * dq.y + r[8] * dq.z, r[1] * dq.x + r[5] * dq.y + r[9] * dq.z,
+              r[2] * dq.x + r[6] * dq.y + r[10] * dq.z);
+}
+
+// The slope of d . f at a point of the world, f a grid.
+KFN Vec3 volume_slope(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d) {
+    Voxels s = voxels_around(v, volume_to_local(scene, v, p, 1));
+    Float along[8];
+    for (int k = 0; k < s.count; k++) {
+        along[k] = spec_dot(d, voxel_value(scene, v, s.at[k]));
+    }
+    return volume_to_world_adj(scene, v, voxels_slope(v, &s, along));
+}
+
+// Adds the adjoint dq of a fixed point of the world, which is q in the volume's space: q = M^-1 p moves by -M^-1 dM q.
+KFN void volume_place_adj(const SceneView *scene, const VolumeNode *v, Vec3 q, Vec3 dq, Sink *sink, Mask m) {
+    const int32_t at = sink->volume_at[v - scene->volumes];
+    Vec3 back = volume_to_world_adj(scene, v, dq);
+    const Float d[3] = {-back.x, -back.y, -back.z};
+    for (int i = 0; i < 3; i++) {
+        sink_add_uniform(sink, at + 4 * i, d[i] * q.x, m);
+        sink_add_uniform(sink, at + 4 * i + 1, d[i] * q.y, m);
+        sink_add_uniform(sink, at + 4 * i + 2, d[i] * q.z, m);
+        sink_add_uniform(sink, at + 4 * i + 3, d[i], m);
+    }
+}
+
+// The adjoint d of the field at a point p of the world, which is fixed.
+KFN void volume_world_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, Sink *sink, Mask m) {
+    Vec3 q = volume_to_local(scene, v, p, 1), dq = v3_zero();
+    bool moves = volume_moves(scene, v, sink);
+    volume_adj(scene, v, q, d, sink->texture_at[v->texture], moves ? &dq : NULL, sink, m);
+    if (moves) {
+        volume_place_adj(scene, v, q, dq, sink, m);
     }
 }

@@ -54,6 +54,13 @@ KFN Vec3 interaction_offset(const Interaction *si, Vec3 d) {
     return v3_madd(si->p, f_copysign(step, v3_dot(si->ng, d)), si->ng);
 }
 
+// The same of a ray that passes undeviated. It stays the same line: next to outlines, a step to the side would lengthen what lies
+// within by much more than that step, and in media the lengths count.
+KFN Vec3 interaction_behind(const Interaction *si, Vec3 d) {
+    Float largest = f_max(f_max(f_abs(si->p.x), f_abs(si->p.y)), f_abs(si->p.z));
+    return v3_madd(si->p, (1.0f + largest) * 9e-5f, d);
+}
+
 // Density per solid angle, seen from ref along d, of points that are uniform over an area around si.
 KFN Float area_density(Vec3 ref, Vec3 d, const Interaction *si, Float area) {
     Vec3 to_point = v3_sub(si->p, ref);

@@ -13,7 +13,7 @@ typedef struct Case {
     rey_define defines[MOST_DEFINES];
     double value[3];
     const char *param;
-    float tangent[3];
+    float tangent[16];
     double derivative[3];
 } Case;
 
@@ -67,25 +67,52 @@ static void expect(const Case *c, const char *what, const double *mean, const do
 
 static double largest(const double *v) { return fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2])); }
 
+static void define(Case *c, const char *name, const char *value) {
+    int count = 0;
+    while (c->defines[count].name && strcmp(c->defines[count].name, name) != 0) {
+        count++;
+    }
+    assert_true(count < MOST_DEFINES);
+    c->defines[count] = (rey_define){name, value};
+}
+
+static void judge_kind(Case c, const char *kind) {
+    define(&c, "kind", kind);
+    Room room = slab_open(c.defines, 2);
+    double mean[3], error[3];
+    mean_of(room, -1, NULL, 1024, mean, error);
+    expect(&c, kind, mean, error, c.value, fmax(largest(c.value), 1e-3));
+    int param = rey_param_find(room.scene, c.param);
+    assert_true(param >= 0);
+    mean_of(room, param, c.tangent, 1024, mean, error);
+    expect(&c, c.param, mean, error, c.derivative, fmax(largest(c.derivative), largest(c.value)));
+    room_close(room);
+}
+
 // The case in both kinds of medium: one is followed in closed form, the other is tracked.
 static void judge(Case c) {
-    static const char *const kinds[] = {"homogeneous", "heterogeneous"};
-    for (int k = 0; k < 2; k++) {
-        int count = 0;
-        while (c.defines[count].name && strcmp(c.defines[count].name, "kind") != 0) {
-            count++;
-        }
-        c.defines[count] = (rey_define){"kind", kinds[k]};
-        Room room = slab_open(c.defines, 2);
-        double mean[3], error[3];
-        mean_of(room, -1, NULL, 1024, mean, error);
-        expect(&c, kinds[k], mean, error, c.value, fmax(largest(c.value), 1e-3));
-        int param = rey_param_find(room.scene, c.param);
-        assert_true(param >= 0);
-        mean_of(room, param, c.tangent, 1024, mean, error);
-        expect(&c, c.param, mean, error, c.derivative, fmax(largest(c.derivative), largest(c.value)));
-        room_close(room);
-    }
+    judge_kind(c, "homogeneous");
+    judge_kind(c, "heterogeneous");
+}
+
+// The case as the slab grows from thickness 2 s, s = 1, given dI / ds; and as it moves along the view, where nothing changes.
+// The border is a surface, or that of the box of a volume.
+static void judge_border(Case c) {
+    Case box = c;
+    c.param = "slab.to_world";
+    c.tangent[10] = 1;
+    judge_kind(c, "homogeneous");
+    define(&box, "wide", "2");
+    box.param = "fog.sigma_t.to_world";
+    box.tangent[10] = 2;
+    box.tangent[11] = -1;
+    judge_kind(box, "heterogeneous");
+    c.tangent[10] = box.tangent[10] = 0;
+    c.tangent[11] = box.tangent[11] = 1;
+    memset(c.derivative, 0, sizeof c.derivative);
+    memset(box.derivative, 0, sizeof box.derivative);
+    judge_kind(c, "homogeneous");
+    judge_kind(box, "heterogeneous");
 }
 
 static const double sigma[3] = {0.3, 0.6, 0.9};
@@ -167,6 +194,39 @@ static void test_furnace(void **state) {
     judge(c);
 }
 
+// The three of them as functions of where the slab begins and ends.
+static void test_borders(void **state) {
+    UNUSED(state);
+    const double albedo[3] = {0.9, 0.5, 0.2}, g = 0.3, p = (1 - g * g) / (4 * pi * pow(1 + g, 3)), light = 5;
+    Case through = {"transmittance", {{"sky", "1"}}, {0}, NULL, {0}, {0}};
+    Case scattered = {"scattering", {{"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}}, {0}, NULL, {0}, {0}};
+    Case glow = {"emission", {{"emission", "0.5"}}, {0}, NULL, {0}, {0}};
+    for (int k = 0; k < 3; k++) {
+        double s = sigma[k];
+        through.value[k] = exp(-2 * s);
+        through.derivative[k] = -2 * s * through.value[k];
+        scattered.value[k] = albedo[k] * p * light * (1 - exp(-4 * s)) / 2;
+        scattered.derivative[k] = albedo[k] * p * light * 2 * s * exp(-4 * s);
+        glow.value[k] = 0.5 * (1 - exp(-2 * s)) / s;
+        glow.derivative[k] = 2 * 0.5 * exp(-2 * s);
+    }
+    judge_border(through);
+    judge_border(scattered);
+    judge_border(glow);
+}
+
+// A ball of the radius r that glows, whole in the picture: I = j 4/3 pi r^3, also next to its outline.
+static void test_outline(void **state) {
+    UNUSED(state);
+    Case c = {"ball", {{"emission", "1"}, {"scale", "0"}, {"shape", "sphere"}, {"wide", "0.4"}}, {0}, "slab.to_world", {0}, {0}};
+    c.tangent[0] = c.tangent[5] = c.tangent[10] = 0.4f;
+    for (int k = 0; k < 3; k++) {
+        c.value[k] = 4 / 3.0 * pi * 0.4 * 0.4 * 0.4;
+        c.derivative[k] = 3 * c.value[k];
+    }
+    judge_kind(c, "homogeneous");
+}
+
 static void refused(const rey_define *defines, const char *param, const char *why) {
     float image[3 * PIXELS], tangent[64] = {1};
     Room room = slab_open(defines, 1);
@@ -184,15 +244,15 @@ static void refused(const rey_define *defines, const char *param, const char *wh
 static void test_refusals(void **state) {
     UNUSED(state);
     const rey_define fog[MOST_DEFINES] = {{"kind", "heterogeneous"}}, particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
-    refused(fog, "slab.to_world", "participating media");
     refused(fog, "camera.to_world", "participating media");
-    refused(fog, "fog.sigma_t.to_world", "participating media");
     refused(particles, "fog.scale.value", "'ptracer' knows no participating media");
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
-                                       cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals)};
+                                       cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_borders),
+                                       cmocka_unit_test(test_outline)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -138,6 +138,24 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
     }
 }
 
+// In media, lanes whose way to the sensor is open; *l becomes what of it arrives there.
+static Mask near_clear(Indirect *in, const Ray *ray, Int medium, Int slot, int32_t bounce, Mask m, Spec *l) {
+    if (!m_any(m)) {
+        return m;
+    }
+    Mask blocked;
+    Fog fog = {medium, stream_key(in->t, slot, bounce, STREAM_SHADOW)};
+    Spec through = walk_transmittance(in->t, *ray, m, &fog, &blocked, NULL);
+    *l = spec_mul(*l, through);
+    return m & m_gt(spec_max(through), f_set(0));
+}
+
+// Lanes of vertices in scenes with media from which paths to the sensor are not too deep.
+KFN Mask near_reaches(const Tracer *t, const Vertex *v) {
+    int32_t depth = t->scene->max_depth;
+    return depth < 0 ? v->m : v->m & mi_lt(v->depth + 1, i_set(depth));
+}
+
 // Connects vertices to the sensor, as light tracing does (particle.h).
 static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Tracer *t = in->t;
@@ -156,8 +174,37 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); // jumps have either sign
     m = m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
-    m = m_any(m) ? particle_open(t, &ray, m) : m;
+    if (t->scene->has_media) {
+        m = near_clear(in, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
+    } else {
+        m = m_any(m) ? particle_open(t, &ray, m) : m;
+    }
     near_book(in, &sight, l, at->v.slot, bounce, m);
+}
+
+// The same of collisions.
+static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *order, int32_t count, int32_t bounce,
+                               int32_t next_count) {
+    Tracer *t = in->t;
+    const PathJob *job = t->job;
+    Vertex v = vertex_load(t, order, count, bounce);
+    v.m = near_reaches(t, &v);
+    if (!m_any(v.m)) {
+        return next_count;
+    }
+    Sight sight = camera_look(in->pinhole, t->scene, t->sensor, v.hit.p, near_lens(in, v.slot));
+    Collision c = collision_look(t, medium, &v.hit, v.d);
+    Mask m = v.m & sight.valid & m_ge(sight.x, f_set((real)job->x)) & m_lt(sight.x, f_set((real)(job->x + job->width))) &
+             m_ge(sight.y, f_set((real)job->y)) & m_lt(sight.y, f_set((real)(job->y + job->height)));
+    Vec3 d = v3_select(m, sight.d, v3_neg(v.d));
+    Spec f = spec_scale(c.albedo, phase_eval(&c.call, d, c.wi) * sight.density);
+    Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
+    m = m & m_gt(spec_max(l), f_set(0)) & m_finite(spec_sum(l));
+    Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
+    m = near_clear(in, &ray, v.medium, v.slot, bounce, m, &l);
+    near_book(in, &sight, l, v.slot, bounce, m);
+    SampleKey key = slot_key(t, v.slot);
+    return collision_scatter(t, &v, &c, &key, bounce, v.m, -1, next_count);
 }
 
 static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order, int32_t count, int32_t bounce,
@@ -169,13 +216,29 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     if (in->b->kind == BOUNDARY_HORIZON && bounce == 0) {
         at.cosine = f_set(1); // is part of no weight of the segment's
     }
+    if (scene->has_media) {
+        at.v.m = near_reaches(in->t, &at.v);
+    }
     if (!scene->hide_emitters || group->emitter < 0) {
         near_connect(in, &at, bounce);
     }
-    if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth) {
+    if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth && !scene->has_media) {
         return next_count;
     }
     return particle_scatter(in->t, &at, bounce, -1, next_count);
+}
+
+// In media, puts particles k... where their flights from the edge have ended.
+static void near_place(Tracer *t, const Segments *q, int32_t k) {
+    Paths *p = &t->ws.paths[0];
+    Mask m = m_first_n(q->count - k);
+    Hit hit = LOAD_HIT(q, k, near);
+    Int air = i_load(q->air + k), group = air + ((int32_t)t->scene->groups_count + 1);
+    hit.shape = i_select(m, hit.shape, i_set(-1));
+    hit_store(t, k, &hit);
+    i_store(t->ws.hit_group + k, i_select(m & mi_lt(i_set(-1), air), group, i_load(t->ws.hit_group + k)));
+    i_store(p->medium + k, i_load(q->around + k));
+    spec_store(p->beta, k, spec_load(q->flown, k));
 }
 
 static void near_particles(Indirect *in, int32_t *begin) {
@@ -189,6 +252,9 @@ static void near_particles(Indirect *in, int32_t *begin) {
         Spec kept = spec_load(t->ws.radiance, k);
         path_begin(t, k, slot, &ray, f_set(1));
         spec_store(t->ws.radiance, k, kept);
+        if (t->scene->has_media) {
+            near_place(t, q, k);
+        }
         if (in->b->kind == BOUNDARY_HORIZON) { // they are there
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
@@ -197,11 +263,15 @@ static void near_particles(Indirect *in, int32_t *begin) {
     }
     t->active = q->count;
     t->current = 0;
-    t->placed = in->b->kind == BOUNDARY_HORIZON;
-    int32_t groups = (int32_t)t->scene->groups_count + 1;
+    const bool media = t->scene->has_media;
+    t->placed = in->b->kind == BOUNDARY_HORIZON || media;
+    int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (media ? (int32_t)t->scene->media_count : 0);
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
         if (!t->placed) {
             trace_stage(t, 1);
+            if (media) {
+                flight_stage(t, begin, bounce);
+            }
         }
         t->placed = false;
         sort_stage(t, begin, groups);
@@ -209,7 +279,9 @@ static void near_particles(Indirect *in, int32_t *begin) {
         for (int32_t g = 1; g < groups; g++) {
             for (int32_t k = begin[g]; k < begin[g + 1]; k += LANES) {
                 int32_t count = begin[g + 1] - k < LANES ? begin[g + 1] - k : LANES;
-                next_count = near_batch(in, t->scene->groups + g - 1, t->ws.order + k, count, bounce, next_count);
+                next_count = g >= surfaces
+                                 ? near_collisions(in, g - surfaces, t->ws.order + k, count, bounce, next_count)
+                                 : near_batch(in, t->scene->groups + g - 1, t->ws.order + k, count, bounce, next_count);
             }
         }
         t->current = 1 - t->current;
@@ -265,15 +337,16 @@ KFN Float sink_taken(Sink *sink) {
 static void segments_near_adj(Indirect *in, int32_t k, const Hit *near, Vec3 dnear, Float seen, Float unseen, Sink *sink, Mask m) {
     const Segments *q = &in->q;
     Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
+    Mask attached = m & mi_lt(i_set(-1), near->shape); // the others are in the air
     if (in->b->job.mode != MODE_FORWARD) {
-        points_slide_adj(in, near, v3_scale(dnear, seen), lens, sink, m);
-        points_move_adj(in->t, near, v3_scale(dnear, unseen), v3_zero(), sink, m);
+        points_slide_adj(in, near, v3_scale(dnear, seen), lens, sink, attached);
+        points_move_adj(in->t, near, v3_scale(dnear, unseen), v3_zero(), sink, attached);
         return;
     }
     Float common = sink_taken(sink);
-    points_slide_adj(in, near, dnear, lens, sink, m);
+    points_slide_adj(in, near, dnear, lens, sink, attached);
     f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
-    points_move_adj(in->t, near, dnear, v3_zero(), sink, m);
+    points_move_adj(in->t, near, dnear, v3_zero(), sink, attached);
     f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
 }
 

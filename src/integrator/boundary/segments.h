@@ -7,7 +7,7 @@
 // them; the near side of the edge adds nothing, because its own light moves along with it.
 #pragma once
 
-#include "integrator/boundary/edge.h"
+#include "integrator/boundary/airborne.h"
 #include "integrator/boundary/view.h"
 
 // Beside the numbers of edges: the light, and where on it or which direction.
@@ -27,12 +27,12 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting: what its
-// motion is worth.
+// motion is worth. In media: what the near point is in (airborne.h), and what the flight to it weighs.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
-#define SEGMENT_INTS(I) I(number) I(lit) I(source) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
-#define SEGMENT_SPECS(S) S(light)
+#define SEGMENT_INTS(I) I(number) I(lit) I(source) I(air) I(around) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
+#define SEGMENT_SPECS(S) S(light) S(flown)
 
 typedef struct Segments {
     SEGMENT_FLOATS(DECLARE_FLOAT) SEGMENT_INTS(DECLARE_INT) SEGMENT_SPECS(DECLARE_SPEC)
@@ -163,11 +163,42 @@ KFN void hit_compress(real *u, real *v, real *x, real *y, real *z, int32_t *shap
            f_load((q)->name##_v + (k)), record_v3((q)->name##_x, (q)->name##_y, (q)->name##_z, (k)),                   \
            i_load((q)->name##_instance + (k))})
 
-// Traces both halves and keeps the segments that have ends.
-static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
+// Stores the segments of m that begin at near points and go on from o.
+static void segment_keep(const Segment *s, Vec3 o, const Hit *near, bool lit, Int number, Segments *q, Mask m) {
+    Vec3 p = s->edge.p;
+    Float behind = v3_length(v3_sub(near->p, p)), before = v3_length(v3_sub(s->far.p, p));
+    Float along = f_select(s->attached | m_lt(s->distance, f_set(INFINITY)), behind * f_safe_rcp(behind + before), f_set(0));
+    int32_t at = q->count;
+    Hit far = s->far;
+    far.shape = i_select(s->attached, s->far.shape, i_set(-1));
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
+    // What the edge gains on the side of n, the light loses.
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
+    f_compress(q->behind + at, behind, m);
+    f_compress(q->along + at, along, m);
+    f_compress(q->seen + at, f_set(0), m);
+    f_compress(q->unseen + at, f_set(0), m);
+    spec_compress(q->light, at, s->light, m);
+    i_compress(q->lit + at, i_set(lit), m);
+    i_compress(q->source + at, s->source, m);
+    i_compress(q->number + at, number, m);
+    KEEP_HIT(q, at, near, near, near->p, m);
+    KEEP_HIT(q, at, edge, &s->edge.hit, p, m);
+    KEEP_HIT(q, at, far, &far, far.p, m);
+    q->count += m_count(m);
+}
+
+// The ray from the edge to the light or far point.
+KFN Vec3 segment_offset(const Segment *s) {
     Vec3 p = s->edge.p;
     Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
-    Vec3 o = v3_madd(p, step, s->n);
+    return v3_madd(p, step, s->n);
+}
+
+// Traces both halves and keeps the segments that have ends.
+static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
+    Vec3 o = segment_offset(s);
     Ray ahead = {o, s->d, s->distance * (1.0f - 9e-4f)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
     Mask m = s->m;
     t->job->rays += m_count(m);
@@ -183,33 +214,35 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     }
     t->job->rays += m_count(m);
     Hit near = trace_closest(t->scene, &back, m, false);
-    m = m & mi_lt(i_set(-1), near.shape);
-    Float behind = v3_length(v3_sub(near.p, p)), before = v3_length(v3_sub(s->far.p, p));
-    Float along = f_select(s->attached | m_lt(s->distance, f_set(INFINITY)), behind * f_safe_rcp(behind + before), f_set(0));
-    int32_t at = q->count;
-    s->far.shape = i_select(s->attached, s->far.shape, i_set(-1));
-    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
-    v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
-    // What the edge gains on the side of n, the light loses.
-    v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
-    f_compress(q->behind + at, behind, m);
-    f_compress(q->along + at, along, m);
-    f_compress(q->seen + at, f_set(0), m);
-    f_compress(q->unseen + at, f_set(0), m);
-    spec_compress(q->light, at, s->light, m);
-    i_compress(q->lit + at, i_set(lit), m);
-    i_compress(q->source + at, s->source, m);
-    i_compress(q->number + at, number, m);
-    KEEP_HIT(q, at, near, &near, near.p, m);
-    KEEP_HIT(q, at, edge, &s->edge.hit, p, m);
-    KEEP_HIT(q, at, far, &s->far, s->far.p, m);
-    q->count += m_count(m);
+    segment_keep(s, o, &near, lit, number, q, m & mi_lt(i_set(-1), near.shape));
+}
+
+// The same in media, of segments that end on lights.
+static void segment_fly(Tracer *t, Segment *s, Int number, Segments *q) {
+    Vec3 o = segment_offset(s);
+    Ray ahead = {o, s->d, s->distance * (1.0f - SHADOW_SHORT)};
+    Fog fog = {medium_around(t, o, s->d, s->m), stream_key(t, number, 0, STREAM_SHADOW)};
+    Int around = fog.medium;
+    Mask blocked;
+    Spec through = walk_transmittance(t, ahead, s->m, &fog, &blocked, NULL);
+    Mask m = s->m & m_gt(spec_max(through), f_set(0));
+    if (!m_any(m)) {
+        return;
+    }
+    s->light = spec_mul(s->light, through);
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, m);
+    i_compress(q->air + q->count, leg.air, leg.m);
+    i_compress(q->around + q->count, leg.around, leg.m);
+    spec_compress(q->flown, q->count, leg.weight, leg.m);
+    segment_keep(s, o, &leg.near, true, number, q, leg.m);
 }
 
 // Samples numbers first... of a chunk and keeps the segments among them.
 static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     const SceneView *scene = t->scene;
     bool indirect = scene->max_depth < 0 || scene->max_depth > 2, direct = scene->emitters_count > 0;
+    indirect = indirect && !scene->has_media; // there only lights move
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
         bool lit = direct && (!indirect || (first + i) / SEGMENT_BLOCK % 2 == 0);
@@ -222,7 +255,9 @@ static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         }
         Segment s;
         segment_sample(t, b, i_iota() + i, lit, f_set(direct && indirect ? 2 : 1), m_first_n(count - i), &s);
-        if (m_any(s.m)) {
+        if (m_any(s.m) && scene->has_media) {
+            segment_fly(t, &s, i_iota() + i, q);
+        } else if (m_any(s.m)) {
             segment_trace(t, &s, lit, i_iota() + i, q);
         }
     }
