@@ -64,7 +64,6 @@ static const Motion motions[] = {
     {"media_box.xml", "ball.to_world", GROW, {0.8f, -0.2f, -0.7f}, 0.03, 1, true},
     {"media_beam.xml", "bulb.position", ADD, {0, 0, 0}, 0.03, 1, false},
     {"media_beam.xml", "torch.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.03, 1, false},
-    {"media_beam.xml", "torch.to_world", TURN, {0.3f, 0.2f, 1}, 1, 1, false},
     {"media_sun.xml", "sun.to_world", TURN, {0.3f, 0.2f, 1}, 1, 1, false},
     {"media_cloud.xml", "puff.sigma_t.to_world", SHIFT, {1, 0.5f, 0.2f}, 0.03, 1, true},
     {"media_cloud.xml", "puff.sigma_t.to_world", TURN, {0.2f, 1, 0.4f}, 4, 1, true},

@@ -246,6 +246,14 @@ static void test_refusals(void **state) {
     const rey_define fog[MOST_DEFINES] = {{"kind", "heterogeneous"}}, particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
     refused(fog, "camera.to_world", "participating media");
     refused(particles, "fog.scale.value", "'ptracer' knows no participating media");
+    static float image[NUMBERS];
+    const float along[3] = {1, 0, 0};
+    Room room = room_open("fog.xml", 1, 0);
+    int bulb = rey_param_find(room.scene, "bulb.position");
+    rey_render_def def = def_make(1, 0, 1);
+    assert_int_not_equal(rey_jvp(room.scene, &def, (rey_selection){&bulb, 1}, along, image, NULL, NULL), REY_OK);
+    assert_non_null(strstr(rey_error(room.ctx), "lie within a participating medium"));
+    room_close(room);
 }
 
 int main(void) {
