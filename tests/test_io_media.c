@@ -264,8 +264,7 @@ static void test_parameters(void **state) {
         rey_param_info info;
         assert_int_equal(rey_param_get_info(scene, find(scene, expected[i].name), &info), REY_OK);
         assert_int_equal(info.count, expected[i].count);
-        bool pose = strstr(expected[i].name, "to_world") != NULL;
-        assert_int_equal(info.terms, pose ? REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT : REY_TERM_INTERIOR);
+        assert_int_equal(info.terms, REY_TERM_INTERIOR);
         assert_true(strstr(expected[i].name, "albedo") ? info.low == 0 && info.high == 1 : true);
     }
     float too_much = 1.5f;
