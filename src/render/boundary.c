@@ -5,6 +5,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "render/boundary_edges.h"
+#include "render/light_borders.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
 #include "shape/shape.h"
@@ -26,32 +27,6 @@ static bool has_steps(const SceneView *view) {
             ((texture->kind == TEXTURE_BITMAP || texture->kind == TEXTURE_VOLUME) && texture->filter == FILTER_NEAREST)) {
             return true;
         }
-    }
-    return false;
-}
-
-// Whether the light of a projector's picture ends abruptly: unless its outermost texels are black.
-static bool ends_lit(const SceneView *view, const TextureNode *t) {
-    bool lit = t->kind != TEXTURE_BITMAP || t->to_uv >= 0;
-    for (int32_t i = 0; i < t->width * t->height && !lit; i++) {
-        int32_t x = i % t->width, y = i / t->width;
-        bool outermost = x == 0 || y == 0 || x == t->width - 1 || y == t->height - 1;
-        for (int32_t c = 0; c < t->channels && outermost; c++) {
-            lit |= view->theta[t->theta + (int64_t)t->channels * i + c] != 0;
-        }
-    }
-    return lit;
-}
-
-// Whether a light has a border at which it ends abruptly.
-static bool has_border(const SceneView *view, const EmitterRecord *e) {
-    const TextureNode *textures = view->textures;
-    if (e->kind == EMITTER_PROJECTOR) {
-        return ends_lit(view, textures + e->slot[SLOT(Projector, irradiance)]);
-    }
-    if (e->kind == EMITTER_SPOT) {
-        float cutoff = view->theta[textures[e->slot[SLOT(Spot, cutoff_angle)]].theta];
-        return view->theta[textures[e->slot[SLOT(Spot, beam_width)]].theta] >= cutoff * (1 - 1e-3f);
     }
     return false;
 }
@@ -91,9 +66,9 @@ static rey_result boundary_check(const Render *r, int term) {
         for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
             moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
         }
-        if (moves && has_border(view, view->emitters + i)) {
-            return refuse(scene, term, "the border of a projector's picture that is not black there, and of a spot whose "
-                                       "beam_width is its cutoff_angle, and the scene has one of them");
+        if (moves && rey_light_is_abrupt(view, view->emitters + i)) {
+            return refuse(scene, term, "the border of the light of a spot whose beam_width is its cutoff_angle, and the scene "
+                                       "has one of them");
         }
     }
     return REY_OK;

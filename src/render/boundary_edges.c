@@ -3,6 +3,7 @@
 #include "render/boundary_edges.h"
 
 #include "bsdf/table.h"
+#include "render/light_borders.h"
 #include "sensor/kinds.h"
 #include "shape/affine.h"
 #include "shape/shape.h"
@@ -287,8 +288,8 @@ static double see_round(const SceneView *view, const Projection *p, const EdgeRe
 // Whether the selection moves a shape.
 static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
     const PathJob *job = &r->job;
-    return job->points_at[id] >= 0 || job->pose_at[id] >= 0 ||
-           (r->scene->view.shapes[id].collection >= 0 && job->instance_at[instance] >= 0);
+    return id >= 0 && (job->points_at[id] >= 0 || job->pose_at[id] >= 0 ||
+                       (r->scene->view.shapes[id].collection >= 0 && job->instance_at[instance] >= 0));
 }
 
 // The same, as the sensor sees it.
@@ -424,7 +425,12 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
 
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
 static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
-    rey_result result = r->meetings.count ? REY_OK : rey_meetings_find(r->scene, moves_on_film, r, &r->meetings);
+    Array borders = {0};
+    rey_result result = r->meetings.count ? REY_OK : rey_light_borders(r->scene, &borders);
+    if (result == REY_OK && !r->meetings.count) {
+        result = rey_meetings_find(r->scene, borders.data, (int32_t)borders.count, moves_on_film, r, &r->meetings);
+    }
+    rey_array_free(r->scene->ctx, &borders);
     for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
         EdgeRecord e = {.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
                         .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};

@@ -14,6 +14,7 @@ enum { AROUND = 64, STACKS = 32 };
 
 typedef struct Facets {
     rey_scene *scene;
+    const LightBorder *borders;
     MeetingMoves *moves;
     const void *user;
     Array bodies, body_boxes; // of Body, of Box
@@ -21,7 +22,7 @@ typedef struct Facets {
     Array *meetings;
 } Facets;
 
-// A shape, or an instance of one.
+// A shape, or an instance of one; shape -1: the border of a light with the number `instance`.
 typedef struct Body {
     int32_t shape, instance;
     int32_t meets; // may meet another
@@ -54,7 +55,11 @@ static void affine_point(const float *m, const double p[3], double out[3]) {
 
 // ---- surfaces in triangles ---------------------------------------------------------------------------------------
 
-static int32_t triangles_of(const ShapeRecord *shape) {
+static int32_t triangles_of(const SceneView *view, int32_t id) {
+    if (id < 0) {
+        return 1;
+    }
+    const ShapeRecord *shape = view->shapes + id;
     switch (shape->kind) {
     case SHAPE_MESH:
         return shape->triangle_count;
@@ -100,7 +105,14 @@ static const int32_t *mesh_triangle(const SceneView *view, const ShapeRecord *sh
     return view->triangles + 3 * ((int64_t)shape->triangle + triangle);
 }
 
-static void corner_of(const SceneView *view, const Body *body, int32_t triangle, int k, double p[3]) {
+static void corner_of(const Facets *f, const Body *body, int32_t triangle, int k, double p[3]) {
+    const SceneView *view = &f->scene->view;
+    if (body->shape < 0) {
+        for (int c = 0; c < 3; c++) {
+            p[c] = (double)f->borders[body->instance].p[k][c];
+        }
+        return;
+    }
     const ShapeRecord *shape = view->shapes + body->shape;
     if (shape->kind != SHAPE_MESH) {
         round_corner(view, shape, triangle, k, p);
@@ -119,7 +131,7 @@ static Triangle triangle_of(const Facets *f, const Piece *piece) {
     Triangle t = {.size = 0};
     double e[2][3];
     for (int k = 0; k < 3; k++) {
-        corner_of(&f->scene->view, &ARRAY_AT(f->bodies, Body, piece->body), piece->triangle, k, t.p[k]);
+        corner_of(f, &ARRAY_AT(f->bodies, Body, piece->body), piece->triangle, k, t.p[k]);
     }
     for (int k = 0; k < 3; k++) {
         double side[3];
@@ -185,15 +197,14 @@ static Quadric quadric_of_cylinder(const float *table) {
 }
 
 static Quadric quadric_of(const SceneView *view, const Body *body, const Triangle *t) {
-    const ShapeRecord *shape = view->shapes + body->shape;
-    switch (shape->kind) {
-    case SHAPE_SPHERE:
+    const ShapeRecord *shape = body->shape < 0 ? NULL : view->shapes + body->shape;
+    if (shape && shape->kind == SHAPE_SPHERE) {
         return quadric_of_sphere(view->tables + shape->table);
-    case SHAPE_CYLINDER:
-        return quadric_of_cylinder(view->tables + shape->table);
-    default:
-        return quadric_of_plane(t);
     }
+    if (shape && shape->kind == SHAPE_CYLINDER) {
+        return quadric_of_cylinder(view->tables + shape->table);
+    }
+    return quadric_of_plane(t);
 }
 
 static double quadric_value(const Quadric *q, const double x[3], double gradient[3]) {
@@ -299,6 +310,9 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     const SceneView *view = &f->scene->view;
     const Piece *piece[2] = {&ARRAY_AT(f->pieces, Piece, first), &ARRAY_AT(f->pieces, Piece, second)};
     const Body *body[2] = {&ARRAY_AT(f->bodies, Body, piece[0]->body), &ARRAY_AT(f->bodies, Body, piece[1]->body)};
+    if (body[0]->shape < 0) { // borders come last
+        return REY_OK;
+    }
     const ShapeRecord *shape = view->shapes + body[0]->shape;
     if (piece[0]->body == piece[1]->body &&
         (shape->kind != SHAPE_MESH || share_vertex(view, shape, piece[0]->triangle, piece[1]->triangle))) {
@@ -312,7 +326,7 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     }
     bool round = false;
     for (int i = 0; i < 2; i++) {
-        bool mesh = view->shapes[body[i]->shape].kind == SHAPE_MESH;
+        bool mesh = body[i]->shape < 0 || view->shapes[body[i]->shape].kind == SHAPE_MESH;
         m.shape[i] = body[i]->shape;
         m.instance[i] = body[i]->instance;
         m.prim[i] = mesh ? piece[i]->triangle : 0;
@@ -345,10 +359,10 @@ static rey_result add_body(Facets *f, int32_t shape, int32_t instance) {
     }
     *body = (Body){shape, instance, 0};
     *box = box_of_points(NULL, 0);
-    for (int32_t i = 0; i < triangles_of(f->scene->view.shapes + shape); i++) {
+    for (int32_t i = 0; i < triangles_of(&f->scene->view, shape); i++) {
         double p[3][3];
         for (int k = 0; k < 3; k++) {
-            corner_of(&f->scene->view, body, i, k, p[k]);
+            corner_of(f, body, i, k, p[k]);
         }
         Box one = box_of_points(p, 3);
         for (int k = 0; k < 3; k++) {
@@ -356,17 +370,17 @@ static rey_result add_body(Facets *f, int32_t shape, int32_t instance) {
             box->high[k] = fmaxf(box->high[k], one.high[k]);
         }
     }
-    box->moves = f->moves(f->user, shape, instance);
+    box->moves = shape >= 0 && f->moves(f->user, shape, instance);
     body->meets = box->moves && f->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
     return REY_OK;
 }
 
-static rey_result add_bodies(Facets *f) {
+static rey_result add_bodies(Facets *f, int32_t border_count) {
     const SceneView *view = &f->scene->view;
     rey_result result = REY_OK;
     for (int32_t id = 0; id < view->shapes_count && result == REY_OK; id++) {
         const ShapeRecord *shape = view->shapes + id;
-        if ((shape->flags & SHAPE_UNSEEN) || triangles_of(shape) == 0) {
+        if ((shape->flags & SHAPE_UNSEEN) || triangles_of(view, id) == 0) {
             continue;
         }
         if (shape->collection < 0) {
@@ -375,6 +389,9 @@ static rey_result add_bodies(Facets *f) {
         for (int32_t i = 0; i < view->instances_count && shape->collection >= 0 && result == REY_OK; i++) {
             result = view->instances[i].group == shape->collection ? add_body(f, id, i) : REY_OK;
         }
+    }
+    for (int32_t i = 0; i < border_count && result == REY_OK; i++) {
+        result = add_body(f, -1, i);
     }
     return result;
 }
@@ -390,7 +407,7 @@ static rey_result add_pieces(Facets *f) {
     rey_context *ctx = f->scene->ctx;
     for (int32_t b = 0; b < (int32_t)f->bodies.count; b++) {
         const Body *body = &ARRAY_AT(f->bodies, Body, b);
-        int32_t n = body->meets ? triangles_of(f->scene->view.shapes + body->shape) : 0;
+        int32_t n = body->meets ? triangles_of(&f->scene->view, body->shape) : 0;
         if (n == 0) {
             continue;
         }
@@ -402,7 +419,7 @@ static rey_result add_pieces(Facets *f) {
         for (int32_t i = 0; i < n; i++) {
             double p[3][3];
             for (int k = 0; k < 3; k++) {
-                corner_of(&f->scene->view, body, i, k, p[k]);
+                corner_of(f, body, i, k, p[k]);
             }
             pieces[i] = (Piece){b, i};
             boxes[i] = box_of_points(p, 3);
@@ -412,10 +429,11 @@ static rey_result add_pieces(Facets *f) {
     return f->pieces.count < INT32_MAX ? REY_OK : rey_fail(ctx, REY_ERROR_UNSUPPORTED, "more than 2^31 triangles may meet");
 }
 
-rey_result rey_meetings_find(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings) {
-    Facets f = {.scene = scene, .moves = moves, .user = user, .meetings = meetings};
+rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
+                             const void *user, Array *meetings) {
+    Facets f = {.scene = scene, .borders = borders, .moves = moves, .user = user, .meetings = meetings};
     rey_context *ctx = scene->ctx;
-    rey_result result = add_bodies(&f);
+    rey_result result = add_bodies(&f, border_count);
     if (result == REY_OK) {
         result = rey_overlaps_find(ctx, f.body_boxes.data, (int32_t)f.bodies.count, bodies_overlap, &f);
     }

@@ -1,4 +1,4 @@
-// meetings.h: the curves along which two surfaces pass through each other.
+// meetings.h: the curves along which two surfaces pass through each other, and along which the light of a lamp ends on one.
 #pragma once
 
 #include "scene/scene.h"
@@ -9,9 +9,14 @@ typedef struct Quadric {
     float matrix[6]; // xx yy zz yz zx xy
 } Quadric;
 
+// A triangle of the surface, in the air, at which the light of a lamp ends.
+typedef struct LightBorder {
+    float p[3][3];
+} LightBorder;
+
 // A piece of such a curve, close to the straight line between its ends.
 typedef struct MeetingRecord {
-    int32_t shape[2], prim[2];
+    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, which stands still
     int32_t instance[2]; // of shapes with SHAPE_INSTANCED, else 0
     float ends[6];       // two points
     Quadric surface[2];
@@ -22,4 +27,5 @@ typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
 
 // Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without
 // passing through, to 1e-4 of its size, does not meet. Grids of distances and curves have none yet.
-rey_result rey_meetings_find(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings);
+rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
+                             const void *user, Array *meetings);

@@ -109,7 +109,6 @@ static void test_motion_is_partial(void **state) {
     } cases[] = {{"moving_ball.xml", "moving_camera.to_world", true, true},
                  {"moving_ball.xml", "moving_wall.to_world", true, true},
                  {"moving_box.xml", "moving_box.to_world", true, true},
-                 {"lights.xml", "moving_camera.to_world", true, false},   // the border of a projector's picture
                  {"materials.xml", "spot.position", true, false}, // its shadows are seen in mirrors
                  {"shapes.xml", "vine.control_points", true, false},
                  {"shapes.xml", "twig.control_points", false, false},

@@ -20,7 +20,8 @@ typedef struct EdgePoint {
     // Where the shading normal n turns away from the viewer, along F = n . view = 0: n, the vector to the viewer, and how far
     // over the surface F rises by 1. Elsewhere 0.
     Vec3 normal, view, rise;
-    Mask meeting;       // where the surface passes through that of the hit `met`; across: the normals of both
+    Mask meeting;       // where the surface passes through that of the hit `met`, or through a light's border, where its
+                        // shape is -1; across: the normals of both
     Hit met;
     Vec3 across[2];
 } EdgePoint;
@@ -229,7 +230,7 @@ static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e,
         Vec3 normal;
         Hit hit = point_hit(scene, i_select(m, MEETING_INT(b, i, shape[k]), i_set(-1)), MEETING_INT(b, i, prim[k]),
                             MEETING_INT(b, i, instance[k]), p, &normal);
-        hits[k]->shape = i_select(m, hit.shape, hits[k]->shape);
+        hits[k]->shape = i_select(m, MEETING_INT(b, i, shape[k]), hits[k]->shape);
         hits[k]->prim = i_select(m, hit.prim, hits[k]->prim);
         hits[k]->instance = i_select(m, hit.instance, hits[k]->instance);
         hits[k]->u = f_select(m, hit.u, hits[k]->u);

@@ -422,7 +422,7 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
     Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
     points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
-    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, m);
+    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, m & mi_lt(i_set(-1), other.shape));
     if (forward) {
         Float all = sink_taken(sink);
         f_store(q->seen + k, all);

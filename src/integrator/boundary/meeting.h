@@ -1,4 +1,5 @@
-// meeting.h: the curves along which two surfaces pass through each other, seen by vertices other than the camera. What a
+// meeting.h: the curves along which two surfaces pass through each other, or light ends on one, seen by vertices other than the
+// camera. Of the latter, the surface on both sides of the curve stands for two surfaces. What a
 // vertex sees of each surface ends there, so that with v, v' the velocities of the curve and of the surface's own points
 //   dI -= integral dl dw sin(dl, w) n . (v - v') L W
 // for both surfaces, n at right angles to the curve and to w, towards the surface's visible side; L leaves it along -w.
@@ -12,12 +13,14 @@
 static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number, Segments *q) {
     SampleKey key = slot_key(t, number);
     EdgePoint e = edge_sample(t->scene, b, rng_2d(&key, DIMENSION_EDGE_SEGMENT), v3_zero(), false);
-    Mask first = m_lt(rng_1d(&key, DIMENSION_TURNING_SIDE), f_set(0.5f));
+    Mask which = m_lt(rng_1d(&key, DIMENSION_TURNING_SIDE), f_set(0.5f)), border = mi_lt(e.met.shape, i_set(0));
+    Mask first = which | border;
     Vec3 d = warp_uniform_sphere(rng_2d(&key, DIMENSION_SEGMENT_END)), across = v3_cross(d, e.tangent);
     Vec3 own = v3_select(first, e.across[0], e.across[1]), other = v3_select(first, e.across[1], e.across[0]);
     Float length = v3_length(across), c = v3_dot(own, other), r = f_safe_rcp(1.0f - c * c);
     // The visible half of the surface is on the viewer's side of the other one: along `other`, less its part along `own`.
-    Vec3 half = v3_scale(v3_madd(other, -c, own), f_copysign(f_set(1), -v3_dot(d, other)));
+    Float side = f_copysign(f_set(1), f_select(border, f_select(which, f_set(1), f_set(-1)), -v3_dot(d, other)));
+    Vec3 half = v3_scale(v3_madd(other, -c, own), side);
     Vec3 n = v3_scale(across, f_safe_rcp(length));
     n = v3_scale(n, f_copysign(f_set(1), v3_dot(n, half)));
     Float weight = length * (8 * PI) * f_safe_rcp(e.probability);
@@ -48,6 +51,13 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
         hits[k].u = f_select(first, e.hit.u, e.met.u);
         hits[k].v = f_select(first, e.hit.v, e.met.v);
         first = ~first;
+    }
+    if (m_any(border)) { // beside the curve
+        Vec3 normal, beside = v3_madd(e.p, step * f_safe_rcp(v3_length(half)), half);
+        Hit moved = point_hit(t->scene, i_select(border, hits[0].shape, i_set(-1)), hits[0].prim, hits[0].instance, beside, &normal);
+        hits[0].u = f_select(border, moved.u, hits[0].u);
+        hits[0].v = f_select(border, moved.v, hits[0].v);
+        e.p = v3_select(border, beside, e.p);
     }
     KEEP_HIT(q, at, edge, hits, e.p, m);
     KEEP_HIT(q, at, far, hits + 1, e.p, m);

@@ -74,7 +74,7 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
                                   (near & mi_eq(e->other, i_set(EDGE_ANY))));
         if (m_any(e->meeting)) {
-            Mask other = mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
+            Mask other = met & mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
             faces = faces | (e->meeting & near & other);
         }
         own[side] = (silhouette & own[side]) | faces;
@@ -159,11 +159,11 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
 // Where two surfaces with normals a and b pass through each other, their curve moves across itself as both say:
 // n = x a + y b, and x a . (velocity of the one) + y b . (velocity of the other).
 static void primary_meeting_adj(Tracer *t, const PrimarySample *s, Vec3 along, Vec3 *first, Sink *sink) {
-    Mask m = s->m & s->edge.meeting;
+    Mask m = s->m & s->edge.meeting, attached = m & mi_lt(i_set(-1), s->edge.met.shape);
     Vec3 a = s->edge.across[0], b = s->edge.across[1];
     Float c = v3_dot(a, b), r = f_safe_rcp(1.0f - c * c), na = v3_dot(along, a), nb = v3_dot(along, b);
     *first = v3_select(m, v3_scale(a, (na - c * nb) * r), *first);
-    points_move_adj(t, &s->edge.met, v3_scale(b, (nb - c * na) * r), v3_zero(), sink, m);
+    points_move_adj(t, &s->edge.met, v3_scale(b, (nb - c * na) * r), v3_zero(), sink, attached);
 }
 
 // Adds the motion of the edges along n, worth `worth`. A terminator is where F = n . view is 0: where F grows, it moves back over
