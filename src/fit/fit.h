@@ -37,7 +37,7 @@ typedef struct FitRow { // one unknown, in the final table
     int dims;
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
-    bool grid;                    // of voxels
+    int grid;                     // numbers of each voxel; 0 = no grid
     bool derived;                 // from other rows: absorption and reduced scattering of a medium; these rows stand last
     int64_t points[COLUMN_COUNT]; // of meshes whose vertices move as a surface, else 0; 0 also where a column has none
     double chamfer[COLUMN_COUNT]; // their mean distances from the truth, over the diagonal of its bounding box

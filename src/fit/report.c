@@ -38,6 +38,9 @@ static rey_result put_page(Fit *fit, FitResult *out, Text *html) {
         result = rey_report_textures(fit, out, html);
     }
     if (!result) {
+        result = rey_report_grids(fit, out, html);
+    }
+    if (!result) {
         rey_report_table(fit, out, html);
         rey_report_histories(fit, out, html);
         rey_text_add(html, "<h2>Loss</h2>\n");

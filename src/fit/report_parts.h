@@ -9,6 +9,9 @@ rey_result rey_report_views(Fit *fit, FitResult *out, Text *html);
 // Textures and environment maps: truth, start, found, difference.
 rey_result rey_report_textures(Fit *fit, const FitResult *out, Text *html);
 
+// Grids of voxels, seen along an axis: truth, start, found.
+rey_result rey_report_grids(Fit *fit, const FitResult *out, Text *html);
+
 // Loss and gradient over the iterations; then every small parameter.
 void rey_report_loss(const Fit *fit, Text *html);
 void rey_report_histories(const Fit *fit, const FitResult *out, Text *html);

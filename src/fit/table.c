@@ -78,7 +78,7 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
                         .shape = {p->shape[0], p->shape[1], p->shape[2]},
                         .weighted = p->count > LARGEST_SMALL && !p->vertices};
         row->points[COLUMN_FOUND] = p->vertices ? p->vertices->mesh.point_count : 0;
-        row->grid = p->grid.nx != 0;
+        row->grid = p->grid.channels;
         bool other = fit->state.meshed && (p->vertices || was_resampled(fit, p)); // the start had other vertices or voxels
         row->name = rey_strdup(fit->ctx, p->name);
         row->start = other ? NULL : copy_floats(fit->ctx, u->start + p->offset, p->count);
