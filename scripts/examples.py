@@ -4,7 +4,9 @@
 usage: examples.py [--reynolds PROGRAM] [EXAMPLE...]"""
 import argparse
 import json
+import math
 import os
+import struct
 import subprocess
 import sys
 import tempfile
@@ -18,10 +20,47 @@ LIMITS = {
     "glass": {"pebble.to_world": 0.02, "group.shape_0.bsdf.eta.value": 0.01},
     "shape": {"creature.positions": 0.004},
     "smoke": {},
+    "milk/dictionary": {},
 }
 LEAST_POINTS = {"shape": 5000}
 LEAST_PSNR = {"smoke": 30}  # of every view that is held out [dB]
+COSINES = (-0.3, 0, 0.3, 0.6, 0.9)  # of the functions in milk/dictionary.xml
+MOST_COSINE_ERROR, MOST_SHAPE_ERROR = 0.02, 0.05
 
+
+def floats(path):
+    """The numbers of an .npy file of 32-bit floats."""
+    with open(path, "rb") as f:
+        data = f.read()
+    begin = 10 + struct.unpack("<H", data[8:10])[0]
+    return struct.unpack("<%df" % ((len(data) - begin) // 4), data[begin:])
+
+
+def shape_error(reynolds, folder, weights):
+    """How far the other shape, rendered with these weights, is from the truth: root of the sum of squares, relative."""
+    pictures = []
+    for name, more in (("truth", []), ("found", ["-D", "weights=" + ", ".join("%.9g" % w for w in weights)])):
+        path = os.path.join(folder, name + ".npy")
+        subprocess.run([reynolds, "render", os.path.join(ROOT, "examples/milk/shape.xml"), "--spp", "8192", "-o", path] + more,
+                       check=True, stderr=subprocess.DEVNULL)
+        pictures.append(floats(path))
+    truth, found = pictures
+    return math.sqrt(sum((a - b) ** 2 for a, b in zip(truth, found)) / sum(a * a for a in truth))
+
+
+def judge_dictionary(reynolds, folder, result):
+    """Mean cosine, and a picture of another shape."""
+    row = next(p for p in result["parameters"] if p["name"] == "milk.phase_function.weights")
+    mean = [sum(w * g for w, g in zip(row[key], COSINES)) / sum(row[key]) for key in ("truth", "found")]
+    off = shape_error(reynolds, folder, row["found"])
+    print("  weights %s: mean cosine %.4f, truth %.4f; another shape is off by %.2f %%" % (
+        " ".join("%.3f" % w for w in row["found"]), mean[1], mean[0], 100 * off))
+    wrong = []
+    if not abs(mean[1] - mean[0]) <= MOST_COSINE_ERROR:
+        wrong.append("milk/dictionary: the mean cosine is %g, expected %g within %g" % (mean[1], mean[0], MOST_COSINE_ERROR))
+    if not off <= MOST_SHAPE_ERROR:
+        wrong.append("milk/dictionary: another shape is off by %g, expected at most %g" % (off, MOST_SHAPE_ERROR))
+    return wrong
 
 
 def judge(name, result):
@@ -61,8 +100,8 @@ def main():
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         for name in options.examples:
-            job = os.path.join(ROOT, "examples", name, "job.yaml")
-            run = subprocess.run([options.reynolds, "fit", job, "-o", os.path.join(folder, name), "--json"], stdout=subprocess.PIPE,
+            job = os.path.join(ROOT, "examples", name + ".yaml" if "/" in name else os.path.join(name, "job.yaml"))
+            run = subprocess.run([options.reynolds, "fit", job, "-o", os.path.join(folder, name.replace("/", "_")), "--json"], stdout=subprocess.PIPE,
                                  stderr=subprocess.PIPE, text=True)
             if run.returncode:
                 wrong.append("%s: exit code %d: %s" % (name, run.returncode, run.stderr[-400:]))
@@ -70,6 +109,8 @@ def main():
             result = json.loads(run.stdout)
             show(name, result)
             wrong += judge(name, result)
+            if name == "milk/dictionary":
+                wrong += judge_dictionary(options.reynolds, folder, result)
     print("\n".join(wrong) if wrong else "examples: all found")
     return 1 if wrong else 0
 
