@@ -174,6 +174,23 @@ static bool turns_within(const rey_scene *scene, int32_t bsdf) {
     return turns;
 }
 
+// In scenes with media, surfaces that light passes undeviated and undimmed only separate media.
+static bool only_separates(const rey_scene *scene, const ShapeRecord *shape) {
+    return scene->view.has_media && rey_bsdf_passes(ARRAY_AT(scene->build.bsdfs, BsdfNode, shape->bsdf).kind);
+}
+
+// Whether a parameter moves nothing else.
+static bool moves_border(const rey_scene *scene, const Param *p) {
+    bool all = scene->view.has_media && (p->geometry >= 0 || p->instance >= 0);
+    for (size_t i = 0; i < scene->build.shapes.count && all; i++) {
+        const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
+        bool moves = p->geometry >= 0 ? p->geometry == (int32_t)i
+                                      : shape->collection == ARRAY_AT(scene->build.instances, InstanceRecord, p->instance).group;
+        all = !moves || (only_separates(scene, shape) && shape->emitter < 0);
+    }
+    return all;
+}
+
 // Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
 // what turns such mirrors' normals; what moves needs another where the normals of maps turn away from the viewer. Scattering
 // functions that no shape has do not count.
@@ -182,7 +199,7 @@ static void name_further_terms(Builder *b) {
     bool bends = false, turns = false;
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
-        bends |= bends_within(scene, shape->bsdf);
+        bends |= bends_within(scene, shape->bsdf) && !only_separates(scene, shape);
         turns |= turns_within(scene, shape->bsdf);
     }
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
@@ -195,6 +212,7 @@ static void name_further_terms(Builder *b) {
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
+        p->terms = moves_border(scene, p) ? REY_TERM_INTERIOR : p->terms;
     }
 }
 

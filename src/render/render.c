@@ -270,7 +270,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_places |= p->emitter >= 0;
         r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
-        r->job.any_motion |= p->emitter < 0 && (p->terms & REY_TERM_SPECULAR) && !rey_moves_border(view, p);
+        r->job.any_motion |= p->emitter < 0 && (p->terms & REY_TERM_SPECULAR);
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
         if (at > INT32_MAX / 2) {

@@ -44,25 +44,6 @@ static bool has_jumping_media(const SceneView *view) {
     return false;
 }
 
-static bool bends_within(const SceneView *view, int32_t bsdf) {
-    const BsdfNode *node = view->bsdfs + bsdf;
-    bool bends = rey_bsdf_bends(node->kind);
-    for (int i = 0; i < MAX_CHILDREN && !bends; i++) {
-        bends = node->child[i] >= 0 && bends_within(view, node->child[i]);
-    }
-    return bends;
-}
-
-// The terms that a parameter needs. Where media end, at surfaces of the kind null, shadows are not seen in mirrors.
-static int terms_needed(const SceneView *view, const Param *p, int terms) {
-    bool bends = false;
-    for (int64_t i = 0; i < view->shapes_count; i++) {
-        int32_t bsdf = view->shapes[i].bsdf;
-        bends |= !rey_bsdf_passes(view->bsdfs[bsdf].kind) && bends_within(view, bsdf);
-    }
-    return view->has_media && p->emitter >= 0 && !bends ? terms & ~REY_TERM_SPECULAR : terms;
-}
-
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
 static const char *gap_in_media(const SceneView *view, const Param *p) {
     const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
@@ -123,18 +104,16 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
         }
-        if (rey_moves_border(&scene->view, p)) {
-            continue; // such surfaces have no silhouettes
-        }
         bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                       (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
+        points = points && !rey_moves_border(&scene->view, p);
         if (points && surfaces_read_volumes(&scene->view)) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
                             "move look them up elsewhere", info.name);
         }
         int known = terms_known(scene, def, p);
-        int needs = terms_needed(&scene->view, p, info.terms), missing = needs & ~known;
+        int missing = info.terms & ~known;
         bool interior = known & REY_TERM_INTERIOR;
         if (missing && !def->terms) {
             int bit = missing & -missing;
@@ -146,7 +125,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
-        *needed |= needs;
+        *needed |= info.terms;
     }
     if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
         int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
