@@ -157,6 +157,7 @@ static inline bool has_interior(const Room room, int param) {
     // Nothing stands in the way of lights with this name, and no border of what they cast is in the picture.
     int shadows = strncmp(info.name, "moving_", 7) == 0 ? REY_TERM_INDIRECT | REY_TERM_PRIMARY : 0;
     // Media move in the rooms of test_boundary.
-    bool medium = strstr(info.name, "sigma_t.to_world") || strstr(info.name, "albedo.to_world");
+    bool medium = strstr(info.name, "sigma_t.to_world") || strstr(info.name, "albedo.to_world") ||
+                  (strncmp(info.name, "shape_", 6) == 0 && (strstr(info.name, "to_world") || strstr(info.name, "positions")));
     return !medium && (info.terms & ~jumps & ~shadows) == REY_TERM_INTERIOR;
 }
