@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS = 16, PATH_BYTES = 4096, TERMS_ESTIMATED = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
+enum { SETS = 16, PATH_BYTES = 4096, TERMS_ESTIMATED = 15 }; // up to REY_TERM_SPECULAR
 
 typedef struct Grad {
     Session session;
@@ -41,9 +41,10 @@ static void summarize(const double *values, int stride, double *mean, double *st
     *standard_error = sqrt(squares / (SETS - 1) / SETS);
 }
 
-// Terms that are missing. A jump that no path met is not needed.
+// Terms that are missing. A jump that no path met is not needed; of mirrors that the camera sees the term does not know.
 static int terms_left_out(const Grad *g) {
-    return g->needed & ~g->used & (~REY_TERM_TERMINATOR | g->stats.missing_terms);
+    int met = g->stats.missing_terms;
+    return (g->needed & ~g->used & (~REY_TERM_TERMINATOR | met)) | (g->needed & met & REY_TERM_SPECULAR);
 }
 
 // The terms' shares of the value, and their standard errors.

@@ -192,7 +192,7 @@ typedef struct rey_stats {
     int64_t paths, rays; /* camera paths, and rays of any kind */
     int64_t nonfinite;   /* samples dropped because they were not finite; 0 in a healthy renderer */
     int missing_terms;   /* derivatives: terms that the parameters may need and the paths showed to be needed, but that
-                            were left out: REY_TERM_TERMINATOR */
+                            were left out: REY_TERM_TERMINATOR, _SPECULAR */
 } rey_stats;
 
 /* Renders. image: height x width x 3 floats owned by the caller. stats may be null. */

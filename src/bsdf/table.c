@@ -42,9 +42,10 @@ int rey_bsdf_kind_find(const char *name) {
     return -1;
 }
 
+bool rey_bsdf_opens(int kind) { return kind == BSDF_THINDIELECTRIC || kind == BSDF_MASK || kind == BSDF_NULL; }
+
 bool rey_bsdf_bends(int kind) {
-    return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_THINDIELECTRIC || kind == BSDF_PLASTIC ||
-           kind == BSDF_MASK || kind == BSDF_NULL;
+    return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_PLASTIC || rey_bsdf_opens(kind);
 }
 
 bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }

@@ -197,6 +197,9 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     if (record >= 0) {
         record_onward(t, record, &w);
     }
+    if (t->lobes) {
+        i_scatter(t->lobes, at->v.slot, w.sample.lobe, at->v.m);
+    }
     Paths *next = &t->ws.paths[1 - t->current];
     Vec3 o = interaction_offset(&at->si, w.d);
     if (t->scene->has_media) {

@@ -242,6 +242,20 @@ static void rung_store(Tracer *t, int32_t rung) {
     }
 }
 
+// After their first vertices: what the paths have brought, and which of the `count` that go on are chains.
+static void fork_store(Tracer *t, int32_t count) {
+    const Paths *next = &t->ws.paths[1 - t->current];
+    for (int c = 0; c < SPEC_N; c++) {
+        memcpy(t->fork->base[c], t->ws.radiance[c], CHUNK * sizeof(real));
+    }
+    memset(t->fork->chained, 0, CHUNK * sizeof(int32_t));
+    for (int32_t k = 0; k < count; k += LANES) {
+        Mask m = m_first_n(count - k);
+        i_scatter(t->fork->chained, i_select(m, i_load(next->slot + k), i_set(0)), i_set(1),
+                  m & m_eq(f_load(next->pdf + k), f_set(PDF_DELTA)));
+    }
+}
+
 // Runs the chunk's paths to their ends. begin: scratch of the number of groups and media, and 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
@@ -280,6 +294,9 @@ static void path_forward(Tracer *t, int32_t *begin) {
             rung_store(t, bounce - t->first_bounce);
         }
         shadow_stage(t, bounce);
+        if (t->fork && bounce == t->first_bounce) {
+            fork_store(t, next_count);
+        }
         t->current = 1 - t->current;
         t->active = next_count;
     }

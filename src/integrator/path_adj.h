@@ -151,6 +151,9 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, &s, sink);
     }
+    if (job->any_motion && s.first && m_any(s.scattered & s.chained)) {
+        sink->faces |= CAMERA_MIRRORED;
+    }
     if ((live & LIVE_SCATTERING) || live_passing) {
         s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
     }

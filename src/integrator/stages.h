@@ -24,6 +24,13 @@ KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)boun
 // Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
 #define DERIVATIVE_FLOOR 0.05f
 
+// Of paths that begin within the scene: what their first vertex brings without going on, and whether they go on in a
+// direction that follows from how they came.
+typedef struct Fork {
+    SpecRows base;
+    int32_t *chained;
+} Fork;
+
 typedef struct Tracer {
     PathJob *job;
     const SceneView *scene;
@@ -38,6 +45,8 @@ typedef struct Tracer {
     int32_t first_bounce;    // 0, but for paths that do not begin at the camera
     real **rungs;            // radiance by number of segments: rows of a colour per number; or null
     int32_t rung_count, rungs_kept;
+    Fork *fork;              // or null
+    int32_t *lobes;          // per slot, of the last vertex of a particle; or null
     bool placed;             // the paths' first vertices are known
     bool overflow;           // the chunk's vertices did not fit the records
     int32_t most;            // paths of the next chunk

@@ -35,7 +35,66 @@ static bool boundary_sees(const SensorRecord *sensor) {
     return sensor->kind == SENSOR_PERSPECTIVE || sensor->kind == SENSOR_THINLENS || sensor->kind == SENSOR_ORTHOGRAPHIC;
 }
 
-int rey_boundary_term(int32_t kind) { return kind == BOUNDARY_PRIMARY ? REY_TERM_PRIMARY : REY_TERM_INDIRECT; }
+int rey_boundary_term(int32_t kind) {
+    switch (kind) {
+    case BOUNDARY_PRIMARY:
+        return REY_TERM_PRIMARY;
+    case BOUNDARY_CHAINED:
+        return REY_TERM_SPECULAR;
+    default:
+        return REY_TERM_INDIRECT;
+    }
+}
+
+// Whether paths turn at surfaces in directions that follow from how they came.
+static bool has_chains(const SceneView *view) {
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        if (rey_bsdf_bends(view->bsdfs[i].kind)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool rey_chains_known(const SceneView *view, const SensorRecord *sensor) {
+    if (!boundary_sees(sensor) || view->through || view->has_media || has_steps(view) || !has_chains(view)) {
+        return false;
+    }
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        int kind = view->bsdfs[i].kind;
+        if (rey_bsdf_opens(kind) || rey_bsdf_turns(kind)) {
+            return false;
+        }
+    }
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (view->shapes[i].flags & SHAPE_HAS_NORMALS) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool moves_always(const void *user, int32_t shape, int32_t instance) {
+    UNUSED(user);
+    UNUSED(shape);
+    UNUSED(instance);
+    return true;
+}
+
+// Chains may see all curves along which surfaces, and borders of light, pass through each other, also those that stand still.
+static rey_result check_meetings(rey_scene *scene) {
+    Array meetings = {0}, borders = {0};
+    rey_result result = rey_light_borders(scene, &borders);
+    if (result == REY_OK) {
+        result = rey_meetings_find(scene, borders.data, (int32_t)borders.count, moves_always, NULL, &meetings);
+    }
+    bool any = meetings.count > 0;
+    rey_array_free(scene->ctx, &borders);
+    rey_array_free(scene->ctx, &meetings);
+    return result == REY_OK && any
+               ? refuse(scene, REY_TERM_SPECULAR, "the curves along which surfaces pass through each other, and the scene has one of them")
+               : result;
+}
 
 // Whether a term of a selection can be computed; records why not.
 static rey_result boundary_check(const Render *r, int term) {
@@ -71,7 +130,7 @@ static rey_result boundary_check(const Render *r, int term) {
                                        "has one of them");
         }
     }
-    return REY_OK;
+    return term == REY_TERM_SPECULAR ? check_meetings(scene) : REY_OK;
 }
 
 void rey_boundary_free(Render *r, BoundaryPlan *plan) {
@@ -96,7 +155,8 @@ static rey_result reserve_workspaces(Render *r) {
 // fiftieth as noisy; what happens where normals turn away is smaller than what happens at silhouettes.
 static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
-                                                  [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4};
+                                                  [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
+                                                  [BOUNDARY_CHAINED] = 1};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -122,6 +182,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .cdf = plan->cdf,
                               .edge_count = edge_count, .round = plan->job.round,
+                              .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
     plan->job.job.y = r->plan.y;
@@ -146,12 +207,7 @@ static void watch_smooth_normals(Render *r) {
 // Whether what only vertex normals move is known: silhouettes have no part in it.
 static bool knows_turning(const Render *r) {
     const SceneView *view = &r->scene->view;
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (rey_bsdf_bends(view->bsdfs[i].kind)) {
-            return false;
-        }
-    }
-    return boundary_sees(r->plan.sensor) && !view->has_media;
+    return !has_chains(view) && boundary_sees(r->plan.sensor) && !view->has_media;
 }
 
 rey_result rey_boundaries_begin(Render *r) {

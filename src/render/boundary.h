@@ -6,6 +6,8 @@
 // Prepares the terms of a derivative after the selection is mapped, where they can be computed, and records why not; a
 // rey_boundary_free of every plan follows in any case.
 rey_result rey_boundaries_begin(Render *r);
+// Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.
+bool rey_chains_known(const SceneView *view, const SensorRecord *sensor);
 // The term that boundaries of a kind (BOUNDARY_) belong to.
 int rey_boundary_term(int32_t kind);
 void rey_boundary_free(Render *r, BoundaryPlan *plan);

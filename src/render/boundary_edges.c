@@ -416,10 +416,10 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     case EDGE_TERMINATOR:
         return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
     case EDGE_MESH:
-        return w->kind == BOUNDARY_INDIRECT ? factor * mesh_edge_weight(view, e)
-                                            : see_mesh_edge(view, &w->projection, w->eye, e);
+        return w->kind == BOUNDARY_PRIMARY ? see_mesh_edge(view, &w->projection, w->eye, e)
+                                           : factor * mesh_edge_weight(view, e);
     default:
-        return w->kind == BOUNDARY_INDIRECT ? factor * round_edge_weight(view, e) : see_round(view, &w->projection, e);
+        return w->kind == BOUNDARY_PRIMARY ? see_round(view, &w->projection, e) : factor * round_edge_weight(view, e);
     }
 }
 

@@ -167,7 +167,8 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
     r->faces |= job->faces;
-    r->stats.missing_terms = (r->faces & FACES_BOTH) == FACES_BOTH ? REY_TERM_TERMINATOR : 0;
+    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH, mirrored = r->faces & CAMERA_MIRRORED;
+    r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
     r->stats.trace_seconds += job->trace_seconds;
     r->stats.thread_seconds += seconds;
     r->done += 1;

@@ -2,6 +2,7 @@
 #include "render/terms.h"
 
 #include "bsdf/table.h"
+#include "render/boundary.h"
 #include "render/motion.h"
 #include "scene/sink.h"
 
@@ -12,7 +13,8 @@ static const char *term_reason(int bit, const rey_param_info *info) {
     switch (bit) {
     case REY_TERM_SPECULAR:
         return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and the "
-               "edges that are seen in or through them are not found";
+               "edges that are seen in or through them are not found beside vertex normals, textures that jump, surfaces "
+               "that let light pass undeviated, or with this sensor or integrator";
     case REY_TERM_TERMINATOR:
         return "the picture jumps where the normals of maps turn away from the viewer";
     default:
@@ -23,14 +25,15 @@ static const char *term_reason(int bit, const rey_param_info *info) {
 // The terms of a parameter's derivative that exist.
 static int terms_known(const rey_scene *scene, const rey_render_def *def, const Param *p) {
     const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
+    const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
     if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) {
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
-        return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
+        return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
     }
     if (p->normals >= 0) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     }
-    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still;
+    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still | chains;
 }
 
 // Whether some medium's extinction jumps from voxel to voxel.
@@ -125,10 +128,13 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
-        *needed |= info.terms;
+        // What chains turn moves shadows of what lies behind them.
+        *needed |= info.terms | (info.terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0);
     }
-    if (def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT)) {
-        int bit = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT);
+    const int exist = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT |
+                      (rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0);
+    if (def->terms & ~exist) {
+        int bit = def->terms & ~exist;
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
     }
     return REY_OK;
@@ -140,19 +146,21 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "the gradient of lights at a point that lie within a participating medium does not exist yet: as they "
                         "move, so must the points next to them from which their light is scattered");
     }
-    if (result != REY_OK || r->def.terms || !(r->stats.missing_terms & REY_TERM_TERMINATOR)) {
+    int missing = r->stats.missing_terms & (REY_TERM_TERMINATOR | (r->terms & REY_TERM_SPECULAR)), bit = missing & -missing;
+    if (result != REY_OK || r->def.terms || !missing) {
         return result;
     }
     const Param *p = NULL;
-    for (int i = 0; i < selection.count && (!p || !(p->terms & REY_TERM_TERMINATOR)); i++) {
+    for (int i = 0; i < selection.count && (!p || !(p->terms & bit)); i++) {
         const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
         p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
     }
+    static const char *const turned = "does not exist yet: paths met shading normals that face the viewer as the surface "
+                                      "does and others that do not, and the picture jumps between them";
+    static const char *const mirrored = "does not know the edges that the camera sees in smooth mirrors and glass";
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the gradient of %s needs the term 'terminator', which does not exist yet: paths met shading "
-                    "normals that face the viewer as the surface does and others that do not, and the picture jumps "
-                    "between them. --terms interior gives the part that does",
-                    p ? p->name : "");
+                    "the gradient of %s needs the term '%s', which %s. --terms interior gives the part that does exist",
+                    p ? p->name : "", rey_term_name(bit), bit == REY_TERM_SPECULAR ? mirrored : turned);
 }
 
 void rey_terms_book(Render *r, int set, int term, const double *picture) {

@@ -9,7 +9,8 @@
 // Which way shading normals that depend on the selection were met: as the surface faces, or the other way round.
 enum { FACES_ALIKE = 1, FACES_AWAY = 2, FACES_BOTH = 3 };
 // Beside these: a light at a point that moves was met within a medium.
-enum { LIGHT_WITHIN = 4 };
+// And the camera saw something smooth mirror or refract while something moves.
+enum { LIGHT_WITHIN = 4, CAMERA_MIRRORED = 8 };
 
 typedef struct Sink {
     double *gradient;          // reverse, else null

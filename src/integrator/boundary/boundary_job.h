@@ -6,8 +6,17 @@
 #include "shape/meetings.h"
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
-// whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h).
-enum { BOUNDARY_PRIMARY, BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_MEETING, BOUNDARY_KINDS };
+// whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
+// along chains of smooth mirrors and glass (chained.h).
+enum {
+    BOUNDARY_PRIMARY,
+    BOUNDARY_INDIRECT,
+    BOUNDARY_TERMINATOR,
+    BOUNDARY_HORIZON,
+    BOUNDARY_MEETING,
+    BOUNDARY_CHAINED,
+    BOUNDARY_KINDS
+};
 
 typedef struct BoundaryJob {
     PathJob job;              // its tile is all of the film; reverse: adjoint, gradient; forward: tangent, film
@@ -20,6 +29,7 @@ typedef struct BoundaryJob {
     bool round;               // there are outlines of round surfaces among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
+    bool chains;              // the scene has chains of smooth mirrors and glass
 } BoundaryJob;
 
 // Samples of one number of a `pixel` of their random numbers.

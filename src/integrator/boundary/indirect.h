@@ -3,106 +3,11 @@
 // comes, by its number of segments; a particle on the near side carries it to the sensor. In reverse mode the particle
 // gathers what the film's adjoint makes of it, at its first vertex and at the others: the first one slides over its
 // surface, because the film position is fixed.
-// NOT differentiated: what moves behind smooth mirrors and glass, and edges of surfaces that let light pass.
+// Edges along chains of smooth mirrors and glass (chained.h) take the same way.
+// NOT differentiated: what the camera sees in mirrors and through glass, and edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/meeting.h"
-#include "integrator/film.h"
-
-typedef struct Indirect {
-    Tracer *t;
-    const BoundaryJob *b;
-    const Pinhole *pinhole;
-    const FilterTable *filter;
-    Segments q;
-} Indirect;
-
-static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
-    for (int32_t k = 0; k < q->count; k++) {
-        t->ws.pixel[k] = (int32_t)((first + q->number[k]) / BOUNDARY_PER_SET);
-        t->ws.sample[k] = (int32_t)((first + q->number[k]) % BOUNDARY_PER_SET);
-    }
-}
-
-// ---- the far side ------------------------------------------------------------------------------------------------
-
-static int32_t far_half(const Segments *q) { return (q->count + LANES - 1) / LANES * LANES; }
-
-// Starts paths along those segments that end on no light.
-static void far_start(Tracer *t, const Segments *q) {
-    int32_t *slots = t->ws.order, n = 0;
-    for (int32_t k = 0; k < q->count; k++) {
-        slots[n] = k;
-        n += q->lit[k] != 1;
-    }
-    for (int32_t k = 0; k < n; k += LANES) {
-        Mask m = m_first_n(n - k);
-        Int slot = i_select(m, i_load(slots + k), i_set(slots[k]));
-        Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
-        path_begin(t, k, slot, &ray, f_set(1));
-    }
-    t->active = n;
-}
-
-// Fills the rungs: radiance that arrives along the segments.
-static void far_paths(Indirect *in, int32_t *begin) {
-    Tracer *t = in->t;
-    Segments *q = &in->q;
-    t->placed = in->b->kind == BOUNDARY_TERMINATOR || in->b->kind == BOUNDARY_MEETING;
-    if (in->b->kind == BOUNDARY_TERMINATOR) {
-        turning_start(t, q, far_half(q));
-    } else if (in->b->kind == BOUNDARY_MEETING) {
-        meetings_start(t, q);
-    } else {
-        far_start(t, q);
-    }
-    for (int c = 0; c < SPEC_N; c++) {
-        memset(t->ws.radiance[c], 0, CHUNK * sizeof(real));
-    }
-    t->current = 0;
-    t->record_count = t->batch_count = 0;
-    t->overflow = false;
-    t->first_bounce = 1;
-    t->rungs = q->rungs;
-    int32_t depth = t->scene->max_depth;
-    t->rungs_kept = 0;
-    t->rung_count = depth > 0 && depth <= MOST_RUNGS ? depth - 1 : 1;
-    for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
-        memset(q->rungs[i], 0, (size_t)(t->placed ? 2 * far_half(q) : q->count) * sizeof(real));
-    }
-    t->job->paths += t->active;
-    path_forward(t, begin);
-    t->first_bounce = 0;
-    t->placed = false;
-    t->rungs = NULL;
-}
-
-// What the paths in the slots brought that are continued by particles that reach the sensor after `bounce` further vertices.
-KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
-    const Tracer *t = in->t;
-    int32_t depth = t->scene->max_depth, rung = depth - 2 - bounce;
-    if (depth > 0 && depth <= MOST_RUNGS && rung < t->rungs_kept) { // paths that have ended bring no more
-        return spec_gather(in->q.rungs + rung * SPEC_N, slot);
-    }
-    return spec_gather(t->ws.radiance, slot);
-}
-
-// Radiance along the segments of such particles. Silhouettes leave out what the far points emit: that is for segments that end
-// on lights.
-KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
-    const Segments *q = &in->q;
-    Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
-    switch (in->b->kind) {
-    case BOUNDARY_TERMINATOR:
-        return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
-    case BOUNDARY_HORIZON:
-    case BOUNDARY_MEETING:
-        return reflected;
-    default:
-        reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
-        return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
-    }
-}
+#include "integrator/boundary/far.h"
 
 // ---- the near side -----------------------------------------------------------------------------------------------
 
@@ -121,6 +26,10 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
     for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
         int lane = __builtin_ctz(bits);
         int32_t k = i_lane(slot, lane);
+        rows = in->upstream ? upstream_row(&in->q, k, bounce) : rows;
+        if (!rows) {
+            continue;
+        }
         double x = (double)f_lane(sight->x, lane), y = (double)f_lane(sight->y, lane), rgb[SPEC_N];
         float delta[SPEC_N];
         if (in->b->job.mode == MODE_FORWARD) {
@@ -225,7 +134,11 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth && !scene->has_media) {
         return next_count;
     }
-    return particle_scatter(in->t, &at, bounce, -1, next_count);
+    next_count = particle_scatter(in->t, &at, bounce, -1, next_count);
+    if (in->upstream) {
+        upstream_leave(in->t, &in->q, at.v.slot, bounce, in->b->kind == BOUNDARY_CHAINED, at.v.m);
+    }
+    return next_count;
 }
 
 // In media, puts particles k... where their flights from the edge have ended.
@@ -241,7 +154,9 @@ static void near_place(Tracer *t, const Segments *q, int32_t k) {
     spec_store(p->beta, k, spec_load(q->flown, k));
 }
 
-static void near_particles(Indirect *in, int32_t *begin) {
+static void ways_advance(Indirect *in, int32_t bounce, Sink *sink);
+
+static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     Tracer *t = in->t;
     const Segments *q = &in->q;
     uint32_t scramble = t->job->scramble;
@@ -266,6 +181,7 @@ static void near_particles(Indirect *in, int32_t *begin) {
     const bool media = t->scene->has_media;
     t->placed = in->b->kind == BOUNDARY_HORIZON || media;
     int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (media ? (int32_t)t->scene->media_count : 0);
+    t->lobes = in->upstream ? q->lobe : NULL;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
         if (!t->placed) {
             trace_stage(t, 1);
@@ -274,6 +190,10 @@ static void near_particles(Indirect *in, int32_t *begin) {
             }
         }
         t->placed = false;
+        if (in->upstream) {
+            upstream_arrive(t, &in->q, bounce);
+            ways_advance(in, bounce, sink);
+        }
         sort_stage(t, begin, groups);
         int32_t next_count = 0;
         for (int32_t g = 1; g < groups; g++) {
@@ -287,6 +207,7 @@ static void near_particles(Indirect *in, int32_t *begin) {
         t->current = 1 - t->current;
         t->active = next_count;
     }
+    t->lobes = NULL;
     t->job->scramble = scramble;
 }
 
@@ -350,17 +271,11 @@ static void segments_near_adj(Indirect *in, int32_t k, const Hit *near, Vec3 dne
     f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
 }
 
-// The motion of the segments k..., worth `seen` where the sensor sees the near points, and `unseen` elsewhere: adds it to the
-// gradient, or in forward mode leaves in both what it is.
-static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
+// The motion of the segments k... but for their near points, worth `both`.
+static void segments_ahead_adj(const Indirect *in, int32_t k, Vec3 n, Float both, Sink *sink, Mask m) {
     const Segments *q = &in->q;
-    Mask m = m_first_n(q->count - k);
-    bool forward = in->b->job.mode == MODE_FORWARD;
-    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
-    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-    m = m & m_finite(seen + unseen);
     Hit near = LOAD_HIT(q, k, near), edge = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
-    Float along = f_load(q->along + k), both = seen + unseen;
+    Float along = f_load(q->along + k);
     Mask attached = m & mi_lt(i_set(-1), far.shape);
     // n . (edge - lerp(near, far, along))
     points_move_adj(in->t, &edge, v3_scale(n, both), v3_zero(), sink, m);
@@ -377,7 +292,84 @@ static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
         lights_move_adj(in->t->scene, i_select(delta, light, i_set(0)), delta, near.p, record_v3(q->dx, q->dy, q->dz, k),
                         total, &move, sink);
     }
-    segments_near_adj(in, k, &near, v3_scale(n, along - 1.0f), seen, unseen, sink, m);
+}
+
+// The motion of the segments k..., worth `seen` where the sensor sees the near points, and `unseen` elsewhere: adds it to the
+// gradient, or in forward mode leaves in both what it is.
+static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    Mask m = m_first_n(q->count - k);
+    bool forward = in->b->job.mode == MODE_FORWARD;
+    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
+    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+    m = m & m_finite(seen + unseen);
+    Hit near = LOAD_HIT(q, k, near);
+    segments_ahead_adj(in, k, n, seen + unseen, sink, m);
+    segments_near_adj(in, k, &near, v3_scale(n, f_load(q->along + k) - 1.0f), seen, unseen, sink, m);
+}
+
+// ---- what moves upstream -----------------------------------------------------------------------------------------
+
+// Forward mode: the rates of the ways that end at the vertices of a bounce, where the particles have just arrived.
+static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
+    const Segments *q = &in->q;
+    for (int32_t k = 0; k < q->count && bounce < q->levels && in->b->job.mode == MODE_FORWARD; k += LANES) {
+        Mask m = m_first_n(q->count - k);
+        Carried c = {record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
+        Float rate = f_load(q->rate + k);
+        if (bounce == 0) {
+            Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+            segments_ahead_adj(in, k, n, f_set(1), sink, m);
+            c = (Carried){v3_scale(n, f_load(q->along + k) - 1.0f), v3_zero()};
+            rate = sink_taken(sink);
+        } else {
+            upstream_turn_adj(in->t, q, bounce - 1, k, &c, sink, m);
+            rate = rate + sink_taken(sink);
+        }
+        UpstreamVertex at = upstream_load(q, bounce, k);
+        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
+        Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
+        points_slide_adj(in, &at.hit, c.drag, lens, sink, ray);
+        f_store(q->up[bounce].seen + k, f_zero_unless(ray, rate + sink_taken(sink)));
+        points_move_adj(in->t, &at.hit, c.drag, v3_zero(), sink, ray);
+        f_store(q->up[bounce].unseen + k, f_zero_unless(ray, rate + sink_taken(sink)));
+        f_store(q->rate + k, rate);
+        f_store(q->dragx + k, c.drag.x);
+        f_store(q->dragy + k, c.drag.y);
+        f_store(q->dragz + k, c.drag.z);
+        f_store(q->turnx + k, c.turn.x);
+        f_store(q->turny + k, c.turn.y);
+        f_store(q->turnz + k, c.turn.z);
+    }
+}
+
+// Reverse mode: the motion of the segments k... and of their ways, by what the vertices of every level are worth.
+static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    Mask m = m_first_n(q->count - k);
+    Float worth[MOST_UPSTREAM + 1], sum = f_set(0);
+    for (int32_t j = q->levels; j >= 0; j--) { // of a level and all that follow
+        Mask met = j < q->levels ? m & mi_lt(i_set(UPSTREAM_NONE), i_load(q->up[j].met + k)) : m_set(false);
+        sum = j < q->levels ? sum + f_zero_unless(met, f_load(q->up[j].seen + k) + f_load(q->up[j].unseen + k)) : sum;
+        worth[j] = sum;
+    }
+    m = m & m_finite(sum);
+    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+    segments_ahead_adj(in, k, n, worth[0], sink, m);
+    Carried c = {v3_scale(n, (f_load(q->along + k) - 1.0f) * worth[0]), v3_zero()};
+    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
+    for (int32_t j = 0; j < q->levels; j++) {
+        Float rcp = f_zero_unless(m_ne(worth[j], f_set(0)), 1.0f / f_select(m_ne(worth[j], f_set(0)), worth[j], f_set(1)));
+        UpstreamVertex at = upstream_load(q, j, k);
+        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
+        if (m_any(ray)) {
+            points_slide_adj(in, &at.hit, v3_scale(c.drag, f_load(q->up[j].seen + k) * rcp), lens, sink, ray);
+            points_move_adj(in->t, &at.hit, v3_scale(c.drag, f_load(q->up[j].unseen + k) * rcp), v3_zero(), sink, ray);
+        }
+        Float share = worth[j + 1] * rcp;
+        c = (Carried){v3_scale(c.drag, share), v3_scale(c.turn, share)};
+        upstream_turn_adj(in->t, q, j, k, &c, sink, m);
+    }
 }
 
 // The same of n . view / r between x and the other end of segments at right angles to n (turning.h). x slides where the sensor
@@ -431,7 +423,9 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
 }
 
 static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
-    if (in->b->kind == BOUNDARY_INDIRECT) {
+    if (in->upstream) {
+        ways_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_move_adj(in, k, sink);
     } else if (in->b->kind == BOUNDARY_MEETING) {
         meetings_move_adj(in, k, sink);
@@ -448,6 +442,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         segments_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_MEETING) {
         meetings_find(t, in->b, first, count, q);
+    } else if (in->b->kind == BOUNDARY_CHAINED) {
+        chained_find(t, in->b, first, count, q);
     } else {
         turnings_find(t, in->b, first, count, q);
     }
@@ -455,11 +451,14 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         return;
     }
     slot_numbers(t, q, first);
-    for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_FORWARD; k += LANES) {
+    if (in->upstream) {
+        upstream_begin(q);
+    }
+    for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_FORWARD && !in->upstream; k += LANES) {
         moves_adj(in, k, sink);
     }
     far_paths(in, begin);
-    near_particles(in, begin);
+    near_particles(in, begin, sink);
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_REVERSE; k += LANES) {
         moves_adj(in, k, sink);
     }

@@ -68,10 +68,7 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
 static void meetings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        for (int32_t k = i; k < i + LANES; k++) {
-            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
-            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
-        }
+        segment_numbers(t, i, first);
         meeting_segment(t, b, m_first_n(count - i), i_iota() + i, q);
     }
 }

@@ -60,29 +60,10 @@ KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real step) {
     return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
 }
 
-// Lanes of m whose edge the camera sees, between the surfaces that meet or end there. Next to a corner a path may miss
-// them; what it meets instead belongs to another edge's jump.
+// Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
 static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
-    const EdgePoint *e = &s->edge;
-    Mask own[2], clear[2], silhouette = s->silhouette, above = m_gt(v3_dot(e->side[0], s->n), f_set(0));
-    for (int side = 0; side < 2; side++) {
-        Ray ray = primary_ray(t, s, side ? PRIMARY_STEP : -PRIMARY_STEP).ray;
-        Hit hit = trace_closest(t->scene, &ray, m, false);
-        Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
-        Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
-        own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
-        Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
-                                  (near & mi_eq(e->other, i_set(EDGE_ANY))));
-        if (m_any(e->meeting)) {
-            Mask other = met & mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
-            faces = faces | (e->meeting & near & other);
-        }
-        own[side] = (silhouette & own[side]) | faces;
-        clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
-    }
-    t->job->rays += 2 * m_count(m);
-    Mask inside = (above & own[1] & clear[0]) | (~above & own[0] & clear[1]);
-    return m & ((silhouette & inside) | (~silhouette & own[0] & own[1]));
+    const Ray rays[2] = {primary_ray(t, s, -PRIMARY_STEP).ray, primary_ray(t, s, PRIMARY_STEP).ray};
+    return edge_between(t, &s->edge, s->silhouette, s->n, rays, m);
 }
 
 // Finds which of `count` samples from number `first` on can contribute; writes their numbers behind `kept`.

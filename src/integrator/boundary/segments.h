@@ -17,7 +17,7 @@
 #define DIMENSION_TURNING_SIDE 0x80000005u
 
 // Blocks of samples that end on lights take turns with blocks that leave into a random direction.
-enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64 };
+enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64, MOST_UPSTREAM = 32 };
 
 // Lights of which every point sees the same direction, or all.
 enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 << EMITTER_DIRECTIONAL };
@@ -34,9 +34,27 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 #define SEGMENT_INTS(I) I(number) I(lit) I(source) I(air) I(around) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light) S(flown)
 
+// Near vertices of one level (upstream.h): where they lie, where the particle came from and went on, and what the motion of a
+// vertex is worth where it is seen by the sensor, and elsewhere.
+#define UPSTREAM_FLOATS(F) F(u) F(v) F(x) F(y) F(z) F(dx) F(dy) F(dz) F(seen) F(unseen)
+#define UPSTREAM_INTS(I) I(shape) I(prim) I(instance) I(met) I(lobe)
+
+typedef struct Upstream {
+    UPSTREAM_FLOATS(DECLARE_FLOAT) UPSTREAM_INTS(DECLARE_INT)
+} Upstream;
+
+// Of the particle in a slot: how it came to its vertex, the level of the last vertex that moves with it, whether its first
+// vertex turned the segment, and the last one's lobe; forward mode: what is carried upstream, and its rate so far.
+#define WAY_INTS(I) I(arrived) I(level) I(full) I(lobe)
+#define WAY_FLOATS(F) F(rate) F(dragx) F(dragy) F(dragz) F(turnx) F(turny) F(turnz)
+
 typedef struct Segments {
     SEGMENT_FLOATS(DECLARE_FLOAT) SEGMENT_INTS(DECLARE_INT) SEGMENT_SPECS(DECLARE_SPEC)
+    WAY_FLOATS(DECLARE_FLOAT) WAY_INTS(DECLARE_INT)
     real *rungs[MOST_RUNGS * SPEC_N];
+    Upstream up[MOST_UPSTREAM];
+    Fork fork;
+    int32_t levels; // of `up` that are in use
     int32_t count;
 } Segments;
 
@@ -51,6 +69,15 @@ static inline size_t segments_layout(Segments *q, char *block) {
     for (int i = 0; i < MOST_RUNGS * SPEC_N; i++) {
         CARVE(q->rungs[i], n)
     }
+#define CARVE_UPSTREAM(name) CARVE(q->up[i].name, n)
+    for (int i = 0; i < MOST_UPSTREAM; i++) {
+        UPSTREAM_FLOATS(CARVE_UPSTREAM)
+        UPSTREAM_INTS(CARVE_UPSTREAM)
+    }
+    WAY_FLOATS(CARVE_SEGMENT)
+    WAY_INTS(CARVE_SEGMENT)
+    CARVE_SPEC(q->fork.base, n)
+    CARVE(q->fork.chained, n)
     q->count = 0;
     return at;
 }
@@ -64,7 +91,30 @@ typedef struct Segment {
     Hit far;
     Int source;      // the delta light that it ends on, -1 = none
     Mask m, attached; // attached: the far point lies on a surface
+    Mask silhouette;
 } Segment;
+
+// The batches of a chunk take turns: whether this one's segments end on lights, and what share of all of them it is.
+typedef struct SegmentTurn {
+    bool direct, indirect; // what there is
+    bool lit;
+    Float share;
+} SegmentTurn;
+
+static SegmentTurn segment_turn(const SceneView *scene, int64_t number) {
+    SegmentTurn r = {scene->emitters_count > 0, scene->max_depth < 0 || scene->max_depth > 2, false, f_set(1)};
+    r.indirect = r.indirect && !scene->has_media; // there only lights move
+    r.lit = r.direct && (!r.indirect || number / SEGMENT_BLOCK % 2 == 0);
+    r.share = f_set(r.direct && r.indirect ? 2 : 1);
+    return r;
+}
+
+static void segment_numbers(Tracer *t, int32_t i, int64_t first) {
+    for (int32_t k = i; k < i + LANES; k++) {
+        t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
+        t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
+    }
+}
 
 KFN Vec3 segment_far_eye(const SceneView *scene, Vec3 reference, Vec3 d) {
     return v3_madd(reference, f_set(1e4f * (real)scene->bounds_radius), d);
@@ -140,8 +190,10 @@ static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, b
     Float into = v3_dot(s->edge.side[0], n);
     s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
     s->weight = length * share * f_safe_rcp(s->edge.probability);
-    s->m = s->m & edge_is_silhouette(t->scene, b, &s->edge, n) & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) &
-           m_finite(s->weight) & m_gt(s->edge.probability, f_set(0));
+    s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n);
+    Mask jumps = b->kind == BOUNDARY_CHAINED && !lit ? s->silhouette | s->edge.crease : s->silhouette;
+    s->m = s->m & jumps & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
+           m_gt(s->edge.probability, f_set(0));
 }
 
 KFN void hit_compress(real *u, real *v, real *x, real *y, real *z, int32_t *shape, int32_t *prim, int32_t *instance,
@@ -240,25 +292,19 @@ static void segment_fly(Tracer *t, Segment *s, Int number, Segments *q) {
 
 // Samples numbers first... of a chunk and keeps the segments among them.
 static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
-    const SceneView *scene = t->scene;
-    bool indirect = scene->max_depth < 0 || scene->max_depth > 2, direct = scene->emitters_count > 0;
-    indirect = indirect && !scene->has_media; // there only lights move
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        bool lit = direct && (!indirect || (first + i) / SEGMENT_BLOCK % 2 == 0);
-        if (!lit && !indirect) {
+        SegmentTurn turn = segment_turn(t->scene, first + i);
+        if (!turn.lit && !turn.indirect) {
             return;
         }
-        for (int32_t k = i; k < i + LANES; k++) {
-            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
-            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
-        }
+        segment_numbers(t, i, first);
         Segment s;
-        segment_sample(t, b, i_iota() + i, lit, f_set(direct && indirect ? 2 : 1), m_first_n(count - i), &s);
-        if (m_any(s.m) && scene->has_media) {
+        segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
+        if (m_any(s.m) && t->scene->has_media) {
             segment_fly(t, &s, i_iota() + i, q);
         } else if (m_any(s.m)) {
-            segment_trace(t, &s, lit, i_iota() + i, q);
+            segment_trace(t, &s, turn.lit, i_iota() + i, q);
         }
     }
 }

@@ -117,10 +117,7 @@ static void turning_trace(Tracer *t, const Turning *s, bool horizon, Int number,
 static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        for (int32_t k = i; k < i + LANES; k++) {
-            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
-            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
-        }
+        segment_numbers(t, i, first);
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {

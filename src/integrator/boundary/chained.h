@@ -1,0 +1,101 @@
+// chained.h: edges along chains of smooth mirrors and glass that begin at a vertex other than the camera. The
+// direction at the vertex before a chain is fixed (path_move.h), so that all of what the chain sees jumps where it
+// passes an edge, as the film does: with F = n . (e - r), e the point of the edge and r that of the ray next to it,
+//   dI += integral dl dw |w x T| (n . e' - n . r') (L- - L+) W,
+// W the importance that comes to the edge. Phase space is what chains preserve, so that dl dw |w x T| is that of the
+// vertex before the chain. A segment's near point is that vertex, or it is part of the chain: which one the particle
+// that carries the light decides (upstream.h). Where it is that vertex, what jumps is only what the far points mirror
+// or refract; all other light of theirs is attached to them (indirect.h).
+#pragma once
+
+#include "integrator/boundary/upstream.h"
+
+// What a segment says of its light in `lit`, beside "no" and "from a light": it meets surfaces on both sides of the edge, and
+// no segments to lights pass there.
+enum { SEGMENT_CREASE = 4 };
+
+// Distance of the two rays from the edge.
+KFN Float chained_step(Vec3 p) { return (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 1e-5f; }
+
+// The rays past both sides of an edge, from half-way to the near point on: n points to the second one.
+KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, int side) {
+    Float step = chained_step(p);
+    Vec3 o = v3_madd(v3_madd(p, behind * -0.5f, d), side ? step : -step, n);
+    return (Ray){o, d, f_set(INFINITY)};
+}
+
+// Finds the near points of segments in any direction, and keeps those that meet the edge between its surfaces.
+static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+    const EdgePoint *e = &s->edge;
+    Float step = (1.0f + f_max(f_max(f_abs(e->p.x), f_abs(e->p.y)), f_abs(e->p.z))) * 9e-5f;
+    // Out of the way of the edge's surfaces: beside silhouettes, and towards the viewer where there are two.
+    Vec3 o = v3_select(s->silhouette, v3_madd(e->p, step, s->n), v3_madd(e->p, -4.0f * step, s->d));
+    Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
+    t->job->rays += m_count(s->m);
+    Hit near = trace_closest(t->scene, &back, s->m, false);
+    Mask m = s->m & mi_lt(i_set(-1), near.shape);
+    if (!m_any(m)) {
+        return;
+    }
+    Float behind = f_select(m, v3_length(v3_sub(near.p, e->p)), f_set(1));
+    Ray rays[2] = {chained_ray(e->p, s->d, s->n, behind, 0), chained_ray(e->p, s->d, s->n, behind, 1)};
+    m = edge_between(t, e, s->silhouette, s->n, rays, m);
+    int32_t at = q->count;
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
+    f_compress(q->behind + at, behind, m);
+    spec_compress(q->light, at, s->light, m);
+    i_compress(q->lit + at, i_select(s->silhouette, i_set(0), i_set(SEGMENT_CREASE)), m);
+    i_compress(q->source + at, i_set(-1), m);
+    i_compress(q->number + at, number, m);
+    Hit none = near;
+    none.shape = i_set(-1);
+    KEEP_HIT(q, at, near, &near, near.p, m);
+    KEEP_HIT(q, at, edge, &e->hit, e->p, m);
+    KEEP_HIT(q, at, far, &none, e->p, m);
+    q->count += m_count(m);
+}
+
+// As segments_find. No chain ends on a light at a point or of one direction.
+static void chained_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        SegmentTurn turn = segment_turn(t->scene, first + i);
+        if (!turn.indirect) {
+            return;
+        }
+        segment_numbers(t, i, first);
+        Segment s;
+        segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
+        s.m = s.m & mi_lt(s.source, i_set(0));
+        if (m_any(s.m) && turn.lit) {
+            segment_trace(t, &s, true, i_iota() + i, q);
+        } else if (m_any(s.m)) {
+            chained_trace(t, &s, i_iota() + i, q);
+        }
+    }
+    // The far points lie where the rays meet their surfaces.
+    memset(q->along, 0, (size_t)q->count * sizeof(real));
+}
+
+// Starts the paths on both sides of the edges, in slots k and half + k.
+static void chained_start(Tracer *t, const Segments *q, int32_t half) {
+    for (int32_t k = 0; k < half; k++) {
+        int32_t at = k < q->count ? k : q->count - 1;
+        t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
+        t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
+    }
+    for (int32_t k = 0; k < half; k += LANES) {
+        Int at = i_min(i_iota() + k, i_set(q->count - 1));
+        Vec3 p = LOAD_V3(*q, edge_x, edge_y, edge_z, at), d = LOAD_V3(*q, dx, dy, dz, at);
+        Vec3 n = v3_normalize(v3_neg(LOAD_V3(*q, nx, ny, nz, at)));
+        Mask m = m_first_n(q->count - k) & ~mi_eq(i_gather(q->lit, at), i_set(1));
+        for (int side = 0; side < 2; side++) { // first the side that n points to
+            Ray ray = chained_ray(p, d, n, real_gather(q->behind, at), 1 - side);
+            ray.tmax = f_zero_unless(m, ray.tmax);
+            path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
+        }
+    }
+    t->active = 2 * half;
+}

@@ -1,0 +1,135 @@
+// far.h: what comes along boundary segments from their far sides: paths that begin there, by their number of segments.
+#pragma once
+
+#include "integrator/boundary/chained.h"
+#include "integrator/boundary/meeting.h"
+#include "integrator/film.h"
+
+typedef struct Indirect {
+    Tracer *t;
+    const BoundaryJob *b;
+    const Pinhole *pinhole;
+    const FilterTable *filter;
+    Segments q;
+    bool upstream;  // near points may move with what lies further towards the sensor
+} Indirect;
+
+static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
+    for (int32_t k = 0; k < q->count; k++) {
+        t->ws.pixel[k] = (int32_t)((first + q->number[k]) / BOUNDARY_PER_SET);
+        t->ws.sample[k] = (int32_t)((first + q->number[k]) % BOUNDARY_PER_SET);
+    }
+}
+
+static int32_t far_half(const Segments *q) { return (q->count + LANES - 1) / LANES * LANES; }
+
+// Starts paths along those segments that end on no light.
+static void far_start(Tracer *t, const Segments *q) {
+    int32_t *slots = t->ws.order, n = 0;
+    for (int32_t k = 0; k < q->count; k++) {
+        slots[n] = k;
+        n += q->lit[k] != 1;
+    }
+    for (int32_t k = 0; k < n; k += LANES) {
+        Mask m = m_first_n(n - k);
+        Int slot = i_select(m, i_load(slots + k), i_set(slots[k]));
+        Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
+        path_begin(t, k, slot, &ray, f_set(1));
+    }
+    t->active = n;
+}
+
+// Fills the rungs: radiance that arrives along the segments.
+static void far_paths(Indirect *in, int32_t *begin) {
+    Tracer *t = in->t;
+    Segments *q = &in->q;
+    int32_t kind = in->b->kind;
+    t->placed = kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_MEETING;
+    if (kind == BOUNDARY_TERMINATOR) {
+        turning_start(t, q, far_half(q));
+    } else if (kind == BOUNDARY_MEETING) {
+        meetings_start(t, q);
+    } else if (kind == BOUNDARY_CHAINED) {
+        chained_start(t, q, far_half(q));
+    } else {
+        far_start(t, q);
+    }
+    for (int c = 0; c < SPEC_N; c++) {
+        memset(t->ws.radiance[c], 0, CHUNK * sizeof(real));
+    }
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    t->first_bounce = 1;
+    t->rungs = q->rungs;
+    int32_t depth = t->scene->max_depth;
+    t->rungs_kept = 0;
+    t->rung_count = depth > 0 && depth <= MOST_RUNGS ? depth - 1 : 1;
+    for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
+        memset(q->rungs[i], 0, (size_t)(t->placed || kind == BOUNDARY_CHAINED ? 2 * far_half(q) : q->count) * sizeof(real));
+    }
+    t->job->paths += t->active;
+    if (in->upstream) {
+        t->fork = &q->fork;
+        memset(q->fork.chained, 0, CHUNK * sizeof(int32_t));
+    }
+    path_forward(t, begin);
+    t->fork = NULL;
+    t->first_bounce = 0;
+    t->placed = false;
+    t->rungs = NULL;
+}
+
+// The number of segments that paths may have that are continued by particles that reach the sensor after `bounce` further
+// vertices, less 1; -1: all that there are.
+KFN int32_t far_rung(const Indirect *in, int32_t bounce) {
+    int32_t depth = in->t->scene->max_depth, rung = depth - 2 - bounce;
+    return depth > 0 && depth <= MOST_RUNGS && rung < in->t->rungs_kept ? rung : -1; // paths that have ended bring no more
+}
+
+// What the paths in the slots brought.
+KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
+    int32_t rung = far_rung(in, bounce);
+    return rung < 0 ? spec_gather(in->t->ws.radiance, slot) : spec_gather(in->q.rungs + rung * SPEC_N, slot);
+}
+
+// What they brought along chains that begin at their first vertices.
+KFN Spec far_chain(const Indirect *in, Int slot, int32_t bounce) {
+    const Fork *fork = &in->q.fork;
+    Mask chained = mi_eq(i_gather(fork->chained, slot), i_set(1)) & m_set(far_rung(in, bounce) != 0);
+    return spec_zero_unless(chained, spec_sub(far_reflected(in, slot, bounce), spec_gather(fork->base, slot)));
+}
+
+// What jumps at an edge along a chain: everything, if the near point is part of it. What far points on the lit side emit is
+// for segments that end on lights.
+KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
+    const Segments *q = &in->q;
+    Int other = slot + far_half(q);
+    Int kind = i_gather(q->lit, slot);
+    Mask lit = mi_eq(kind, i_set(1)), full = mi_eq(i_gather(q->full, slot), i_set(1));
+    Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), spec_gather(q->rungs, slot));
+    Spec all = spec_sub(spec_sub(far_reflected(in, slot, bounce), emitted), far_reflected(in, other, bounce));
+    Spec chain = spec_sub(far_chain(in, slot, bounce), far_chain(in, other, bounce));
+    Spec jump = spec_mul(l, spec_select(full, all, chain));
+    return spec_select(lit, spec_zero_unless(full, l), jump);
+}
+
+// Radiance along the segments of such particles. Silhouettes leave out what the far points emit: that is for segments that end
+// on lights.
+KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
+    const Segments *q = &in->q;
+    Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
+    switch (in->b->kind) {
+    case BOUNDARY_TERMINATOR:
+        return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
+    case BOUNDARY_HORIZON:
+    case BOUNDARY_MEETING:
+        return reflected;
+    case BOUNDARY_CHAINED:
+        return far_jump(in, slot, bounce);
+    default:
+        reflected = in->upstream ? spec_sub(reflected, far_chain(in, slot, bounce)) : reflected;
+        reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
+        return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
+    }
+}
