@@ -20,6 +20,7 @@ LIMITS = {
     "glass": {"pebble.to_world": 0.02, "group.shape_0.bsdf.eta.value": 0.01},
     "shape": {"creature.positions": 0.004},
     "smoke": {},
+    "milk": {"milk.sigma_a": 0.05, "milk.reduced_sigma_s": 0.08},
     "milk/dictionary": {},
 }
 LEAST_POINTS = {"shape": 5000}
