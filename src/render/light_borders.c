@@ -2,6 +2,7 @@
 #include "render/light_borders.h"
 
 #include "emitter/emitter.h"
+#include "scene/texels.h"
 #include "shape/meetings.h"
 
 static bool ends_lit(const SceneView *view, const TextureNode *t) {
@@ -10,7 +11,7 @@ static bool ends_lit(const SceneView *view, const TextureNode *t) {
         int32_t x = i % t->width, y = i / t->width;
         bool outermost = x == 0 || y == 0 || x == t->width - 1 || y == t->height - 1;
         for (int32_t c = 0; c < t->channels && outermost; c++) {
-            lit |= view->theta[t->theta + (int64_t)t->channels * i + c] != 0;
+            lit |= rey_texel(view, t, (int64_t)t->channels * i + c) != 0;
         }
     }
     return lit;

@@ -34,18 +34,26 @@ static float half_value(const float *levels, uint32_t bits) {
     return bits >> 15 ? -value : value;
 }
 
+float rey_texel(const SceneView *view, const TextureNode *t, int64_t i) {
+    if (t->storage == TEXELS_FLOAT) {
+        return view->theta[t->theta + i];
+    }
+    const int bytes = rey_texel_bytes(t->storage);
+    const unsigned char *at = (const unsigned char *)view->texels + (t->texels + i) * bytes;
+    if (t->storage == TEXELS_HALF) {
+        return half_value(view->levels, (uint32_t)at[0] | (uint32_t)at[1] << 8);
+    }
+    return view->levels[(t->storage == TEXELS_SRGB ? LEVELS_SRGB : LEVELS_BYTE) + at[0]];
+}
+
 void rey_texels_promote(rey_scene *scene, int32_t texture, bool unpack) {
     TextureNode *t = (TextureNode *)(uintptr_t)(scene->view.textures + texture);
     if (t->storage == TEXELS_FLOAT) {
         return;
     }
-    const float *levels = scene->view.levels;
-    const unsigned char *bytes = (const unsigned char *)scene->view.texels + (int64_t)t->texels * rey_texel_bytes(t->storage);
     float *out = scene->view.theta + t->theta;
     for (int64_t i = 0; i < number_count(t) && unpack; i++) {
-        out[i] = t->storage == TEXELS_HALF   ? half_value(levels, (uint32_t)bytes[2 * i] | (uint32_t)bytes[2 * i + 1] << 8)
-                 : t->storage == TEXELS_BYTE ? levels[LEVELS_BYTE + bytes[i]]
-                                             : levels[LEVELS_SRGB + bytes[i]];
+        out[i] = rey_texel(&scene->view, t, i);
     }
     scene->arena_bytes += (size_t)number_count(t) * sizeof *out;
     t->storage = TEXELS_FLOAT;

@@ -10,6 +10,8 @@ enum { LEVELS_BYTE = 0, LEVELS_SRGB = 256, LEVELS_HALF = 512, LEVELS_COUNT = 544
 
 // Bytes of one number.
 int rey_texel_bytes(int32_t storage);
+// Number i of a bitmap, however it is stored.
+float rey_texel(const SceneView *view, const TextureNode *t, int64_t i);
 // Gives packed textures, and the parameters that are their numbers, places behind the end of theta, which take memory when
 // they are written to. *numbers: how many there are.
 rey_result rey_texels_place(rey_scene *scene, int64_t *numbers);
