@@ -155,21 +155,24 @@ static bool agrees(const CheckResult *r) {
 }
 
 // A difference that crosses kinks (texels' edges, a beam's border, triangles that turn away from a light) is off in a few
-// blocks whatever its order. Where an eighth of the step agrees, or an eighth of that, and is not drowned in noise, that
-// was it.
+// blocks whatever its order. Where an eighth of the step agrees, or an eighth of that, that was it. In noise a short step
+// agrees with anything: there it must close most of the worst block's gap, too.
 static rey_result try_short_steps(Work *w, Check *check, bool central) {
     CheckResult first = check->result;
     double fresh_z = check->fresh_z, h = check->step.h;
     bool stands = agrees(&first);
-    if (stands || first.relative_error > CHECK_WEAK || w->session.options->step > 0) {
+    if (stands || w->session.options->step > 0) {
         return REY_OK;
     }
+    double gap = check_gap(&w->blocks, w->derivative, w->difference, &first);
     rey_result result = REY_OK;
     for (int i = 0; i < CHECK_SHORTENINGS && !stands && !result; i++) {
         h /= 8;
         Step step = central ? check_central_step(h) : check_one_sided_step(h, check->step.offsets[1] > 0 ? 1 : -1);
         result = differences(w, check, &step);
-        stands = agrees(&check->result) && check->result.relative_error <= CHECK_WEAK;
+        stands = agrees(&check->result) &&
+                 (check->result.relative_error <= CHECK_WEAK ||
+                  check_gap(&w->blocks, w->derivative, w->difference, &first) < 0.25 * gap);
         if (stands) {
             check->step = step;
         }

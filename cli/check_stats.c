@@ -104,6 +104,12 @@ static double gap_at(const double *difference, const double *rough, size_t strid
     return fabs(gap);
 }
 
+double check_gap(const Blocks *b, const double *derivative, const double *difference, const CheckResult *worst) {
+    size_t block = (size_t)worst->worst_y * (size_t)b->nx + (size_t)worst->worst_x;
+    size_t at = block * CHECK_SERIES + (size_t)worst->worst_channel, stride = (size_t)b->nx * (size_t)b->ny * CHECK_SERIES;
+    return gap_at(derivative, difference, stride, at);
+}
+
 CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, const double *rough,
                           double rounding) {
     size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;

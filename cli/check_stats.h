@@ -31,6 +31,9 @@ typedef struct CheckResult {
 CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, const double *rough,
                           double rounding);
 
+// How far derivative and difference lie apart in the block and channel that another comparison found the worst.
+double check_gap(const Blocks *blocks, const double *derivative, const double *difference, const CheckResult *worst);
+
 // z of the picture's mean of such rows against 0, give or take `floor`.
 double check_mean_z(const Blocks *blocks, const double *rows, double floor);
 

@@ -24,12 +24,18 @@ static void on_terminate(int number) {
 typedef struct Display {
     bool terminal;
     double shown; // time of the last line [s]
+    bool finishing;
 } Display;
 
 static bool show_progress(void *user, const FitProgress *p) {
     Display *display = user;
     double now = rey_seconds(), wait = display->terminal ? 0.1 : LINE_SECONDS;
-    if (!p->finishing && (now - display->shown >= wait || p->iteration == p->iterations)) {
+    if (p->finishing && (!display->finishing || now - display->shown >= LINE_SECONDS)) {
+        fprintf(stderr, "%smaking the table and the report%s", display->finishing ? "" : display->terminal ? "\n" : "",
+                display->terminal ? "\r" : "\n");
+        display->finishing = true;
+        display->shown = now;
+    } else if (!p->finishing && (now - display->shown >= wait || p->iteration == p->iterations)) {
         fprintf(stderr, "%siteration %d/%d  loss %.4g  gradient %.3g  %.0f s left%s",
                 display->terminal ? "\r\033[K" : "", p->iteration, p->iterations, p->loss, p->gradient_norm,
                 p->seconds_left, display->terminal ? "" : "\n");
@@ -169,8 +175,9 @@ static void print_json(const FitResult *result) {
 
 static void print_words(const FitResult *result) {
     print_table(result);
-    printf("\n%lld number%s, %d iteration%s%s, %.1f s", (long long)result->numbers, PLURAL(result->numbers),
-           result->iterations, PLURAL(result->iterations), result->converged ? " (converged)" : "", result->seconds);
+    printf("\n%lld number%s, %d iteration%s%s, %.1f s (%.1f s in all)", (long long)result->numbers, PLURAL(result->numbers),
+           result->iterations, PLURAL(result->iterations), result->converged ? " (converged)" : "", result->seconds,
+           cli_seconds_total());
     if (result->iterations) {
         printf(", loss %.4g\n", result->loss);
     } else {

@@ -3,7 +3,21 @@
 
 #include "shape/shape.h"
 
+#include <math.h>
 #include <string.h>
+
+// Colours that files give as bytes are numbers up to 255 here, as in other programs of the format.
+static rey_result note_byte_colours(Builder *b, const rey_mesh_attribute *attribute, const char *path, int64_t count) {
+    float largest = 0;
+    bool whole = attribute->channels == 3 && strstr(attribute->name, "color") != NULL;
+    for (int64_t i = 0; i < count && whole; i++) {
+        whole = attribute->data[i] >= 0 && attribute->data[i] == floorf(attribute->data[i]);
+        largest = fmaxf(largest, attribute->data[i]);
+    }
+    return whole && largest > 1 ? rey_scene_add_note(b->scene, "the attribute %s of %s has whole numbers up to %g; colours go from 0 to 1",
+                                                     attribute->name, path, (double)largest)
+                                : REY_OK;
+}
 
 rey_result build_mesh_attribute(Builder *b, const rey_mesh_attribute *attribute, int32_t id, const char *path,
                                 int64_t vertices, int64_t faces) {
@@ -22,6 +36,7 @@ rey_result build_mesh_attribute(Builder *b, const rey_mesh_attribute *attribute,
     build_join(name, path, attribute->name);
     *a = (MeshAttribute){.shape = id, .theta = theta, .channels = attribute->channels, .per_face = attribute->per_face};
     memcpy(a->name, attribute->name, sizeof a->name);
+    TRY(note_byte_colours(b, attribute, path, count));
     a->param = rey_scene_add_param(scene, name, p);
     return a->param < 0 ? REY_ERROR_MEMORY : REY_OK;
 }

@@ -74,7 +74,7 @@ rey_result rey_xml_read_vector(XmlReader *reader, const XmlAttributes *attribute
         int count;
         read_list(value->value, 3, out, &count);
         if (count != 1 && count != 3) {
-            return fail_value(reader, value, "one or three numbers");
+            return fail_value(reader, value, "one or three numbers up to 3.4e38");
         }
         if (count == 1) {
             out[1] = out[2] = out[0];

@@ -121,7 +121,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         if (missing && !def->terms) {
             int bit = missing & -missing;
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "the gradient of %s needs the term '%s', which does not exist yet: %s%s", info.name,
+                            "the gradient of %s needs the term '%s', which does not cover this yet: %s%s", info.name,
                             rey_term_name(bit), term_reason(bit, &info), interior ? ". --terms interior gives the part that does" : "");
         }
         if (missing && !interior) {
