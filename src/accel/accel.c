@@ -288,6 +288,8 @@ static rey_result accel_create(rey_scene *scene) {
         if (!scene->embree_groups[i]) {
             return check_device(scene);
         }
+        // Rays come from far away in the units of an instance: without this they slip between its triangles.
+        rtcSetSceneFlags(scene->embree_groups[i], RTC_SCENE_FLAG_ROBUST);
     }
     return REY_OK;
 }
