@@ -423,14 +423,20 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     }
 }
 
-// Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
-static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
+static rey_result find_meetings(Render *r) {
     Array borders = {0};
-    rey_result result = r->meetings.count ? REY_OK : rey_light_borders(r->scene, &borders);
-    if (result == REY_OK && !r->meetings.count) {
+    rey_result result = rey_light_borders(r->scene, &borders);
+    if (result == REY_OK) {
         result = rey_meetings_find(r->scene, borders.data, (int32_t)borders.count, moves_on_film, r, &r->meetings);
     }
     rey_array_free(r->scene->ctx, &borders);
+    r->meetings_found = true;
+    return result;
+}
+
+// Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
+static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
+    rey_result result = r->meetings_found ? REY_OK : find_meetings(r);
     for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
         EdgeRecord e = {.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
                         .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};

@@ -44,7 +44,8 @@ typedef struct Render {
     TermRequest request;
     double booked;         // of a set's value: what its terms have brought so far
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
-    Array meetings;        // of the primary term (shape/meetings.h)
+    Array meetings;        // curves that two boundary terms share (shape/meetings.h)
+    bool meetings_found;
     BoundaryPlan boundary[BOUNDARY_KINDS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
     rey_stats stats;
