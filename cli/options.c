@@ -283,7 +283,10 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     switch (row->id) {
     case OPTION_OUTPUT:
         o->output = value;
-        return true;
+        if (*value == '=') {
+            cli_usage_error(o, "-o%s: a name follows without '='", value);
+        }
+        return *value != '=';
     case OPTION_SPP:
         return parse_count(o, "--spp", value, 1, MOST_SPP, &o->spp);
     case OPTION_SEED:

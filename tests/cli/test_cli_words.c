@@ -130,6 +130,7 @@ static void checks_show_their_rows(void **state) {
     expect_words(f, 1, "check %s --param glass.eta.value", "the term 'specular' does not know");
     expect(f, 0, "check %s --param red.reflectance.value --spp 16");
     assert_null(strstr(f->words, "worst z"));
+    expect_words(f, 2, "render %s -o=a.exr", "-o=a.exr: a name follows without '='");
 }
 
 int main(void) {
