@@ -343,23 +343,14 @@ static void border_choose(Tracer *t, int32_t count) {
 }
 
 static void border_start(Tracer *t, int32_t count) {
-    Workspace *ws = &t->ws;
-    Paths *p = &ws->paths[0];
+    const Workspace *ws = &t->ws;
     int32_t n = 0;
     for (int32_t k = 0; k < count; k += LANES) {
         Int slot = i_select(m_first_n(count - k), i_iota() + k, i_set(0));
         Mask m = m_first_n(count - k) & mi_lt(i_set(-1), i_gather(ws->border, slot));
         Vec3 o = LOAD_V3(*ws, border_x, border_y, border_z, slot), d = LOAD_V3(*ws, border_dx, border_dy, border_dz, slot);
         Int medium = i_gather(ws->border_medium, slot);
-        v3_compress(p->ox + n, p->oy + n, p->oz + n, o, m);
-        v3_compress(p->px + n, p->py + n, p->pz + n, o, m);
-        v3_compress(p->dx + n, p->dy + n, p->dz + n, d, m);
-        v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, o, m);
-        i_compress(ws->hit_group + n, medium + ((int32_t)t->scene->groups_count + 1), m);
-        i_compress(p->medium + n, medium, m);
-        i_compress(p->depth + n, i_gather(ws->border_depth, slot), m);
-        i_compress(p->slot + n, slot, m);
-        n += m_count(m);
+        n += probe_push(t, n, o, d, medium, i_gather(ws->border_depth, slot), slot, m);
     }
     probes_begin(t, n);
 }

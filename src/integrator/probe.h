@@ -101,10 +101,24 @@ static void probes_begin(Tracer *t, int32_t n) {
     t->current = 0;
 }
 
-// Starts a path at the point of each chosen flight whose medium is asked for, as if it had collided there.
-static void probe_start(Tracer *t, int32_t count) {
+// Path n... of the lanes of m, as if it had come along d and collided at o; returns how many there are.
+KFN int32_t probe_push(Tracer *t, int32_t n, Vec3 o, Vec3 d, Int medium, Int depth, Int slot, Mask m) {
     Workspace *ws = &t->ws;
     Paths *p = &ws->paths[0];
+    v3_compress(p->ox + n, p->oy + n, p->oz + n, o, m);
+    v3_compress(p->px + n, p->py + n, p->pz + n, o, m);
+    v3_compress(p->dx + n, p->dy + n, p->dz + n, d, m);
+    v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, o, m);
+    i_compress(ws->hit_group + n, medium + ((int32_t)t->scene->groups_count + 1), m);
+    i_compress(p->medium + n, medium, m);
+    i_compress(p->depth + n, depth, m);
+    i_compress(p->slot + n, slot, m);
+    return m_count(m);
+}
+
+// Starts a path at the point of each chosen flight whose medium is asked for, as if it had collided there.
+static void probe_start(Tracer *t, int32_t count) {
+    const Workspace *ws = &t->ws;
     const Records *r = &ws->records;
     int32_t n = 0;
     for (int32_t k = 0; k < count; k += LANES) {
@@ -116,15 +130,7 @@ static void probe_start(Tracer *t, int32_t count) {
         record = i_max(record, i_set(0));
         Vec3 d = LOAD_V3(*r, dx, dy, dz, record);
         Vec3 o = v3_madd(LOAD_V3(*r, px, py, pz, record), real_gather(ws->probe_at, slot), d);
-        v3_compress(p->ox + n, p->oy + n, p->oz + n, o, m);
-        v3_compress(p->px + n, p->py + n, p->pz + n, o, m);
-        v3_compress(p->dx + n, p->dy + n, p->dz + n, d, m);
-        v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, o, m);
-        i_compress(ws->hit_group + n, medium + ((int32_t)t->scene->groups_count + 1), m);
-        i_compress(p->medium + n, medium, m);
-        i_compress(p->depth + n, i_gather(r->depth, record), m);
-        i_compress(p->slot + n, slot, m);
-        n += m_count(m);
+        n += probe_push(t, n, o, d, medium, i_gather(r->depth, record), slot, m);
     }
     probes_begin(t, n);
 }

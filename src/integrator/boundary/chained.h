@@ -65,7 +65,7 @@ static void chained_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t
         if (!turn.indirect) {
             return;
         }
-        segment_numbers(t, i, first);
+        batch_numbers(t, i, first);
         Segment s;
         segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
         s.m = s.m & mi_lt(s.source, i_set(0));
@@ -81,11 +81,7 @@ static void chained_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t
 
 // Starts the paths on both sides of the edges, in slots k and half + k.
 static void chained_start(Tracer *t, const Segments *q, int32_t half) {
-    for (int32_t k = 0; k < half; k++) {
-        int32_t at = k < q->count ? k : q->count - 1;
-        t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
-        t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
-    }
+    segment_pairs(t, q, half);
     for (int32_t k = 0; k < half; k += LANES) {
         Int at = i_min(i_iota() + k, i_set(q->count - 1));
         Vec3 p = LOAD_V3(*q, edge_x, edge_y, edge_z, at), d = LOAD_V3(*q, dx, dy, dz, at);

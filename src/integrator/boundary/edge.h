@@ -26,6 +26,19 @@ typedef struct EdgePoint {
     Vec3 across[2];
 } EdgePoint;
 
+// Which sample of its random numbers a slot stands for.
+KFN void slot_number(Tracer *t, int32_t k, int64_t number) {
+    t->ws.pixel[k] = (int32_t)(number / BOUNDARY_PER_SET);
+    t->ws.sample[k] = (int32_t)(number % BOUNDARY_PER_SET);
+}
+
+// The slots i... of a batch stand for the samples first + i...
+KFN void batch_numbers(Tracer *t, int32_t i, int64_t first) {
+    for (int32_t k = i; k < i + LANES; k++) {
+        slot_number(t, k, first + k);
+    }
+}
+
 // Radians.
 #define OUTLINE_TURN 1e-3f
 

@@ -16,8 +16,7 @@ typedef struct Indirect {
 
 static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
     for (int32_t k = 0; k < q->count; k++) {
-        t->ws.pixel[k] = (int32_t)((first + q->number[k]) / BOUNDARY_PER_SET);
-        t->ws.sample[k] = (int32_t)((first + q->number[k]) % BOUNDARY_PER_SET);
+        slot_number(t, k, first + q->number[k]);
     }
 }
 

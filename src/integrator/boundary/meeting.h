@@ -68,7 +68,7 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
 static void meetings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        segment_numbers(t, i, first);
+        batch_numbers(t, i, first);
         meeting_segment(t, b, m_first_n(count - i), i_iota() + i, q);
     }
 }
@@ -77,8 +77,7 @@ static void meetings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
 static void meetings_start(Tracer *t, const Segments *q) {
     for (int32_t k = 0; k < q->count; k += LANES) {
         Int at = i_min(i_iota() + k, i_set(q->count - 1));
-        Hit hit = {i_gather(q->edge_shape, at), i_gather(q->edge_prim, at), real_gather(q->edge_u, at),
-                   real_gather(q->edge_v, at), LOAD_V3(*q, edge_x, edge_y, edge_z, at), i_gather(q->edge_instance, at)};
+        Hit hit = segment_edge(q, at);
         Vec3 d = LOAD_V3(*q, dx, dy, dz, at);
         Ray ray = {v3_sub(hit.p, d), d, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
         path_begin(t, k, i_iota() + k, &ray, f_set(1));

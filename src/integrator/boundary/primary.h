@@ -72,10 +72,7 @@ static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinh
     for (int32_t i = 0; i < count; i += LANES) {
         Mask m = m_first_n(count - i);
         Int slot = i_iota() + i;
-        for (int32_t k = i; k < i + LANES; k++) {
-            t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
-            t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
-        }
+        batch_numbers(t, i, first);
         PrimarySample s;
         primary_sample(t, b, pinhole, slot, m, &s);
         Mask visible = m_any(s.m) ? primary_visible(t, &s, s.m) : s.m;
@@ -90,8 +87,8 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
                           int32_t count, int32_t half) {
     for (int32_t k = 0; k < half; k++) {
         int64_t number = first + kept[k < count ? k : 0];
-        t->ws.pixel[k] = t->ws.pixel[half + k] = (int32_t)(number / BOUNDARY_PER_SET);
-        t->ws.sample[k] = t->ws.sample[half + k] = (int32_t)(number % BOUNDARY_PER_SET);
+        slot_number(t, k, number);
+        slot_number(t, half + k, number);
     }
     for (int32_t k = 0; k < half; k += LANES) {
         Int slot = i_iota() + k;

@@ -109,13 +109,6 @@ static SegmentTurn segment_turn(const SceneView *scene, int64_t number) {
     return r;
 }
 
-static void segment_numbers(Tracer *t, int32_t i, int64_t first) {
-    for (int32_t k = i; k < i + LANES; k++) {
-        t->ws.pixel[k] = (int32_t)((first + k) / BOUNDARY_PER_SET);
-        t->ws.sample[k] = (int32_t)((first + k) % BOUNDARY_PER_SET);
-    }
-}
-
 KFN Vec3 segment_far_eye(const SceneView *scene, Vec3 reference, Vec3 d) {
     return v3_madd(reference, f_set(1e4f * (real)scene->bounds_radius), d);
 }
@@ -248,6 +241,21 @@ KFN Vec3 segment_offset(const Segment *s) {
     return v3_madd(p, step, s->n);
 }
 
+// The edge's point of the segments at.
+KFN Hit segment_edge(const Segments *q, Int at) {
+    return (Hit){i_gather(q->edge_shape, at), i_gather(q->edge_prim, at), real_gather(q->edge_u, at), real_gather(q->edge_v, at),
+                 LOAD_V3(*q, edge_x, edge_y, edge_z, at), i_gather(q->edge_instance, at)};
+}
+
+// Two paths for every segment, in slots k and half + k, share its numbers.
+static void segment_pairs(Tracer *t, const Segments *q, int32_t half) {
+    for (int32_t k = 0; k < half; k++) {
+        int32_t at = k < q->count ? k : q->count - 1;
+        t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
+        t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
+    }
+}
+
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
     Vec3 o = segment_offset(s);
@@ -298,7 +306,7 @@ static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         if (!turn.lit && !turn.indirect) {
             return;
         }
-        segment_numbers(t, i, first);
+        batch_numbers(t, i, first);
         Segment s;
         segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
         if (m_any(s.m) && t->scene->has_media) {

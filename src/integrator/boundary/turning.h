@@ -117,7 +117,7 @@ static void turning_trace(Tracer *t, const Turning *s, bool horizon, Int number,
 static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        segment_numbers(t, i, first);
+        batch_numbers(t, i, first);
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {
@@ -128,15 +128,10 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
 
 // Terminators: starts the paths that look at x from both sides of its shading normal's plane, in slots k and half + k.
 static void turning_start(Tracer *t, const Segments *q, int32_t half) {
-    for (int32_t k = 0; k < half; k++) {
-        int32_t at = k < q->count ? k : q->count - 1;
-        t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
-        t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
-    }
+    segment_pairs(t, q, half);
     for (int32_t k = 0; k < half; k += LANES) {
         Int at = i_min(i_iota() + k, i_set(q->count - 1));
-        Hit hit = {i_gather(q->edge_shape, at), i_gather(q->edge_prim, at), real_gather(q->edge_u, at),
-                   real_gather(q->edge_v, at), LOAD_V3(*q, edge_x, edge_y, edge_z, at), i_gather(q->edge_instance, at)};
+        Hit hit = segment_edge(q, at);
         Vec3 d = LOAD_V3(*q, dx, dy, dz, at), n = v3_normalize(LOAD_V3(*q, nx, ny, nz, at));
         for (int side = 0; side < 2; side++) {
             Vec3 to = v3_normalize(v3_madd(d, f_set(side ? TURNING_STEP : -TURNING_STEP), n)); // first from where n points to
