@@ -83,13 +83,9 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
 
 // Chains may see all curves along which surfaces, and borders of light, pass through each other, also those that stand still.
 static rey_result check_meetings(rey_scene *scene) {
-    Array meetings = {0}, borders = {0};
-    rey_result result = rey_light_borders(scene, &borders);
-    if (result == REY_OK) {
-        result = rey_meetings_find(scene, borders.data, (int32_t)borders.count, moves_always, NULL, &meetings);
-    }
+    Array meetings = {0};
+    rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
     bool any = meetings.count > 0;
-    rey_array_free(scene->ctx, &borders);
     rey_array_free(scene->ctx, &meetings);
     return result == REY_OK && any
                ? refuse(scene, REY_TERM_SPECULAR, "the curves along which surfaces pass through each other, and the scene has one of them")

@@ -424,14 +424,8 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
 }
 
 static rey_result find_meetings(Render *r) {
-    Array borders = {0};
-    rey_result result = rey_light_borders(r->scene, &borders);
-    if (result == REY_OK) {
-        result = rey_meetings_find(r->scene, borders.data, (int32_t)borders.count, moves_on_film, r, &r->meetings);
-    }
-    rey_array_free(r->scene->ctx, &borders);
     r->meetings_found = true;
-    return result;
+    return rey_meetings_with_borders(r->scene, moves_on_film, r, &r->meetings);
 }
 
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.

@@ -3,7 +3,6 @@
 
 #include "emitter/emitter.h"
 #include "scene/texels.h"
-#include "shape/meetings.h"
 
 static bool ends_lit(const SceneView *view, const TextureNode *t) {
     bool lit = t->kind != TEXTURE_BITMAP || t->to_uv >= 0;
@@ -30,7 +29,7 @@ static void corner(const SceneView *view, const EmitterRecord *e, int which, flo
     }
 }
 
-rey_result rey_light_borders(rey_scene *scene, Array *borders) {
+static rey_result find_borders(rey_scene *scene, Array *borders) {
     const SceneView *view = &scene->view;
     for (int64_t i = 0; i < view->emitters_count; i++) {
         const EmitterRecord *e = view->emitters + i;
@@ -51,6 +50,16 @@ rey_result rey_light_borders(rey_scene *scene, Array *borders) {
         }
     }
     return REY_OK;
+}
+
+rey_result rey_meetings_with_borders(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings) {
+    Array borders = {0};
+    rey_result result = find_borders(scene, &borders);
+    if (result == REY_OK) {
+        result = rey_meetings_find(scene, borders.data, (int32_t)borders.count, moves, user, meetings);
+    }
+    rey_array_free(scene->ctx, &borders);
+    return result;
 }
 
 bool rey_light_is_abrupt(const SceneView *view, const EmitterRecord *e) {
