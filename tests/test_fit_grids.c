@@ -1,10 +1,7 @@
 // test_fit_grids.c: grids of voxels as unknowns: regularisers, resampling, and a small fit from coarse to fine with a view held
 // out, resumed with the same bits.
-#include "fit/fit.h"
-#include "io/file.h"
-#include "io/image.h"
+#include "fit_folder.h"
 #include "io/vol.h"
-#include "folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,11 +15,6 @@
 #include <unistd.h>
 
 enum { SIZE = 8, COARSE = 4, FINE = 6, VIEWS = 3 };
-
-typedef struct Fixture {
-    rey_context *ctx;
-    char folder[64];
-} Fixture;
 
 static const char *const HEAD =
     "<scene version=\"3.0.0\"><default name=\"file\" value=\"start.vol\"/><integrator type=\"volpath\"><integer name=\"max_depth\" "
@@ -43,16 +35,6 @@ static const char *const JOB =
     "parameters:\n  - {name: air.interior_medium.sigma_t.data, parameterisation: softplus, regularisers: {total_variation: 1e-5, "
     "sparsity: 1e-5}}\n"
     "image_every: 0\nreport_spp: 64\ntruth: {scene: truth.xml}\n";
-
-static void path_of(const Fixture *f, const char *name, char path[128]) {
-    snprintf(path, 128, "%s/%s", f->folder, name);
-}
-
-static int write_text(const Fixture *f, const char *name, const char *text) {
-    char path[128];
-    path_of(f, name, path);
-    return rey_file_write(f->ctx, path, text, strlen(text));
-}
 
 // A ball of fog beside the middle, or fog everywhere.
 static int write_fog(const Fixture *f, const char *name, int n, bool ball) {
@@ -80,45 +62,11 @@ static int write_scene(const Fixture *f, const char *name, const char *file) {
     return write_text(f, name, text);
 }
 
-static int write_targets(const Fixture *f) {
-    char path[128], name[32];
-    rey_scene *scene = NULL;
-    path_of(f, "truth.xml", path);
-    int wrong = rey_scene_load(f->ctx, path, NULL, 0, &scene);
-    for (int v = 0; v < VIEWS && !wrong; v++) {
-        float image[SIZE * SIZE * 3];
-        rey_render_def render = rey_default_render_def();
-        render.spp = 1024;
-        render.seed = 77;
-        render.sensor = v;
-        snprintf(name, sizeof name, "target_%d.exr", v);
-        path_of(f, name, path);
-        wrong = rey_render(scene, &render, image, NULL) || rey_exr_write(f->ctx, path, image, SIZE, SIZE, 3, NULL);
-    }
-    rey_scene_destroy(scene);
-    return wrong;
-}
-
 static int set_up(void **state) {
-    Fixture *f = calloc(1, sizeof *f);
-    rey_context_def def = rey_default_context_def();
-    def.threads = 2;
-    if (!f || rey_context_create(&def, &f->ctx)) {
-        return 1;
-    }
-    snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_grids_XXXXXX");
-    *state = f;
-    return !mkdtemp(f->folder) || write_fog(f, "start.vol", COARSE + 1, false) || write_fog(f, "truth.vol", FINE, true) ||
+    Fixture *f = *state = fixture_make();
+    return !f || write_fog(f, "start.vol", COARSE + 1, false) || write_fog(f, "truth.vol", FINE, true) ||
            write_scene(f, "scene.xml", "start.vol") || write_scene(f, "truth.xml", "truth.vol") || write_text(f, "job.yaml", JOB) ||
-           write_targets(f);
-}
-
-static int tear_down(void **state) {
-    Fixture *f = *state;
-    int status = folder_remove(f->folder);
-    rey_context_destroy(f->ctx);
-    free(f);
-    return status;
+           write_targets_of_truth(f, VIEWS, SIZE, 1024);
 }
 
 /* ---- parts --------------------------------------------------------------------------------------------- */

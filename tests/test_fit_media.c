@@ -1,8 +1,5 @@
 // test_fit_media.c: small fits of what media are made of: absorption and reduced scattering, and shares of phase functions.
-#include "fit/fit.h"
-#include "io/file.h"
-#include "io/image.h"
-#include "folder.h"
+#include "fit_folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,11 +12,6 @@
 #include <string.h>
 
 enum { SIZE = 8 };
-
-typedef struct Fixture {
-    rey_context *ctx;
-    char folder[64];
-} Fixture;
 
 static const char *const SCENE =
     "<scene version=\"3.0.0\"><default name=\"sigma_t\" value=\"0.9\"/><default name=\"albedo\" value=\"0.5\"/><default name=\"g\" "
@@ -50,49 +42,10 @@ static const char *const JOB =
     "  - {name: box.interior_medium.phase_function.weights, parameterisation: simplex}\n"
     "image_every: 0\nreport_spp: 4\ntruth: {scene: truth.xml}\n";
 
-static int write_text(const Fixture *f, const char *name, const char *text) {
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", f->folder, name);
-    return rey_file_write(f->ctx, path, text, strlen(text));
-}
-
-static int write_targets(const Fixture *f) {
-    char path[128];
-    rey_scene *scene = NULL;
-    snprintf(path, sizeof path, "%s/truth.xml", f->folder);
-    int wrong = rey_scene_load(f->ctx, path, NULL, 0, &scene);
-    for (int v = 0; v < 2 && !wrong; v++) {
-        float image[SIZE * SIZE * 3];
-        rey_render_def render = rey_default_render_def();
-        render.spp = 4096;
-        render.seed = 77;
-        render.sensor = v;
-        snprintf(path, sizeof path, "%s/target_%d.exr", f->folder, v);
-        wrong = rey_render(scene, &render, image, NULL) || rey_exr_write(f->ctx, path, image, SIZE, SIZE, 3, NULL);
-    }
-    rey_scene_destroy(scene);
-    return wrong;
-}
-
 static int set_up(void **state) {
-    Fixture *f = calloc(1, sizeof *f);
-    rey_context_def def = rey_default_context_def();
-    def.threads = 2;
-    if (!f || rey_context_create(&def, &f->ctx)) {
-        return 1;
-    }
-    snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_media_XXXXXX");
-    *state = f;
-    return !mkdtemp(f->folder) || write_text(f, "scene.xml", SCENE) || write_text(f, "truth.xml", TRUTH) ||
-           write_text(f, "job.yaml", JOB) || write_targets(f);
-}
-
-static int tear_down(void **state) {
-    Fixture *f = *state;
-    int status = folder_remove(f->folder);
-    rey_context_destroy(f->ctx);
-    free(f);
-    return status;
+    Fixture *f = *state = fixture_make();
+    return !f || write_text(f, "scene.xml", SCENE) || write_text(f, "truth.xml", TRUTH) || write_text(f, "job.yaml", JOB) ||
+           write_targets_of_truth(f, 2, SIZE, 4096);
 }
 
 static rey_result run_fit(Fixture *f, const char *out, const char *extra, FitResult *result) {
