@@ -14,11 +14,15 @@ static void put_head(Fit *fit, const FitResult *out, Text *html) {
     rey_text_bytes(html, rey_report_style, strlen(rey_report_style));
     rey_text_add(html, "</style></head><body>\n<h1>Recovering ");
     rey_text_html(html, scene ? scene + 1 : fit->job.scene);
+    int fitted = 0;
+    for (int v = 0; v < fit->job.view_count; v++) {
+        fitted += !fit->job.views[v].held_out;
+    }
     rey_text_add(html,
                  " from images</h1>\n<p class=\"lead\">%lld unknown number%s in %d parameter%s, from %d view%s: "
                  "%d iteration%s of %s on the %s loss in %.1f seconds%s. Job ",
-                 (long long)out->numbers, PLURAL(out->numbers), (int)out->rows.count, PLURAL(out->rows.count), fit->job.view_count,
-                 PLURAL(fit->job.view_count), out->iterations, PLURAL(out->iterations),
+                 (long long)out->numbers, PLURAL(out->numbers), (int)out->rows.count, PLURAL(out->rows.count), fitted,
+                 PLURAL(fitted), out->iterations, PLURAL(out->iterations),
                  optimizers[fit->job.optimizer.kind],
                  fit->job.loss == LOSS_L1            ? "L1"
                  : fit->job.loss == LOSS_L2          ? "L2"
