@@ -3,6 +3,7 @@
 #include "io/image.h"
 
 #include <openexr.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { EXR_MOST_CHANNELS = 64 };
@@ -14,7 +15,7 @@ typedef struct Stream {
     const unsigned char *in; // reading
     size_t size;
     Array out;               // writing
-    bool reported;
+    char message[256];       // of the library, "" = none yet
 } Stream;
 
 // The core prints to stderr unless it is given a handler. The first message is the one that explains the others.
@@ -23,9 +24,11 @@ static void on_error(exr_const_context_t file, exr_result_t code, const char *me
     UNUSED(code);
     if (file && exr_get_user_data(file, &user) == EXR_ERR_SUCCESS && user) {
         Stream *s = user;
-        if (!s->reported) {
-            rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: %s", s->name, message);
-            s->reported = true;
+        if (!s->message[0]) {
+            snprintf(s->message, sizeof s->message, "%s", message);
+            for (char *c = s->message; *c; c++) { // names of a broken file
+                *c = *c < ' ' || *c > '~' ? '?' : *c;
+            }
         }
     }
 }
@@ -61,11 +64,17 @@ static int64_t on_write(exr_const_context_t file, void *user, const void *buffer
 }
 
 static rey_result failed(Stream *s, exr_result_t code) {
-    if (s->reported) {
-        return REY_ERROR_FORMAT;
+    const char *message = s->message[0] ? s->message : exr_get_default_error_message(code);
+    if (code == EXR_ERR_OUT_OF_MEMORY) {
+        return rey_fail(s->ctx, REY_ERROR_MEMORY, "%s: not enough memory for the picture", s->name);
     }
-    return rey_fail(s->ctx, code == EXR_ERR_OUT_OF_MEMORY ? REY_ERROR_MEMORY : REY_ERROR_FORMAT, "%s: %s", s->name,
-                    exr_get_default_error_message(code));
+    if (code == EXR_ERR_FEATURE_NOT_IMPLEMENTED) {
+        return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED, "%s: %s; expected channels of full resolution that are compressed "
+                       "by none, RLE, ZIP, PIZ, PXR24 or B44", s->name, message);
+    }
+    return s->in ? rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: broken, or cut off after %zu bytes: %s; expected a whole OpenEXR file",
+                            s->name, s->size, message)
+                 : rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: %s", s->name, message);
 }
 
 // Which channels of the file become the picture's: R G B, or X Y Z, or Y, or (layer.)R G B, or all.
