@@ -342,6 +342,23 @@ static void test_truth_loses_nothing(void **state) {
     assert_non_null(ARRAY_AT(result.rows, FitRow, 0).truth);
     rey_fit_result_free(&result);
 
+    const char *own[] = {f->target_set, "truth.scene=" TEST_DATA_DIR "/jobs/start.xml", "truth.defines.light=7", "iterations=1",
+                         "report_spp=0"};
+    def.overrides = own; // defines of its own
+    snprintf(folder, sizeof folder, "%s/v", f->folder);
+    if (rey_fit(f->ctx, &def, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    assert_float_equal((double)ARRAY_AT(result.rows, FitRow, 1).truth[0], 7, 1e-6);
+    rey_fit_result_free(&result);
+
+    own[2] = "truth.defines.lihgt=7";
+    snprintf(folder, sizeof folder, "%s/w", f->folder);
+    assert_int_equal(rey_fit(f->ctx, &def, &result), REY_ERROR_ARGUMENT);
+    assert_non_null(strstr(rey_error(f->ctx), "--set truth.defines.lihgt=7: "));
+    rey_fit_result_free(&result);
+
+    def.overrides = sets;
     sets[4] = "truth.scene=nowhere.xml";
     snprintf(folder, sizeof folder, "%s/u", f->folder);
     assert_int_equal(rey_fit(f->ctx, &def, &result), REY_ERROR_IO);
@@ -427,6 +444,8 @@ static void test_fit_errors(void **state) {
         {"parameters.3.name=red.*", "entry 0 of 'parameters' names it already"},
         {"parameters.3.name=nothing*", "matches no differentiable parameter"},
         {"parameters.0.start=[1, 2]", "start holds 2 numbers"},
+        {"parameters.1.start=0", "entry 0 starts at 0, expected a number above 0: 'parameterisation: log'"},
+        {"parameters.0.start=1", "entry 0 starts at 1, expected a number between 0 and 1: 'parameterisation: logit'"},
         {"parameters.2.start=1.5", "entry 0 starts at 1.5, outside of its bounds"},
         {"parameters.0.bounds=[0, 0.01]", "outside of its bounds 0 to 0.01"},
         {"views.0.weight=0", "weight = 0, expected 1e-09 to"},

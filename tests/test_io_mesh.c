@@ -179,7 +179,7 @@ static void test_serialized_versions_agree(void **state) {
         assert_floats(triangle.positions, positions, 9);
         rey_mesh_free(ctx, &triangle);
         assert_int_equal(rey_mesh_read_serialized(ctx, paths[i], 2, &triangle), REY_ERROR_FORMAT);
-        assert_int_equal(rey_mesh_read_serialized(ctx, paths[i], -1, &triangle), REY_ERROR_ARGUMENT);
+        assert_int_equal(rey_mesh_read_serialized(ctx, paths[i], -1, &triangle), REY_ERROR_SCENE);
     }
     assert_same_mesh(&squares[0], &squares[1]);
     assert_floats(squares[0].positions, positions, 12);

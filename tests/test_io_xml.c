@@ -201,7 +201,7 @@ static void test_substitution(void **state) {
     assert_string_equal(rey_xml_find(film, "s")->string, "1-2 $5 a\\b$raw");
     rey_xml_free(ctx, document);
     const rey_define unused[] = {{"given", "1"}, {"nnn", "1"}};
-    assert_int_equal(rey_xml_read_memory(ctx, "t.xml", text, strlen(text), unused, 2, &document), REY_ERROR_SCENE);
+    assert_int_equal(rey_xml_read_memory(ctx, "t.xml", text, strlen(text), unused, 2, &document), REY_ERROR_ARGUMENT);
     assert_string_equal(rey_error(ctx), "t.xml:1:1: the parameter 'nnn' was given but the scene never uses '$nnn', "
                                         "did you mean 'nn'?");
     assert_null(document);

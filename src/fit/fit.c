@@ -223,7 +223,6 @@ rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out) {
     locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0); // files hold decimal points, whatever the host has set
     locale_t host = plain ? uselocale(plain) : (locale_t)0;
     rey_result result = open_fit(&fit);
-    out->bad_override = result == REY_ERROR_ARGUMENT;
     if (!result) {
         result = rey_fit_optimise(&fit);
     }
@@ -233,6 +232,7 @@ rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out) {
             rey_fail(ctx, result, "stopped before the report was written; --resume writes it");
         }
     }
+    out->bad_override = result == REY_ERROR_ARGUMENT;
     close_fit(&fit);
     if (plain) {
         uselocale(host);

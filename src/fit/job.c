@@ -18,21 +18,23 @@ static bool is_name(const char *text) {
 }
 
 static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
-    rey_define **defines = target;
+    JobDefines *defines = target;
     if (node->kind != YAML_MAP) {
         return node->child || (node->text && node->text[0])
                    ? rey_job_fail(job, node, "defines: expected 'name: value' lines")
                    : REY_OK;
     }
-    job->define_count = rey_yaml_count(node);
-    *defines = rey_job_alloc(job, (size_t)job->define_count, sizeof **defines);
-    rey_result result = *defines ? REY_OK : REY_ERROR_MEMORY;
-    int i = 0;
+    int count = rey_yaml_count(node), i = 0;
+    defines->list = rey_job_alloc(job, (size_t)count, sizeof *defines->list);
+    defines->at = rey_job_alloc(job, (size_t)count, sizeof *defines->at);
+    rey_result result = defines->list && defines->at ? REY_OK : REY_ERROR_MEMORY;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        (*defines)[i].name = entry->key;
-        result = is_name(entry->key) ? rey_job_read_text(job, entry, &(*defines)[i].value)
+        defines->list[i].name = entry->key;
+        defines->at[i] = rey_job_place(entry);
+        result = is_name(entry->key) ? rey_job_read_text(job, entry, &defines->list[i].value)
                                      : rey_job_fail(job, entry, "defines: '%s' is not a name", entry->key);
     }
+    defines->count = i;
     return result;
 }
 
@@ -204,6 +206,7 @@ static rey_result read_terms(Job *job, const YamlNode *node, void *target) {
 static rey_result read_truth(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "scene", .type = FIELD_TEXT, .offset = offsetof(Job, truth_scene), .required = true},
+        {.key = "defines", .type = FIELD_READER, .offset = offsetof(Job, truth_defines), .read = read_defines},
         {0},
     };
     UNUSED(target);

@@ -87,6 +87,12 @@ typedef struct JobOptimizer {
     JobSchedule schedule;
 } JobOptimizer;
 
+typedef struct JobDefines { // values of $names in a scene file
+    rey_define *list;
+    JobPlace *at;
+    int count;
+} JobDefines;
+
 typedef struct Job {
     rey_context *ctx;
     const char *path;   // of the job file
@@ -94,8 +100,7 @@ typedef struct Job {
     const char *scene, *truth_scene, *output;
     const char *load; // scene file whose values the scene gets, or null
     JobPlace scene_at, truth_at, load_at;
-    rey_define *defines;
-    int define_count;
+    JobDefines defines, truth_defines; // the truth gets those of the job where it has none of its own
     uint32_t seed;
     int iterations, views_per_iteration; // 0 = all views
     int checkpoint_every, image_every;   // 0 = never
@@ -134,6 +139,9 @@ rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const c
 
 // Puts the place that named a file before why it could not be read; passes every result on.
 rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result);
+
+// The same for a scene that these defines were given to: one that it never uses is told at its own place.
+rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *defines, rey_result result);
 
 // Path of a file that the job names; owned by the job, null (and a recorded message) when memory runs out.
 const char *rey_job_path(Job *job, const char *name);

@@ -132,6 +132,14 @@ static void flat_terms(Text *t, int terms) {
     line_text(t, "terms", names);
 }
 
+static void flat_defines(Text *t, const char *prefix, const JobDefines *defines) {
+    char key[512];
+    for (int i = 0; i < defines->count; i++) {
+        snprintf(key, sizeof key, "%s.%s", prefix, defines->list[i].name);
+        line_text(t, key, defines->list[i].value);
+    }
+}
+
 // What decides the numbers that the optimisation goes through.
 static void flat_decisive(Text *t, const Job *job) {
     char key[512];
@@ -139,10 +147,7 @@ static void flat_decisive(Text *t, const Job *job) {
     if (job->load) {
         line_text(t, "load", job->load);
     }
-    for (int i = 0; i < job->define_count; i++) {
-        snprintf(key, sizeof key, "defines.%s", job->defines[i].name);
-        line_text(t, key, job->defines[i].value);
-    }
+    flat_defines(t, "defines", &job->defines);
     line_integer(t, "seed", job->seed);
     for (int i = 0; i < job->spp_count; i++) {
         snprintf(key, sizeof key, "spp.%d.from", i);
@@ -237,6 +242,7 @@ rey_result rey_job_yaml(const Job *job, char **out) {
     line_integer(&flat, "report_spp", job->report_spp);
     if (job->truth_scene) {
         line_text(&flat, "truth.scene", job->truth_scene);
+        flat_defines(&flat, "truth.defines", &job->truth_defines);
     }
     flat_decisive(&flat, job);
     char *lines;

@@ -41,6 +41,17 @@ rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result) {
     return result == REY_ERROR_IO ? rey_job_fail_at(job, at, result, "%s", rey_error(job->ctx)) : result;
 }
 
+rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *defines, rey_result result) {
+    char quoted[128];
+    for (int i = 0; i < defines->count && result == REY_ERROR_ARGUMENT; i++) {
+        snprintf(quoted, sizeof quoted, "the parameter '%.100s'", defines->list[i].name);
+        if (strstr(rey_error(job->ctx), quoted)) {
+            return rey_job_fail_at(job, defines->at[i], REY_ERROR_SCENE, "%s", rey_error(job->ctx));
+        }
+    }
+    return rey_job_named_file(job, at, result);
+}
+
 const char *rey_job_path(Job *job, const char *name) {
     if (name[0] == '/' || !strcmp(job->folder, ".")) {
         return name;

@@ -26,8 +26,8 @@ rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out) {
     }
     const char *scene = rey_job_path(&fit->job, fit->job.scene);
     rey_result result =
-        scene ? rey_scene_load(ctx, scene, fit->job.defines, fit->job.define_count, out) : REY_ERROR_MEMORY;
-    result = rey_job_named_file(&fit->job, fit->job.scene_at, result);
+        scene ? rey_scene_load(ctx, scene, fit->job.defines.list, fit->job.defines.count, out) : REY_ERROR_MEMORY;
+    result = rey_job_named_scene(&fit->job, fit->job.scene_at, &fit->job.defines, result);
     if (!result && fit->job.load) {
         const char *values = rey_job_path(&fit->job, fit->job.load);
         result = values ? rey_scene_load_values(*out, values) : REY_ERROR_MEMORY;

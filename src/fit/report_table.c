@@ -72,23 +72,50 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
     rey_text_add(html, "</td></tr>\n");
 }
 
+// What the marks and numbers of the table mean, of those that it has.
+static void put_notes(const FitResult *out, Text *html) {
+    bool entries = false, weighted = false, poses = false, judged_poses = false, meshes = false, dashed = false;
+    for (size_t i = 0; i < out->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        bool pose = rey_fit_row_is_pose(row), mesh = row->points[COLUMN_FOUND] != 0;
+        poses |= pose;
+        judged_poses |= pose && row->truth;
+        meshes |= mesh && row->points[COLUMN_TRUTH];
+        weighted |= row->weighted && row->truth;
+        entries |= row->truth && !pose && !mesh && !row->weighted;
+        dashed |= out->iterations && row->truth && row->count <= HISTORY_LARGEST && !row->derived;
+    }
+    if (!entries && !weighted && !poses && !meshes) {
+        return;
+    }
+    rey_text_add(html, "<p class=\"note\">");
+    if (entries) {
+        rey_text_add(html, "Error: the largest relative error of an entry. ");
+    }
+    if (weighted) {
+        rey_text_add(html, "<sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the pictures "
+                           "depend on it at the truth. ");
+    }
+    if (poses) {
+        rey_text_add(html, "Poses: position, rotation as axis times angle, scale%s. ",
+                     judged_poses ? "; their error is that of an entry over the largest" : "");
+    }
+    if (meshes) {
+        rey_text_add(html, "<sup>c</sup>&thinsp;Meshes: the Chamfer distance from the truth (the mean of the mean distances "
+                           "from either surface to the other) over the diagonal of its bounding box. ");
+    }
+    rey_text_add(html, dashed ? "Dashed: the truth.</p>\n" : "</p>\n");
+}
+
 void rey_report_table(Fit *fit, const FitResult *out, Text *html) {
     int column = HISTORY_VALUES;
-    bool weighted = false;
     rey_text_add(html, "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>truth</th>"
                        "<th>start</th><th>found</th><th class=\"n\">error</th><th>history</th></tr></thead><tbody>\n");
     for (size_t i = 0; i < out->rows.count; i++) {
         const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
         put_row(fit, row, column, html);
         column += row->count <= HISTORY_LARGEST ? (int)row->count : 0;
-        weighted = weighted || (row->weighted && row->truth);
     }
-    rey_text_add(html, "</tbody></table></div>\n<p class=\"note\">Error: the largest relative error of an entry.");
-    if (weighted) {
-        rey_text_add(html, " <sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the "
-                           "pictures depend on it at the truth.");
-    }
-    rey_text_add(html, " Poses: position, rotation as axis times angle, scale; their error is that of an entry over the "
-                       "largest. <sup>c</sup>&thinsp;Meshes: the Chamfer distance from the truth (the mean of the mean "
-                       "distances from either surface to the other) over the diagonal of its bounding box. Dashed: the truth.</p>\n");
+    rey_text_add(html, "</tbody></table></div>\n");
+    put_notes(out, html);
 }

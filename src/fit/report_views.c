@@ -89,6 +89,7 @@ static rey_result strip(Fit *fit, int index, float exposure, const float *start,
     const FitView *view = &fit->views[index];
     rey_text_add(html, "<div class=\"strip\">");
     rey_result result = strip_end(view, start, exposure, "start", html);
+    bool any = false;
     for (int i = 1; i < fit->state.iteration && !result; i++) {
         unsigned char *png = NULL;
         size_t size = 0;
@@ -99,14 +100,16 @@ static rey_result strip(Fit *fit, int index, float exposure, const float *start,
             char caption[32];
             snprintf(caption, sizeof caption, "%d", i);
             strip_figure(html, 160, 160 * view->height / view->width, png, size, caption);
+            any = true;
         }
         rey_free(fit->ctx, png);
     }
     if (!result) {
         result = strip_end(view, found, exposure, "result", html);
     }
-    rey_text_add(html, "</div>\n<p class=\"note\">The way: pictures after so many iterations, with the few samples of an "
-                       "iteration.</p>\n");
+    rey_text_add(html, any ? "</div>\n<p class=\"note\">The way: pictures after so many iterations, with the few samples of an "
+                             "iteration.</p>\n"
+                           : "</div>\n");
     return result;
 }
 

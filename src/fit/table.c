@@ -286,12 +286,14 @@ static rey_result check_films(Fit *fit, const rey_scene *truth) {
     return REY_OK;
 }
 
-// The job's defines are those of its scene: the truth need not use them.
+// The job's defines are those of its scene: the truth need not use them. Its own it must.
 static rey_result load_truth(Fit *fit, rey_scene **out) {
     const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
-    rey_result result = path ? rey_mitsuba_load(fit->ctx, path, fit->job.defines, fit->job.define_count, LOAD_SPARE, out)
+    bool own = fit->job.truth_defines.count > 0;
+    const JobDefines *defines = own ? &fit->job.truth_defines : &fit->job.defines;
+    rey_result result = path ? rey_mitsuba_load(fit->ctx, path, defines->list, defines->count, own ? 0 : LOAD_SPARE, out)
                              : REY_ERROR_MEMORY;
-    return result ? rey_job_named_file(&fit->job, fit->job.truth_at, result) : rey_scene_update(*out);
+    return result ? rey_job_named_scene(&fit->job, fit->job.truth_at, defines, result) : rey_scene_update(*out);
 }
 
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {

@@ -11,28 +11,6 @@
 
 static const double LOG_FLOOR = 1e-6; // lower bound where a parameter has none and log needs one
 
-static bool glob_match(const char *pattern, const char *text) {
-    const char *star = NULL, *resume = NULL;
-    while (*text) {
-        if (*pattern == '*') {
-            star = pattern++;
-            resume = text;
-        } else if (*pattern == *text) {
-            pattern++;
-            text++;
-        } else if (star) {
-            pattern = star + 1;
-            text = ++resume;
-        } else {
-            return false;
-        }
-    }
-    while (*pattern == '*') {
-        pattern++;
-    }
-    return !*pattern;
-}
-
 static rey_result fail_at(Job *job, const JobParameter *p, const char *name, const char *why) {
     return rey_job_fail_at(job, p->at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
 }
@@ -122,16 +100,33 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     return REY_OK;
 }
 
+static rey_result fail_start(Job *job, const JobParameter *p, const Unknown *unknown, int64_t i, float start,
+                             const char *expected) {
+    JobPlace at = p->start_count || p->start_file ? p->start_at : p->at;
+    return rey_job_fail_at(job, at, REY_ERROR_PARAM, "parameter '%s': entry %lld starts at %g, %s", unknown->name,
+                           (long long)i, (double)start, expected);
+}
+
 // A start that would be moved before the first iteration is not what the job asked for.
-static rey_result check_start(Job *job, const JobParameter *p, const Unknown *unknown, const float *start) {
-    bool open_log = p->parameterisation == PARAMETERISATION_LOG && unknown->low <= LOG_FLOOR;
+// kept: it is where an earlier level ended, which may have rounded to a bound.
+static rey_result check_start(Job *job, const JobParameter *p, const Unknown *unknown, const float *start, bool kept) {
+    bool logarithm = !kept && p->parameterisation == PARAMETERISATION_LOG;
+    bool logit = !kept && p->parameterisation == PARAMETERISATION_LOGIT;
+    char expected[256];
     for (int64_t i = 0; i < unknown->count; i++) {
-        bool low = start[i] < (float)unknown->low && !(open_log && start[i] >= 0);
-        if (low || start[i] > (float)unknown->high) {
-            char why[160];
-            snprintf(why, sizeof why, "entry %lld starts at %g, outside of its bounds %g to %g", (long long)i,
-                     (double)start[i], unknown->low, unknown->high);
-            return fail_at(job, p, unknown->name, why);
+        float x = start[i], low = (float)unknown->low, high = (float)unknown->high;
+        if (logarithm && !(x > 0)) {
+            return fail_start(job, p, unknown, i, x, "expected a number above 0: 'parameterisation: log' never leaves or "
+                                                     "reaches 0; give a start, or 'parameterisation: softplus'");
+        }
+        if (x < low || x > high) {
+            snprintf(expected, sizeof expected, "outside of its bounds %g to %g", unknown->low, unknown->high);
+            return fail_start(job, p, unknown, i, x, expected);
+        }
+        if (logit && !(x > low && x < high)) {
+            snprintf(expected, sizeof expected, "expected a number between %g and %g: 'parameterisation: logit' never leaves or "
+                                                "reaches its bounds; give a start, or wider bounds", unknown->low, unknown->high);
+            return fail_start(job, p, unknown, i, x, expected);
         }
     }
     return REY_OK;
@@ -246,7 +241,7 @@ static rey_result match_exposures(Job *job, int index, Array *owners, Unknowns *
     for (int v = 0; v < job->view_count && !result; v++) {
         char name[40];
         snprintf(name, sizeof name, "views.%d.exposure", v);
-        if (strncmp(job->parameters[index].name, "views.", 6) || !glob_match(job->parameters[index].name, name) ||
+        if (strncmp(job->parameters[index].name, "views.", 6) || !rey_name_matches(job->parameters[index].name, name) ||
             job->views[v].held_out) {
             continue;
         }
@@ -334,7 +329,7 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
     for (int i = 0; i < rey_param_count(scene) && !result; i++) { // a glob passes over what cannot be differentiated
         rey_param_info info;
         result = rey_param_get_info(scene, i, &info);
-        if (!result && info.terms == REY_TERM_INTERIOR && glob_match(p->name, info.name)) {
+        if (!result && info.terms == REY_TERM_INTERIOR && rey_name_matches(p->name, info.name)) {
             result = add_unknown(job, scene, i, p, index, owners, u);
         }
     }
@@ -381,7 +376,7 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *
         const JobParameter *p = &job->parameters[ARRAY_AT(owners, int, i)];
         result = set_start(job, scene, keep ? NULL : p, unknown, u->start + unknown->offset);
         if (!result) {
-            result = check_start(job, p, unknown, u->start + unknown->offset);
+            result = check_start(job, p, unknown, u->start + unknown->offset, keep);
         }
     }
     rey_array_free(job->ctx, &owners);

@@ -20,7 +20,7 @@ void rey_mesh_free(rey_context *ctx, rey_mesh *mesh) {
 
 float *rey_mesh_add_attribute(rey_context *ctx, rey_mesh *mesh, const char *name, bool per_face, int channels) {
     if (strlen(name) >= sizeof mesh->attributes->name) {
-        rey_fail(ctx, REY_ERROR_ARGUMENT, "mesh attribute name '%s' is too long, expected at most %zu characters", name,
+        rey_fail(ctx, REY_ERROR_FORMAT, "mesh attribute name '%s' is too long, expected at most %zu characters", name,
                  sizeof mesh->attributes->name - 1);
         return NULL;
     }

@@ -312,7 +312,7 @@ rey_result rey_mesh_read_serialized_memory(rey_context *ctx, const char *name, c
                                            int shape_index, rey_mesh *out) {
     *out = (rey_mesh){0};
     if (shape_index < 0) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: shape index %d, expected 0 or more", name, shape_index);
+        return rey_fail(ctx, REY_ERROR_SCENE, "%s: shape index %d, expected 0 or more", name, shape_index);
     }
     SerializedReader *r = rey_alloc(ctx, sizeof *r);
     if (!r) {

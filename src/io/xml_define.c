@@ -131,9 +131,10 @@ rey_result rey_xml_check_defines(XmlReader *reader, rey_xml_position at) {
     for (size_t i = 0; i < reader->defines.count; i++) {
         XmlDefine *define = &ARRAY_AT(reader->defines, XmlDefine, i);
         if (define->from_caller && !define->used) {
-            return rey_xml_fail_word(reader->ctx, at, define->name, unclaimed_name, reader,
-                                     "the parameter '%.100s' was given but the scene never uses '$%.100s'",
-                                     define->name, define->name);
+            const char *nearest = rey_nearest_word(define->name, unclaimed_name, reader);
+            return rey_xml_fail(reader->ctx, at, REY_ERROR_ARGUMENT,
+                                "the parameter '%.100s' was given but the scene never uses '$%.100s'%s%.100s%s", define->name,
+                                define->name, nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
         }
     }
     return REY_OK;

@@ -21,3 +21,6 @@ int32_t rey_names_find(const Names *names, NamedItems items, const char *name);
 // Takes out an item that is still in the array.
 void rey_names_remove(Names *names, NamedItems items, int32_t item);
 void rey_names_free(rey_context *ctx, Names *names);
+
+// Whether a name fits a pattern, in which * stands for any text.
+bool rey_name_matches(const char *pattern, const char *name);
