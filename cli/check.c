@@ -26,6 +26,7 @@ typedef struct Work {
     float *image, *adjoint;
     float *original, *moved; // values of the direction's parameters
     uint32_t first_set;      // of the sample sets
+    Reasons reasons;         // of what was refused so far
     rey_stats stats;
 } Work;
 
@@ -270,8 +271,11 @@ static rey_result check_direction(Work *w, Check *check) {
 
 // Of --all: a parameter without a complete derivative is listed and not checked.
 static rey_result check_or_refuse(Work *w, Check *check) {
-    rey_result result = check_direction(w, check);
-    if (!w->session.options->all || (result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
+    const Options *o = w->session.options;
+    rey_result result = cli_direction_check_terms(w->session.ctx, w->session.scene, &check->direction, o->terms);
+    bool lacking = result != REY_OK;
+    result = lacking ? result : check_direction(w, check);
+    if (!o->all || (!lacking && result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
         return result;
     }
     check->verdict = VERDICT_REFUSED;
@@ -285,6 +289,7 @@ static void work_free(Work *w) {
     for (int i = 0; i < COUNT_OF(arrays); i++) {
         rey_free(ctx, arrays[i]);
     }
+    reasons_free(ctx, &w->reasons);
     rey_scene_destroy(w->displaced);
 }
 
@@ -321,14 +326,9 @@ static bool is_partial(const Work *w, const Check *check) {
     return o->all && o->terms && (cli_direction_terms(w->session.scene, &check->direction) & ~o->terms);
 }
 
-static int build_directions(Work *w, Check *checks, int count) {
-    for (int i = 0; i < count; i++) {
-        rey_param_info info;
-        if (w->session.options->all && !rey_param_get_info(w->session.scene, i, &info)) {
-            checks[i].spec = info.name;
-        } else {
-            checks[i].spec = w->session.options->params[i];
-        }
+static int build_directions(Work *w, const Specs *specs, Check *checks) {
+    for (int i = 0; i < specs->count; i++) {
+        checks[i].spec = specs->texts[i];
         int status = cli_session_direction(&w->session, &checks[i].spec, 1, &checks[i].direction);
         if (status) {
             return status;
@@ -357,8 +357,10 @@ static rey_result check_all(Work *w, Check *checks, int count) {
         result = check_or_refuse(w, &checks[i]);
         tests += checks[i].result.tests;
         if (!result && count > 1) {
+            int most = count * w->blocks.nx * w->blocks.ny * CHECK_SERIES;
             cli_progress_end(&s->progress);
-            check_print_ready(&checks[i], i == 0, check_z_threshold(tests), is_partial(w, &checks[i]));
+            result = check_print_ready(s->ctx, &checks[i], i == 0, check_z_threshold(tests), check_z_threshold(most),
+                                       is_partial(w, &checks[i]), &w->reasons);
         }
     }
     cli_progress_end(&s->progress);
@@ -376,33 +378,43 @@ static void judge(const Work *w, Check *checks, int count, double *threshold) {
     }
 }
 
+static int report_checks(const Options *options, Work *w, Check *checks, int count) {
+    double threshold;
+    bool wrong = false;
+    rey_result result = REY_OK;
+    judge(w, checks, count, &threshold);
+    if (options->json) {
+        check_print_json(&w->session, &w->stats, checks, count, threshold);
+    } else {
+        result = check_print_table(w->session.ctx, checks, count, threshold);
+    }
+    for (int i = 0; i < count; i++) {
+        wrong |= checks[i].verdict == VERDICT_WRONG;
+    }
+    int status = result ? cli_report_failure(options, w->session.ctx, result) : cli_finish_output();
+    return status ? status : wrong ? EXIT_FAILED : EXIT_OK;
+}
+
 static int run_checks(const Options *options, Work *w) {
-    int count = options->all ? rey_param_count(w->session.scene) : options->param_count;
-    Check *checks = rey_alloc_array(w->session.ctx, (size_t)count, sizeof *checks);
-    int status = checks ? build_directions(w, checks, count) : EXIT_OK;
-    rey_result result = !checks ? REY_ERROR_MEMORY : status ? REY_OK : check_all(w, checks, count);
+    Specs specs;
+    int status = cli_specs_open(&w->session, &specs);
+    if (status) {
+        return status;
+    }
+    Check *checks = rey_alloc_array(w->session.ctx, (size_t)specs.count, sizeof *checks);
+    status = checks ? build_directions(w, &specs, checks) : EXIT_OK;
+    rey_result result = !checks ? REY_ERROR_MEMORY : status ? REY_OK : check_all(w, checks, specs.count);
     if (result) {
         status = cli_report_failure(options, w->session.ctx, result);
     } else if (!status) {
-        double threshold;
-        bool wrong = false;
-        judge(w, checks, count, &threshold);
-        if (options->json) {
-            check_print_json(&w->session, &w->stats, checks, count, threshold);
-        } else {
-            check_print_table(checks, count, threshold);
-        }
-        for (int i = 0; i < count; i++) {
-            wrong |= checks[i].verdict == VERDICT_WRONG;
-        }
-        status = cli_finish_output();
-        status = status ? status : wrong ? EXIT_FAILED : EXIT_OK;
+        status = report_checks(options, w, checks, specs.count);
     }
-    for (int i = 0; i < count && checks; i++) {
+    for (int i = 0; i < specs.count && checks; i++) {
         cli_direction_free(w->session.ctx, &checks[i].direction);
         rey_free(w->session.ctx, checks[i].refusal);
     }
     rey_free(w->session.ctx, checks);
+    cli_specs_free(&w->session, &specs);
     return status;
 }
 

@@ -3,6 +3,7 @@
 
 #include "check_stats.h"
 #include "cli.h"
+#include "reasons.h"
 
 enum { CHECK_POINTS = 4, CHECK_HALVINGS = 6, CHECK_SHORTENINGS = 2 };
 
@@ -54,7 +55,9 @@ Step check_choose_step(const rey_scene *scene, const float *original, const Chec
 const char *check_verdict_name(Verdict verdict);
 // Sets the verdict, unless it is a refusal. threshold: of |z|; partial: terms are left out on request.
 void check_judge(Check *check, double threshold, bool partial);
-// A row on standard error as soon as it is known, judged by what is known so far.
-void check_print_ready(const Check *check, bool first, double threshold, bool partial);
-void check_print_table(const Check *checks, int count, double threshold);
+// A row on standard error as soon as it is known. The limit of |z| rises with the number of tests, from `threshold` now to
+// `loosest` at most: a verdict that may change with it is open. reasons: of what was refused so far.
+rey_result check_print_ready(rey_context *ctx, const Check *check, bool first, double threshold, double loosest,
+                             bool partial, Reasons *reasons);
+rey_result check_print_table(rey_context *ctx, const Check *checks, int count, double threshold);
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold);

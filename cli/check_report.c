@@ -16,33 +16,63 @@ static void print_titles(FILE *file) {
             "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
 }
 
-static void print_row(FILE *file, const Check *check) {
+static void print_row(FILE *file, const Check *check, const char *verdict) {
     const CheckResult *r = &check->result;
-    if (check->verdict == VERDICT_REFUSED) {
-        fprintf(file, "%-36s %s: %s\n", check->spec, check_verdict_name(check->verdict), check->refusal);
-        return;
-    }
     char block[32];
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
     fprintf(file, "%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative,
             r->difference, check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->fresh_z,
-            check->reverse_error, check_verdict_name(check->verdict));
+            check->reverse_error, verdict);
 }
 
-void check_print_ready(const Check *check, bool first, double threshold, bool partial) {
-    Check so_far = *check; // the verdict follows from all directions, and may change
-    check_judge(&so_far, threshold, partial);
+// "refused [2]"; *number is the reason's.
+static rey_result print_refusal(rey_context *ctx, FILE *file, const Check *check, Reasons *reasons, int *number) {
+    *number = reasons_add(ctx, reasons, check->refusal, check->spec);
+    fprintf(file, "%-36s %s [%d]\n", check->spec, check_verdict_name(check->verdict), *number);
+    return *number ? REY_OK : REY_ERROR_MEMORY;
+}
+
+rey_result check_print_ready(rey_context *ctx, const Check *check, bool first, double threshold, double loosest,
+                             bool partial, Reasons *reasons) {
+    Check tight = *check, loose = *check;
     if (first) {
         print_titles(stderr);
     }
-    print_row(stderr, &so_far);
+    if (check->verdict == VERDICT_REFUSED) {
+        int number;
+        rey_result result = print_refusal(ctx, stderr, check, reasons, &number);
+        if (!result && ARRAY_AT(reasons->items, Reason, number - 1).count == 1) {
+            reasons_print(stderr, reasons, number);
+        }
+        return result;
+    }
+    check_judge(&tight, threshold, partial);
+    check_judge(&loose, loosest, partial);
+    print_row(stderr, check, tight.verdict == loose.verdict ? check_verdict_name(tight.verdict) : "open: see the table");
+    return REY_OK;
 }
 
-void check_print_table(const Check *checks, int count, double threshold) {
+static rey_result print_rows(rey_context *ctx, const Check *checks, int count) {
+    Reasons reasons = {0};
+    rey_result result = REY_OK;
     print_titles(stdout);
-    for (int i = 0; i < count; i++) {
-        print_row(stdout, &checks[i]);
+    for (int i = 0; i < count && !result; i++) {
+        int number;
+        if (checks[i].verdict == VERDICT_REFUSED) {
+            result = print_refusal(ctx, stdout, &checks[i], &reasons, &number);
+        } else {
+            print_row(stdout, &checks[i], check_verdict_name(checks[i].verdict));
+        }
     }
+    for (int i = 1; i <= (int)reasons.items.count; i++) {
+        reasons_print(stdout, &reasons, i);
+    }
+    reasons_free(ctx, &reasons);
+    return result;
+}
+
+rey_result check_print_table(rey_context *ctx, const Check *checks, int count, double threshold) {
+    rey_result result = print_rows(ctx, checks, count);
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
     int undecided = 0;
     for (int i = 0; i < count; i++) {
@@ -61,6 +91,7 @@ void check_print_table(const Check *checks, int count, double threshold) {
         printf("%d of %d are weak: noise is more than %g %% of the signal, so that they say little; raise --spp\n", weak,
                count, 100 * CHECK_WEAK);
     }
+    return result;
 }
 
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold) {

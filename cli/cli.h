@@ -7,7 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { MOST_SPP = 1 << 24 }; // the library's limit
+enum { MOST_SPP = 1 << 24 };        // the library's limit
+enum { TERMS_ESTIMATED = 15 };      // REY_TERM_ bits that --terms may ask for
 enum { EXIT_OK = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_INTERRUPTED = 130 };
 
 // Subcommands: main.c holds one row for each. A command gets its own name as argv[0] and returns the exit status.
@@ -128,6 +129,8 @@ int cli_session_open(const Options *options, const char *label, Session *session
 void cli_session_close(Session *session);
 // What --load asks for.
 rey_result cli_load_values(const Options *options, rey_context *ctx, rey_scene *scene);
+// What a wrong call returns as REY_ERROR_ARGUMENT, the command line's fault, is a usage error; all else a failure.
+int cli_report(const Options *options, const rey_context *ctx, rey_result result);
 
 // Reports a failed library call (words on standard error, one object on standard output with --json)
 // and returns the exit status for it: 130 when the user interrupted, else 1.
@@ -163,16 +166,33 @@ typedef struct Direction {
     float *tangent;
 } Direction;
 
-// Builds the sum of the directions of specs, each `NAME[:OP]`. On REY_ERROR_ARGUMENT the text itself is malformed.
+// Builds the sum of the directions of specs, each `NAME[:OP]`. On REY_ERROR_ARGUMENT the text is malformed, or
+// names what the scene does not have.
 rey_result cli_direction_build(rey_context *ctx, rey_scene *scene, const char *const *specs, int spec_count,
                                Direction *direction);
 // Whether a spec without an operation names a pose, of which then all entries move.
 bool cli_direction_bare_pose(const rey_scene *scene, const char *spec);
-// The same for a session, with failures reported: returns the exit status.
+// Length of the NAME part of a spec, and whether the operation behind it can be had of a parameter: without one, of what
+// moves nothing.
+size_t cli_direction_name_length(const char *spec);
+bool cli_direction_fits(const rey_param_info *info, const char *spec);
+// REY_ERROR_ARGUMENT where a direction has none of the terms that are asked for (0 = of all), which it names.
+rey_result cli_direction_check_terms(rey_context *ctx, const rey_scene *scene, const Direction *direction, int asked);
+// Directions of a session, with failures reported: returns the exit status.
 int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction);
 void cli_direction_free(rey_context *ctx, Direction *direction);
 rey_selection cli_direction_selection(const Direction *direction);
 int cli_direction_terms(const rey_scene *scene, const Direction *direction); // terms that it needs
+
+// Texts of directions in which no name holds a *.
+typedef struct Specs {
+    char **texts;
+    int count;
+} Specs;
+// What --param says, with patterns written out: a pattern stands for the parameters that fit it and the operation behind
+// it. Failures are reported; returns the exit status. --all: every parameter by its name.
+int cli_specs_open(Session *session, Specs *specs);
+void cli_specs_free(Session *session, Specs *specs);
 
 /* ---- images -------------------------------------------------------------------------------------------- */
 

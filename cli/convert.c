@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 // Whether both names mean one file.
 static bool same_file(const char *a, const char *b) {
@@ -21,6 +22,17 @@ static void print_json(const Session *s) {
     json_end(&json);
 }
 
+// OUT.xml, and OUT_data beside it where the scene has meshes or pictures.
+static void say_what_was_written(const char *path) {
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%.*s_data", (int)(strlen(path) - strlen(".xml")), path);
+    if (access(folder, F_OK) == 0) {
+        cli_note("wrote %s, and its meshes and pictures to %s", path, folder);
+    } else {
+        cli_note("wrote %s", path);
+    }
+}
+
 int cli_convert(int argc, char **argv) {
     Options options;
     Session session;
@@ -29,15 +41,10 @@ int cli_convert(int argc, char **argv) {
         return status;
     }
     options.output = options.files[1];
-    if (!strcmp(options.output, "-")) {
-        fprintf(stderr, "reynolds convert: a scene is written with its meshes and pictures, which standard output cannot hold; name a file\n");
-        cli_options_free(&options);
-        return 2;
-    }
     if (same_file(options.files[0], options.files[1])) {
-        fprintf(stderr, "reynolds convert: %s is both read and written; name another file for the result\n", options.files[1]);
+        status = cli_usage_error(&options, "%s is both read and written; name another file for the result", options.files[1]);
         cli_options_free(&options);
-        return 2;
+        return status;
     }
     status = cli_session_open(&options, "convert", &session);
     if (!status) {
@@ -46,6 +53,8 @@ int cli_convert(int argc, char **argv) {
             status = cli_report_failure(&options, session.ctx, result);
         } else if (options.json) {
             print_json(&session);
+        } else {
+            say_what_was_written(options.files[1]);
         }
         status = status ? status : cli_finish_output();
         cli_session_close(&session);

@@ -47,8 +47,8 @@ static Geometry geometry_of(const rey_param_info *info) {
     return ends_with(info->name, "normals") || ends_with(info->name, "direction") ? GEOMETRY_VECTORS : GEOMETRY_NONE;
 }
 
-// Length of the NAME part of spec: up to the first colon that an operation's name and "=" follow, or the first colon.
-static size_t name_length(const char *spec) {
+// Up to the first colon that an operation's name and "=" follow, or the first colon.
+size_t cli_direction_name_length(const char *spec) {
     for (const char *colon = strchr(spec, ':'); colon; colon = strchr(colon + 1, ':')) {
         for (int i = 0; i < OP_COUNT; i++) {
             size_t n = strlen(op_names[i]);
@@ -105,7 +105,7 @@ static rey_result parse_op(rey_context *ctx, const char *spec, const char *text,
         }
     }
     if (op->id == OP_COUNT || !*text) {
-        return unknown_op(ctx, spec, spec + name_length(spec) + 1);
+        return unknown_op(ctx, spec, spec + cli_direction_name_length(spec) + 1);
     }
     if (op->id == OP_FILE) {
         op->file = text;
@@ -232,7 +232,7 @@ static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info 
 
 // Index of the parameter that spec names. *name is a copy of the name, for the caller to free.
 static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spec, int *param, char **name) {
-    size_t length = name_length(spec);
+    size_t length = cli_direction_name_length(spec);
     *name = rey_alloc(ctx, length + 1);
     if (!*name) {
         return REY_ERROR_MEMORY;
@@ -246,12 +246,12 @@ static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spe
         char mesh[256];
         snprintf(mesh, sizeof mesh, "%.*s.positions", (int)(length - strlen(".to_world")), *name);
         if (rey_param_find(scene, mesh) >= 0) {
-            return rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s': meshes have none, their vertices move: %s:%s",
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "unknown parameter '%s': meshes have none, their vertices move: %s:%s",
                             *name, mesh, spec[length] ? spec + length + 1 : "translate=1,0,0");
         }
     }
     const char *nearest = rey_param_nearest(scene, *name);
-    return rey_fail(ctx, REY_ERROR_PARAM, "unknown parameter '%s'%s%s%s", *name, nearest ? ", did you mean '" : "",
+    return rey_fail(ctx, REY_ERROR_ARGUMENT, "unknown parameter '%s'%s%s%s", *name, nearest ? ", did you mean '" : "",
                     nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
 }
 
@@ -262,7 +262,7 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
         return result;
     }
     Op op = {.id = OP_ADD, .values = {1}, .value_count = 1};
-    size_t length = name_length(spec);
+    size_t length = cli_direction_name_length(spec);
     if (spec[length]) {
         result = parse_op(ctx, spec, spec + length + 1, &op);
         if (result) {
@@ -346,9 +346,24 @@ rey_selection cli_direction_selection(const Direction *direction) {
     return (rey_selection){.params = direction->params, .count = direction->count};
 }
 
+bool cli_direction_fits(const rey_param_info *info, const char *spec) {
+    Geometry geometry = geometry_of(info);
+    const char *op = spec + cli_direction_name_length(spec);
+    if (!*op || !info->terms) {
+        return info->terms == REY_TERM_INTERIOR;
+    }
+    if (!strncmp(op, ":local_translate=", 17)) {
+        return geometry == GEOMETRY_TRANSFORM;
+    }
+    if (!strncmp(op, ":translate=", 11) || !strncmp(op, ":scale=", 7)) {
+        return geometry == GEOMETRY_TRANSFORM || geometry == GEOMETRY_POINTS;
+    }
+    return strncmp(op, ":rotate=", 8) || geometry != GEOMETRY_NONE;
+}
+
 bool cli_direction_bare_pose(const rey_scene *scene, const char *spec) {
     rey_param_info info;
-    int param = spec[name_length(spec)] ? -1 : rey_param_find(scene, spec);
+    int param = spec[cli_direction_name_length(spec)] ? -1 : rey_param_find(scene, spec);
     return param >= 0 && rey_param_get_info(scene, param, &info) == REY_OK && geometry_of(&info) == GEOMETRY_TRANSFORM;
 }
 
@@ -361,4 +376,17 @@ int cli_direction_terms(const rey_scene *scene, const Direction *direction) {
         }
     }
     return terms;
+}
+
+rey_result cli_direction_check_terms(rey_context *ctx, const rey_scene *scene, const Direction *direction, int asked) {
+    int terms = cli_direction_terms(scene, direction);
+    terms |= terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // shadows of what chains turn
+    if (!asked || !terms || (asked & terms)) {
+        return REY_OK;
+    }
+    char wrong[128], right[128];
+    cli_terms_text(asked, wrong, sizeof wrong);
+    cli_terms_text(terms & TERMS_ESTIMATED, right, sizeof right);
+    return rey_fail(ctx, REY_ERROR_ARGUMENT, "--terms %s: the gradient of %s%s has no such term, expected some of %s", wrong,
+                    direction->names[0], direction->count > 1 ? " and the others" : "", right);
 }

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS = 16, PATH_BYTES = 4096, TERMS_ESTIMATED = 15 }; // up to REY_TERM_SPECULAR
+enum { SETS = 16, PATH_BYTES = 4096 };
 
 typedef struct Grad {
     Session session;
@@ -321,13 +321,17 @@ static void print_result(const Grad *g) {
 int cli_grad(int argc, char **argv) {
     Options options;
     Grad g = {0};
+    Specs specs = {0};
     int status;
     if (!cli_options_parse(COMMAND_GRAD, argc, argv, &options, &status)) {
         return status;
     }
     status = cli_session_open(&options, "grad", &g.session);
     if (!status) {
-        status = cli_session_direction(&g.session, options.params, options.param_count, &g.direction);
+        status = cli_specs_open(&g.session, &specs);
+        if (!status) {
+            status = cli_session_direction(&g.session, (const char *const *)specs.texts, specs.count, &g.direction);
+        }
         rey_result result = status ? REY_OK : differentiate(&g);
         if (result) {
             status = cli_report_failure(&options, g.session.ctx, result);
@@ -336,6 +340,7 @@ int cli_grad(int argc, char **argv) {
             status = cli_finish_output();
         }
         cli_direction_free(g.session.ctx, &g.direction);
+        cli_specs_free(&g.session, &specs);
         cli_session_close(&g.session);
     }
     cli_options_free(&options);

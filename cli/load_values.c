@@ -43,7 +43,7 @@ static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name,
     int param = rey_param_find(scene, text);
     if (param < 0) {
         const char *nearest = rey_param_nearest(scene, text);
-        return rey_fail(ctx, REY_ERROR_PARAM, "--load %s: the scene has no parameter '%s'%s%s%s", path, text,
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s: the scene has no parameter '%s'%s%s%s", path, text,
                         nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
     }
     rey_result result = rey_param_get_info(scene, param, &info);

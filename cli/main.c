@@ -7,8 +7,8 @@
 #include <string.h>
 
 #define DIRECTION_NOTES                                                                                                \
-    "\nA direction P is NAME[:OP]; several form one joint direction. Names are listed by 'reynolds params'. OP is "    \
-    "one of\n"                                                                                                         \
+    "\nA direction P is NAME[:OP]; several form one joint direction. Names are listed by 'reynolds params'; a * in NAME\n"   \
+    "stands for any text: for the parameters that move nothing, with OP for those that OP fits. OP is one of\n"                                                                                                         \
     "  add=V                     every entry moves by theta*V (default add=1); V may list the last dimension\n"        \
     "  translate=x,y,z           positions or to_world, in the world\n"                                                \
     "  local_translate=x,y,z     to_world, in the object's own frame\n"                                                \
@@ -27,7 +27,9 @@ typedef struct CommandRow {
 static const CommandRow command_rows[COMMAND_COUNT] = {
     [COMMAND_RENDER] = {"render", cli_render, "SCENE -o OUT [options]", "render a Mitsuba 3 scene to an image", ""},
     [COMMAND_GRAD] =
-        {"grad", cli_grad, "SCENE --param P [--param P]... [--mode reverse --adjoint A] [-o OUT] [options]",
+        {"grad", cli_grad,
+         "SCENE --param P [--param P]... [-o OUT] [options]\n"
+         "       reynolds grad SCENE --param P [--param P]... --mode reverse --adjoint A [-o DIR] [options]",
          "derivative image (forward) or gradient (reverse)",
          "\nForward mode writes the derivative image along the direction; its value is the mean over pixels and\n"
          "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
@@ -40,7 +42,8 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
                        "1 when a gradient is wrong, with 0 when all are right or too noisy to say (weak).\n" DIRECTION_NOTES},
     [COMMAND_FIT] = {"fit", cli_fit, "JOB.yaml [--set key=value]... [--resume] [-o DIR] [options]",
                      "recover parameters from images", ""},
-    [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene", ""},
+    [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene",
+                        "\nThe column gradient says whether grad computes all of the derivative; below the table stands why not.\n"},
     [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
     [COMMAND_CONVERT] =
         {"convert", cli_convert, "IN OUT.xml [options]", "write a scene back, with its meshes and images",

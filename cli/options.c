@@ -15,6 +15,7 @@ enum {
     READS = 1 << COMMAND_PARAMS | 1 << COMMAND_INFO | 1 << COMMAND_CONVERT,
     GRADS = 1 << COMMAND_GRAD,
     CHECKS = 1 << COMMAND_CHECK,
+    LISTS = 1 << COMMAND_PARAMS,
     DOCTOR = 1 << COMMAND_DOCTOR,
     EVERY = (1 << COMMAND_COUNT) - 1
 };
@@ -56,11 +57,13 @@ typedef struct OptionRow {
 } OptionRow;
 
 static const OptionRow option_rows[] = {
-    {OPTION_OUTPUT, 'o', NULL, "OUT", RENDERS & ~CHECKS, "file by ending (.exr .png .npy), - for standard output"},
+    {OPTION_OUTPUT, 'o', NULL, "OUT", 1 << COMMAND_RENDER, "file by ending (.exr .png .npy), - for standard output"},
+    {OPTION_OUTPUT, 'o', NULL, "OUT", GRADS, "forward mode: the derivative image (.exr .png .npy, or -); reverse: a folder"},
     {OPTION_OUTPUT, 'o', NULL, "DIR", FITS, "folder for everything that the fit writes"},
     {OPTION_PARAM, 0, "param", "P", GRADS | CHECKS, "NAME[:OP]: a direction (see below); may be repeated"},
+    {OPTION_PARAM, 0, "param", "NAME", LISTS, "these parameters only; * stands for any text; may be repeated"},
     {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
-    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or an EXR of the image's size"},
+    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or a picture (.exr .npy) of the image's size"},
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior,primary,indirect,specular)"},
     {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
     {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
@@ -116,24 +119,18 @@ void cli_options_help(Command command) {
     }
 }
 
-void cli_terms_text(int terms, char *text, size_t size) {
-    size_t used = 0;
-    snprintf(text, size, "none");
-    for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
-        if (terms & bit && used < size) {
-            int n = snprintf(text + used, size - used, "%s%s", used ? "," : "", rey_term_name(bit));
-            used += (size_t)n;
-        }
-    }
-}
-
 static bool parse_terms(Options *o, const char *text) {
-    char all[128];
+    char all[128], unknown[128];
     const char *wrong;
     int terms = rey_terms_of(text, &wrong);
+    cli_terms_text(TERMS_ESTIMATED, all, sizeof all);
     if (!terms) {
-        cli_terms_text(REY_TERM_ALL, all, sizeof all);
         cli_usage_error(o, "--terms: '%.*s' is none of %s", (int)strcspn(wrong, ","), wrong, all);
+        return false;
+    }
+    if (terms & ~TERMS_ESTIMATED) {
+        cli_terms_text(terms & ~TERMS_ESTIMATED, unknown, sizeof unknown);
+        cli_usage_error(o, "--terms: '%s' does not exist by itself yet, expected some of %s", unknown, all);
         return false;
     }
     o->terms |= terms;

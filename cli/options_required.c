@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static bool is_nonfinite(const char *text) {
     char *end;
@@ -22,6 +23,11 @@ static const char *missing_file(Command command, int given) {
     default:
         return "SCENE is missing";
     }
+}
+
+static bool is_scene_name(const char *path) {
+    size_t length = strlen(path);
+    return length > 4 && !strcasecmp(path + length - 4, ".xml");
 }
 
 bool cli_options_required(const Options *o) {
@@ -52,6 +58,10 @@ bool cli_options_required(const Options *o) {
         cli_usage_error(o, "--load: a fit takes one saved scene; `start` of its parameters takes files");
     } else if (o->resume && o->overwrite) {
         cli_usage_error(o, "--resume continues and --overwrite starts again: give one of them");
+    } else if (c == COMMAND_CONVERT && !strcmp(o->files[1], "-")) {
+        cli_usage_error(o, "a scene is written with its meshes and pictures, which standard output cannot hold; name a file");
+    } else if (c == COMMAND_CONVERT && !is_scene_name(o->files[1])) {
+        cli_usage_error(o, "'%s' ends in none of .xml", o->files[1]);
     } else if (c == COMMAND_RENDER && !o->output && !o->json) {
         cli_usage_error(o, "-o OUT is missing");
     } else if (o->json && o->output && !strcmp(o->output, "-")) {

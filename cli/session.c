@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "base/parallel.h"
 #include "io/file.h"
+#include "render/used.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -109,6 +110,11 @@ int cli_report_failure(const Options *options, const rey_context *ctx, rey_resul
     return EXIT_FAILED;
 }
 
+int cli_report(const Options *options, const rey_context *ctx, rey_result result) {
+    return result == REY_ERROR_ARGUMENT ? cli_usage_error(options, "%s", rey_error(ctx))
+                                        : cli_report_failure(options, ctx, result);
+}
+
 int cli_fail(const Options *options, const char *format, ...) {
     char message[2048];
     va_list arguments;
@@ -189,18 +195,14 @@ int cli_session_open(const Options *options, const char *label, Session *session
         return status;
     }
     rey_result result = load_scene(session);
-    rey_scene_info info = {0};
-    if (session->scene) {
-        rey_scene_get_info(session->scene, &info);
-    }
-    if (result && info.sensors > 0 && options->sensor >= info.sensors) {
-        status = cli_usage_error(options, "--sensor: the scene has the sensors 0 to %d, got %d", (int)info.sensors - 1,
-                                 options->sensor);
-        cli_session_close(session);
-        return status;
-    }
     if (result || cli_interrupted()) {
-        status = cli_report_failure(options, session->ctx, cli_interrupted() ? REY_ERROR_CANCELLED : result);
+        rey_scene_info info = {0};
+        rey_scene_get_info(session->scene, &info);
+        status = cli_interrupted() ? cli_report_failure(options, session->ctx, REY_ERROR_CANCELLED)
+                 : info.sensors > 0 && options->sensor >= info.sensors
+                     ? cli_usage_error(options, "--sensor: the scene has the sensors 0 to %d, got %d", (int)info.sensors - 1,
+                                       options->sensor)
+                     : cli_report(options, session->ctx, result);
         cli_session_close(session);
         return status;
     }
@@ -224,19 +226,35 @@ void cli_session_close(Session *session) {
     session->ctx = NULL;
 }
 
+// A derivative of 0 may be a misunderstanding.
+static rey_result note_unused(Session *session, const Direction *direction) {
+    bool *used = rey_alloc_array(session->ctx, (size_t)rey_param_count(session->scene), sizeof *used);
+    rey_result result = used ? rey_params_used(session->scene, used) : REY_ERROR_MEMORY;
+    for (int i = 0; i < direction->count && !result; i++) {
+        if (!used[direction->params[i]]) {
+            cli_note("nothing in the scene uses %s: its derivative is 0", direction->names[i]);
+        }
+    }
+    rey_free(session->ctx, used);
+    return result;
+}
+
 int cli_session_direction(Session *session, const char *const *specs, int spec_count, Direction *direction) {
     rey_result result = cli_direction_build(session->ctx, session->scene, specs, spec_count, direction);
-    if (result == REY_ERROR_ARGUMENT) { // the text, not the scene, is wrong
-        cli_report_failure(session->options, session->ctx, result);
-        return EXIT_USAGE;
+    if (!result && !session->options->all) {
+        result = cli_direction_check_terms(session->ctx, session->scene, direction, session->options->terms);
     }
-    for (int i = 0; i < spec_count && !result && !session->options->all; i++) {
+    if (!result && session->options->command == COMMAND_GRAD) {
+        result = note_unused(session, direction);
+    }
+    bool notes = !session->options->all && session->options->command != COMMAND_PARAMS;
+    for (int i = 0; i < spec_count && !result && notes; i++) {
         if (cli_direction_bare_pose(session->scene, specs[i])) {
             cli_note("%s moves all entries of the matrix; :translate=x,y,z, :rotate=ax,ay,az@cx,cy,cz and :scale=S@cx,cy,cz "
                      "move what it places", specs[i]);
         }
     }
-    return result ? cli_report_failure(session->options, session->ctx, result) : EXIT_OK;
+    return result ? cli_report(session->options, session->ctx, result) : EXIT_OK;
 }
 
 void cli_add_stats(rey_stats *sum, const rey_stats *part) {
@@ -274,14 +292,4 @@ void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) 
     json_integer(json, "threads", rey_threads(session->ctx));
     json_integer(json, "lanes", rey_lanes(session->ctx));
     json_integer(json, "nonfinite", stats->nonfinite);
-}
-
-void cli_json_terms(Json *json, const char *key, int terms) {
-    json_array(json, key);
-    for (int bit = 1; bit <= REY_TERM_ALL; bit <<= 1) {
-        if (terms & bit) {
-            json_string(json, NULL, rey_term_name(bit));
-        }
-    }
-    json_array_end(json);
 }

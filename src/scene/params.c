@@ -108,7 +108,9 @@ static const char *param_word(void *user, int i) {
 }
 
 const char *rey_param_nearest(const rey_scene *scene, const char *name) {
-    return scene && name ? rey_nearest_word(name, param_word, (void *)(uintptr_t)scene) : NULL;
+    const char *word = scene && name ? rey_nearest_word(name, param_word, (void *)(uintptr_t)scene) : NULL;
+    int param = word ? rey_param_find(scene, word) : -1; // an alias is meant for the name that is listed
+    return param >= 0 ? ARRAY_AT(scene->params, Param, param).name : NULL;
 }
 
 const float *rey_param_values(const rey_scene *scene, int param) {

@@ -17,6 +17,13 @@ static void failures_of_convert(void **state) {
     expect(f, 2, "convert %s");
     assert_non_null(strstr(f->words, "OUT.xml is missing"));
     expect(f, 1, "convert missing.xml copy.xml");
+    expect(f, 2, "convert %s copy.obj");
+    assert_non_null(strstr(f->words, "'copy.obj' ends in none of .xml"));
+    assert_int_not_equal(access("copy.obj", F_OK), 0);
+    expect(f, 2, "convert %s -");
+    expect(f, 0, "convert %s plain.xml");
+    assert_non_null(strstr(f->words, "wrote plain.xml"));
+    expect(f, 2, "convert plain.xml ./plain.xml");
     expect(f, 1, "convert %s no/such/folder.xml");
     assert_non_null(strstr(f->words, "no/such/folder.xml"));
 }

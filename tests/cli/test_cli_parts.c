@@ -195,6 +195,27 @@ static void blocks_are_means(void **state) {
     }
 }
 
+// Messages that differ in the parameter's name alone are one reason, which names it where it holds of one alone.
+static void reasons_are_grouped(void **state) {
+    (void)state;
+    rey_context *ctx;
+    Reasons reasons = {0};
+    char *text = NULL;
+    size_t size = 0;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    assert_int_equal(reasons_add(ctx, &reasons, "a.b is stuck: a.b moves", "a.b"), 1);
+    assert_int_equal(reasons_add(ctx, &reasons, "c moves nothing", "c"), 2);
+    assert_int_equal(reasons_add(ctx, &reasons, "cube is stuck: cube moves", "cube"), 1);
+    FILE *file = open_memstream(&text, &size);
+    reasons_print(file, &reasons, 1);
+    reasons_print(file, &reasons, 2);
+    fclose(file);
+    assert_string_equal(text, "[1] NAME is stuck: NAME moves\n[2] c moves nothing\n");
+    free(text);
+    reasons_free(ctx, &reasons);
+    rey_context_destroy(ctx);
+}
+
 /* ---- directions on a real scene ------------------------------------------------------------------------------ */
 
 typedef struct Fixture {
@@ -302,7 +323,7 @@ static void malformed_directions_are_refused(void **state) {
     }
     const char *unknown = "rad.reflectance.value", *missing = "red.reflectance.value:file=/nonexistent.npy";
     Direction d;
-    assert_int_equal(cli_direction_build(f->ctx, f->scene, &unknown, 1, &d), REY_ERROR_PARAM);
+    assert_int_equal(cli_direction_build(f->ctx, f->scene, &unknown, 1, &d), REY_ERROR_ARGUMENT);
     assert_non_null(strstr(rey_error(f->ctx), "red.reflectance.value"));
     assert_int_equal(cli_direction_build(f->ctx, f->scene, &missing, 1, &d), REY_ERROR_IO);
 }
@@ -313,7 +334,7 @@ int main(void) {
         cmocka_unit_test(json_is_escaped_and_exact),
         cmocka_unit_test(json_reader_refuses_broken_text),
         cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
-        cmocka_unit_test(blocks_are_means), cmocka_unit_test(verdicts_know_noise),
+        cmocka_unit_test(blocks_are_means), cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(malformed_directions_are_refused, open_scene, close_scene),

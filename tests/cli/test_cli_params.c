@@ -1,0 +1,168 @@
+// test_cli_params.c: which parameters there are: names, patterns, those that nothing uses, and reasons said once.
+#include "command.h"
+
+static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words) && !strstr(f->out, words)) {
+        fail_msg("reynolds %s: '%s%s', expected '%s'", arguments, f->out, f->words, words);
+    }
+}
+
+static int count_words(const char *text, const char *words) {
+    int count = 0;
+    while ((text = strstr(text, words)) != NULL) {
+        text += strlen(words);
+        count++;
+    }
+    return count;
+}
+
+static const JsonNode *find_param(const JsonNode *node, const char *name) {
+    for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
+        if (!strcmp(json_text(p, "name", ""), name)) {
+            return p;
+        }
+    }
+    return NULL;
+}
+
+// What no shape has is said to be unused, in the table, in JSON and by grad.
+static void unused_objects_are_told(void **state) {
+    Fixture *f = *state;
+    static const char *const scenes[] = {"params %s --json", "params %s -D ball=glass --json"};
+    for (int glass = 0; glass < 2; glass++) {
+        JsonNode *node = run_json(f, 0, scenes[glass]);
+        for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
+            const char *name = json_text(p, "name", "");
+            bool off = !strncmp(name, glass ? "metal." : "glass.", 6);
+            if (json_value(p, "used", -1) != (off ? 0 : 1)) {
+                fail_msg("%s: used is %g", name, json_value(p, "used", -1));
+            }
+        }
+        json_free(node);
+    }
+    expect_words(f, 0, "params %s -D ball=glass --param metal.alpha.value", "unused: nothing in the scene refers to it");
+    expect_words(f, 0, "grad %s -D ball=glass --param metal.alpha.value --spp 1", "nothing in the scene uses metal.alpha.value");
+    expect(f, 0, "grad %s --param metal.alpha.value --spp 1");
+    assert_string_equal(f->words, "");
+}
+
+// A reason stands once below the table, however many parameters it holds of.
+static void reasons_are_said_once(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "params %s -D ball=glass --param \"*.to_world\" --param red.reflectance.value");
+    int refused = count_words(f->out, "refused [1]");
+    JsonNode *node = run_json(f, 0, "params %s -D ball=glass --param \"*.to_world\" --json");
+    int expected = 0;
+    for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
+        expected += json_text(p, "refused", "")[0] != 0;
+    }
+    json_free(node);
+    expect(f, 0, "params %s -D ball=glass --param \"*.to_world\"");
+    assert_true(expected >= 2);
+    assert_int_equal(refused, expected);
+    assert_int_equal(count_words(f->out, "\n[1] "), 1);
+    assert_int_equal(count_words(f->out, "the term 'specular' does not know"), 1);
+}
+
+// Patterns stand for the parameters that move nothing, with an operation for those that it fits.
+static void patterns_choose(void **state) {
+    Fixture *f = *state;
+    JsonNode *node = run_json(f, 0, "grad %s --param \"*.reflectance.value\" --spp 4 --json");
+    assert_int_equal(count_words(f->out, "reflectance.value"), 3); // white, red, the lamp's
+    double all = json_value(node, "value", 0);
+    json_free(node);
+    node = run_json(f, 0, "grad %s --spp 4 --json --param white.reflectance.value --param red.reflectance.value "
+                          "--param lamp.bsdf.reflectance.value");
+    assert_true(json_value(node, "value", 1) == all);
+    json_free(node);
+    node = run_json(f, 0, "grad %s --param \"ball.*:translate=1,0,0\" --spp 4 --json");
+    assert_string_equal(json_get(node, "parameters")->first->text, "ball.to_world");
+    assert_null(json_get(node, "parameters")->first->next);
+    json_free(node);
+    node = run_json(f, 0, "check %s --param \"red.*\" --param \"metal.alpha*\" --spp 16 --json");
+    assert_string_equal(json_text(json_get(node, "directions")->first, "param", ""), "red.reflectance.value");
+    assert_string_equal(json_text(json_get(node, "directions")->first->next, "param", ""), "metal.alpha.value");
+    json_free(node);
+    node = run_json(f, 0, "params %s --param \"ball.*\" --param red.reflectance --json");
+    assert_non_null(find_param(node, "ball.to_world"));
+    assert_non_null(find_param(node, "red.reflectance.value"));
+    assert_null(find_param(node, "white.reflectance.value"));
+    json_free(node);
+    expect_words(f, 2, "grad %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_words(f, 2, "check %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_words(f, 2, "params %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_words(f, 2, "grad %s --param \"ball.*\"", "'ball.*' matches only ball.to_world, which move things");
+    expect_words(f, 2, "grad %s --param \"red.*:translate=1,0,0\"", "which this operation does not fit");
+    expect_words(f, 2, "params %s --param \"red.*:add=1\"", "expected a name or a pattern");
+}
+
+// What is suggested is what `params` lists, whatever alias the word is nearest to.
+static void suggestions_are_listed(void **state) {
+    Fixture *f = *state;
+    expect_words(f, 2, "grad %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
+    expect_words(f, 2, "check %s --param metal.bsdf", "unknown parameter 'metal.bsdf'");
+    expect_words(f, 2, "params %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
+}
+
+// A term that a parameter's derivative does not have is no 0.
+static void terms_that_do_not_exist_are_errors(void **state) {
+    Fixture *f = *state;
+    expect_words(f, 2, "grad %s --param red.reflectance.value --terms primary",
+                 "--terms primary: the gradient of red.reflectance.value has no such term, expected some of interior");
+    expect_words(f, 2, "check %s --param red.reflectance.value --terms indirect", "expected some of interior");
+    expect_words(f, 2, "grad %s --param red.reflectance.value --terms terminator", "expected some of interior,primary,");
+    expect(f, 0, "grad %s --param red.reflectance.value --terms interior,primary --spp 1");
+    expect(f, 0, "grad %s --param ball.to_world:translate=1,0,0 --param red.reflectance.value --terms primary --spp 4");
+    JsonNode *node = run_json(f, 0, "check %s --all --terms primary --spp 16 --json");
+    const JsonNode *list = json_get(node, "directions");
+    for (const JsonNode *row = list->first; row; row = row->next) {
+        if (!strcmp(json_text(row, "param", ""), "red.reflectance.value")) {
+            assert_string_equal(json_text(row, "verdict", ""), "refused");
+        }
+    }
+    json_free(node);
+}
+
+// The command line is wrong, not the scene: 2, and "usage" in JSON.
+static void wrong_names_are_usage_errors(void **state) {
+    Fixture *f = *state;
+    static const char *const wrong[] = {"grad %s --param rad.reflectance.value --json",
+                                        "check %s --param rad.reflectance.value --json",
+                                        "params %s --param rad.reflectance.value --json",
+                                        "grad %s --param \"rad.*\" --json",
+                                        "grad %s --param ball.to_world:translate=1,2 --json",
+                                        "grad %s --param ball.to_world:translate=1,2,x --json",
+                                        "grad %s --param ball.to_world:rotate=0,0,0 --json",
+                                        "grad %s --param red.reflectance.value:translate=1,0,0 --json",
+                                        "grad %s --param red.reflectance.value:add=1,2 --json",
+                                        "grad %s --param red.reflectance.value --terms primary --json",
+                                        "grad %s --param red.reflectance.value -D bal=glass --json",
+                                        "info %s -D bal=glass --json",
+                                        "render %s -o a.exr -D ball=glass -D ball=metal --json",
+                                        "render %s -o a.exr --load re.reflectance.value=a.npy --json",
+                                        "render %s -o a.exr --sensor 3 --json",
+                                        "convert %s copy.obj --json",
+                                        "convert %s - --json"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        JsonNode *node = run_json(f, 2, wrong[i]);
+        assert_string_equal(json_text(node, "kind", ""), "usage");
+        assert_non_null(strstr(f->words, "--help"));
+        json_free(node);
+    }
+    JsonNode *node = run_json(f, 1, "grad %s --param red.reflectance.value:file=none.npy --json");
+    assert_string_not_equal(json_text(node, "kind", ""), "usage");
+    json_free(node);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(unused_objects_are_told),
+        cmocka_unit_test(reasons_are_said_once),
+        cmocka_unit_test(patterns_choose),
+        cmocka_unit_test(suggestions_are_listed),
+        cmocka_unit_test(terms_that_do_not_exist_are_errors),
+        cmocka_unit_test(wrong_names_are_usage_errors),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
