@@ -152,11 +152,11 @@ static rey_result view_section(Fit *fit, int index, const float *start, const fl
 }
 
 // Renders every view with the given values, one picture behind the other.
-static rey_result render_all(Fit *fit, const float *values, uint32_t set, float *images) {
+static rey_result render_all(Fit *fit, const float *values, uint32_t set, int spp, float *images) {
     rey_result result = rey_unknowns_apply(&fit->unknowns, fit->scene, values);
     for (int v = 0; v < fit->job.view_count && !result; v++) {
         const FitView *view = &fit->views[v];
-        rey_render_def def = rey_fit_finishing_def(fit, view, set, fit->job.report_spp);
+        rey_render_def def = rey_fit_finishing_def(fit, view, set, spp);
         result = rey_render(fit->scene, &def, images, NULL);
         rey_exposure_scale(fit, v, rey_exposure_of(fit, v, values), images);
         images += (int64_t)view->width * view->height * 3;
@@ -164,17 +164,22 @@ static rey_result render_all(Fit *fit, const float *values, uint32_t set, float 
     return result;
 }
 
+// A quarter of the samples is enough to see how far off the start is: half of a report's time went into it.
+static int start_spp(const Fit *fit) {
+    return (fit->job.report_spp + 3) / 4;
+}
+
 // With the meshes that the fit began with.
 static rey_result render_start(Fit *fit, float *images) {
     if (!fit->state.meshed) {
-        return render_all(fit, fit->unknowns.start, REPORT_SET, images);
+        return render_all(fit, fit->unknowns.start, REPORT_SET, start_spp(fit), images);
     }
     Fit first = *fit;
     first.scene = NULL;
     first.unknowns = (Unknowns){0};
     rey_result result = rey_fit_open_start(fit, &first.scene, &first.unknowns);
     if (!result) {
-        result = render_all(&first, first.unknowns.value, REPORT_SET, images);
+        result = render_all(&first, first.unknowns.value, REPORT_SET, start_spp(fit), images);
     }
     rey_unknowns_free(&first.unknowns);
     rey_scene_destroy(first.scene);
@@ -193,7 +198,7 @@ rey_result rey_report_views(Fit *fit, FitResult *out, Text *html) {
         result = render_start(fit, start);
     }
     if (!result) {
-        result = render_all(fit, fit->unknowns.value, REPORT_SET + 1, found);
+        result = render_all(fit, fit->unknowns.value, REPORT_SET + 1, fit->job.report_spp, found);
     }
     int64_t at = 0;
     for (int v = 0; v < fit->job.view_count && !result; v++) {
@@ -203,9 +208,9 @@ rey_result rey_report_views(Fit *fit, FitResult *out, Text *html) {
     }
     rey_text_add(html,
                  "<p class=\"note\">Error of a picture: root of the sum of (I &minus; R)&sup2; over that of R&sup2;, R "
-                 "the target, I rendered with %d samples per pixel, whose noise it contains. Differences are means of "
+                 "the target, I rendered with %d samples per pixel (the start with %d), whose noise it contains. Differences are means of "
                  "the channels; their scale ends at the 99.5th percentile.%s</p>\n",
-                 fit->job.report_spp,
+                 fit->job.report_spp, start_spp(fit),
                  out->held_out.count ? " PSNR of views that were not fitted: 10 log<sub>10</sub> of the square of the target's "
                                        "largest number over the mean of (I &minus; R)&sup2;." : "");
     rey_free(fit->ctx, start);

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { LARGEST_SMALL = 64, WEIGHT_SPP = 64 }; // parameters up to this size are judged by their worst entry
+enum { LARGEST_SMALL = 64, WEIGHT_SPP = 16 }; // parameters up to this size are judged by their worst entry
 
 static float *copy_floats(rey_context *ctx, const float *values, int64_t count) {
     float *copy = rey_alloc_array(ctx, (size_t)count, sizeof *copy);
@@ -95,26 +95,6 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
     return added;
 }
 
-// Adds the views' |d sum(I) / d entry|, entry by entry of the row's parameter, to weights.
-static rey_result add_weights(Fit *fit, rey_scene *truth, int param, int64_t count, const float *ones,
-                              double *weights) {
-    double *gradient = rey_alloc_array(fit->ctx, (size_t)count, sizeof *gradient);
-    rey_result result = gradient ? REY_OK : REY_ERROR_MEMORY;
-    memset(weights, 0, (size_t)count * sizeof *weights);
-    for (int v = 0; v < fit->job.view_count && !result; v++) {
-        rey_render_def def = rey_fit_finishing_def(fit, &fit->views[v], 0, WEIGHT_SPP);
-        result = rey_vjp(truth, &def, (rey_selection){&param, 1}, ones, gradient, NULL, NULL);
-        for (int64_t i = 0; i < count && !result; i++) {
-            weights[i] += gradient[i];
-        }
-    }
-    for (int64_t i = 0; i < count; i++) {
-        weights[i] = fabs(weights[i]);
-    }
-    rey_free(fit->ctx, gradient);
-    return result;
-}
-
 bool rey_fit_row_is_pose(const FitRow *row) {
     return row->dims == 2 && row->shape[0] == 4 && row->shape[1] == 4;
 }
@@ -156,11 +136,11 @@ static double worst_error(const FitRow *row) {
     return worst;
 }
 
-static double weighted_error(const FitRow *row, const double *weights) {
+static double weighted_error(const FitRow *row, const double *gradient) {
     double error = 0, mean = 0;
     for (int64_t i = 0; i < row->count; i++) {
-        error += weights[i] * fabs((double)row->found[i] - (double)row->truth[i]);
-        mean += weights[i] * fabs((double)row->truth[i]);
+        error += fabs(gradient[i]) * fabs((double)row->found[i] - (double)row->truth[i]);
+        mean += fabs(gradient[i]) * fabs((double)row->truth[i]);
     }
     return mean > 0 ? error / mean : 0;
 }
@@ -240,7 +220,7 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
     return REY_OK;
 }
 
-static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRow *row) {
+static rey_result judge_row(Fit *fit, rey_scene *truth, FitRow *row) {
     int param = rey_param_find(truth, row->name); // none of an exposure's name
     rey_param_info info;
     if (row->derived) {
@@ -256,16 +236,68 @@ static rey_result judge_row(Fit *fit, rey_scene *truth, const float *ones, FitRo
     if (!row->truth) {
         return REY_ERROR_MEMORY;
     }
-    if (!row->weighted) {
-        row->error = worst_error(row);
-        return REY_OK;
+    row->error = row->weighted ? 0 : worst_error(row); // weigh_rows follows
+    return REY_OK;
+}
+
+// Parameters of the truth whose rows are weighted, each once, and where its numbers begin.
+typedef struct Weighing {
+    int *params;
+    int64_t *offsets; // one more than params
+    int *of_row;      // per row the number of its parameter, -1 = not weighted
+    int count;
+    double *gradient, *sum; // d sum(I) / d entry of one view, and of all
+} Weighing;
+
+static void choose_weighed(const rey_scene *truth, const FitResult *out, Weighing *w) {
+    for (size_t i = 0; i < out->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        int param = row->weighted && row->truth ? rey_param_find(truth, row->name) : -1, k = 0;
+        while (k < w->count && w->params[k] != param) {
+            k++;
+        }
+        w->of_row[i] = param < 0 ? -1 : k;
+        if (param >= 0 && k == w->count) {
+            w->params[w->count++] = param;
+            w->offsets[w->count] = w->offsets[k] + row->count;
+        }
     }
-    double *weights = rey_alloc_array(fit->ctx, (size_t)row->count, sizeof *weights);
-    rey_result result = weights ? add_weights(fit, truth, param, row->count, ones, weights) : REY_ERROR_MEMORY;
+}
+
+// |d sum(I) / d entry| over all views: one reverse pass per view has the derivatives of all of them.
+static rey_result find_weights(Fit *fit, rey_scene *truth, const float *ones, Weighing *w) {
+    size_t size = (size_t)w->offsets[w->count];
+    w->gradient = rey_alloc_array(fit->ctx, size, sizeof *w->gradient);
+    w->sum = rey_alloc_array(fit->ctx, size, sizeof *w->sum);
+    rey_result result = w->gradient && w->sum ? REY_OK : REY_ERROR_MEMORY;
+    for (int v = 0; v < fit->job.view_count && w->count && !result; v++) {
+        rey_render_def def = rey_fit_finishing_def(fit, &fit->views[v], 0, WEIGHT_SPP);
+        result = rey_vjp(truth, &def, (rey_selection){w->params, w->count}, ones, w->gradient, NULL, NULL);
+        for (size_t i = 0; i < size && !result; i++) {
+            w->sum[i] += w->gradient[i];
+        }
+    }
+    return result;
+}
+
+static rey_result weigh_rows(Fit *fit, rey_scene *truth, const float *ones, FitResult *out) {
+    size_t rows = out->rows.count;
+    Weighing w = {.params = rey_alloc_array(fit->ctx, rows, sizeof *w.params),
+                  .offsets = rey_alloc_array(fit->ctx, rows + 1, sizeof *w.offsets),
+                  .of_row = rey_alloc_array(fit->ctx, rows, sizeof *w.of_row)};
+    rey_result result = w.params && w.offsets && w.of_row ? REY_OK : REY_ERROR_MEMORY;
     if (!result) {
-        row->error = weighted_error(row, weights);
+        choose_weighed(truth, out, &w);
+        result = find_weights(fit, truth, ones, &w);
     }
-    rey_free(fit->ctx, weights);
+    for (size_t i = 0; i < rows && !result; i++) {
+        FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        row->error = w.of_row[i] < 0 ? row->error : weighted_error(row, w.sum + w.offsets[w.of_row[i]]);
+    }
+    void *const arrays[] = {w.params, w.offsets, w.of_row, w.gradient, w.sum};
+    for (int k = 0; k < COUNT_OF(arrays); k++) {
+        rey_free(fit->ctx, arrays[k]);
+    }
     return result;
 }
 
@@ -310,7 +342,10 @@ rey_result rey_fit_judge(Fit *fit, FitResult *out) {
         result = check_films(fit, truth);
     }
     for (size_t i = 0; i < out->rows.count && !result; i++) {
-        result = judge_row(fit, truth, ones, &ARRAY_AT(out->rows, FitRow, i));
+        result = judge_row(fit, truth, &ARRAY_AT(out->rows, FitRow, i));
+    }
+    if (!result) {
+        result = weigh_rows(fit, truth, ones, out);
     }
     rey_free(fit->ctx, ones);
     rey_scene_destroy(truth);

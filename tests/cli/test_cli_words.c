@@ -93,6 +93,11 @@ static void fits_show_what_the_job_says(void **state) {
     char page[OUTPUT_BYTES];
     read_text("fit/report.html", page);
     assert_null(strstr(page, ">-0<"));
+    static const char *const absent[] = {"Meshes:", "each entry weighted", "Dashed", "The way:"};
+    assert_non_null(strstr(page, "Poses:")); // footnotes of what there is
+    for (size_t i = 0; i < sizeof absent / sizeof absent[0]; i++) {
+        assert_null(strstr(page, absent[i]));
+    }
 }
 
 // Where the job is wrong its line is told; where the command line is, the setting, and the exit status is that of usage.
