@@ -9,6 +9,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -144,6 +145,32 @@ static inline void ok(Room room, rey_result result) {
     if (result != REY_OK) {
         fail_msg("%s", rey_error(room.ctx));
     }
+}
+
+// Numbers that take long to find: where the environment variable REYNOLDS_TEST_KEEP names a folder, they are kept there from
+// run to run, as scripts/mutate.py wants, whose mutants do not change them.
+static inline bool kept(const char *name, double *x, size_t n, bool write) {
+    const char *folder = getenv("REYNOLDS_TEST_KEEP");
+    char path[1024];
+    snprintf(path, sizeof path, "%s/%s", folder ? folder : "", name);
+    FILE *f = folder ? fopen(path, write ? "wb" : "rb") : NULL;
+    bool done = f && (write ? fwrite(x, sizeof *x, n, f) : fread(x, sizeof *x, n, f)) == n;
+    return f && fclose(f) == 0 && done;
+}
+
+// Of a group's tests those whose name begins with one of the arguments; all without any.
+static inline size_t tests_asked(struct CMUnitTest *tests, size_t count, int argc, char **argv) {
+    size_t asked = 0;
+    for (size_t i = 0; i < count; i++) {
+        bool wanted = argc < 2;
+        for (int k = 1; k < argc; k++) {
+            wanted = wanted || strncmp(tests[i].name, argv[k], strlen(argv[k])) == 0;
+        }
+        if (wanted) {
+            tests[asked++] = tests[i];
+        }
+    }
+    return asked;
 }
 
 // Whether the interior term is all that the parameter needs in these rooms.

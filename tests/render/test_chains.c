@@ -65,6 +65,31 @@ static void reverse_agrees(Room room, const rey_render_def *def, rey_selection s
     assert_true(fabs(along - square) <= 1e-4 * square);
 }
 
+// The differences' blocks, taken away from what is there.
+static void subtract_quotient(Room room, const Step *s, int param, const float *start, const float *tangent, int n,
+                              const rey_render_def *def, double *off) {
+    static float image[NUMBERS];
+    double blocks[BLOCKS] = {0};
+    char name[128];
+    snprintf(name, sizeof name, "%s %s %g %u", s->room, s->param, s->h, def->seed);
+    if (!kept(name, blocks, BLOCKS, false)) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            float values[POSE];
+            for (int i = 0; i < n; i++) {
+                values[i] = start[i] + (float)(sign * s->h) * tangent[i];
+            }
+            ok(room, rey_param_set(room.scene, param, values, n));
+            ok(room, rey_render(room.scene, def, image, NULL));
+            blocks_of(image, sign / (2 * s->h), blocks);
+        }
+        ok(room, rey_param_set(room.scene, param, start, n));
+        kept(name, blocks, BLOCKS, true);
+    }
+    for (int b = 0; b < BLOCKS; b++) {
+        off[b] -= blocks[b];
+    }
+}
+
 static void test_step(void **state) {
     const Step *s = *state;
     static float image[NUMBERS];
@@ -85,16 +110,7 @@ static void test_step(void **state) {
             off[seed][b] = blocks[b];
             rms += blocks[b] * blocks[b] / (SEEDS * BLOCKS);
         }
-        for (int sign = -1; sign <= 1; sign += 2) {
-            float values[POSE];
-            for (int i = 0; i < n; i++) {
-                values[i] = start[i] + (float)(sign * s->h) * tangent[i];
-            }
-            ok(room, rey_param_set(room.scene, param, values, n));
-            ok(room, rey_render(room.scene, &def, image, NULL));
-            blocks_of(image, -sign / (2 * s->h), off[seed]);
-        }
-        ok(room, rey_param_set(room.scene, param, start, n));
+        subtract_quotient(room, s, param, start, tangent, n, &def, off[seed]);
     }
     for (int b = 0; b < BLOCKS; b++) {
         double mean = 0, variance = 0;
@@ -118,18 +134,14 @@ static void test_step(void **state) {
     room_close(room);
 }
 
-// Arguments: the rooms to test, all without any.
+// Arguments: what the names of rooms, and parameters in them, begin with.
 int main(int argc, char **argv) {
     struct CMUnitTest tests[COUNT_OF(steps)];
-    size_t count = 0;
+    static char names[COUNT_OF(steps)][64];
     for (int i = 0; i < COUNT_OF(steps); i++) {
-        bool asked = argc < 2;
-        for (int k = 1; k < argc; k++) {
-            asked = asked || strcmp(steps[i].room, argv[k]) == 0;
-        }
-        if (asked) {
-            tests[count++] = (struct CMUnitTest){steps[i].param, test_step, NULL, NULL, (void *)(uintptr_t)(steps + i)};
-        }
+        snprintf(names[i], sizeof names[i], "%s %s", steps[i].room, steps[i].param);
+        tests[i] = (struct CMUnitTest){names[i], test_step, NULL, NULL, (void *)(uintptr_t)(steps + i)};
     }
+    size_t count = tests_asked(tests, COUNT_OF(steps), argc, argv);
     return _cmocka_run_group_tests("chains", tests, count, write_pictures, remove_pictures);
 }

@@ -49,6 +49,7 @@ static void blocks_of(const float *image, double *blocks) {
 
 // A parameter, the direction in which it moves, and how far.
 typedef struct Move {
+    const char *room;
     int param, count, spp;
     float start[LARGEST], tangent[LARGEST];
     double h, scale; // step; size of the values
@@ -70,8 +71,8 @@ static void turn(Move *m) {
     m->h = 0.01; // radians
 }
 
-static Move move_make(Room room, int param, const Effort *effort) {
-    Move m = {.param = param, .spp = effort->spp, .high_order = effort->high_order};
+static Move move_make(Room room, const char *file, int param, const Effort *effort) {
+    Move m = {.room = file, .param = param, .spp = effort->spp, .high_order = effort->high_order};
     rey_param_info info;
     rey_param_get_info(room.scene, param, &info);
     assert_true(info.count <= LARGEST);
@@ -119,16 +120,25 @@ static void difference(Room room, const Move *m, uint32_t seed, double *d, doubl
                  {3, {0, 1, 2}, {-1.5, 2, -0.5}},
                  {4, {0, 1, 2, 3}, {-11 / 6.0, 3, -1.5, 1 / 3.0}}};
     int rule = 2 * m->one_sided + m->high_order;
-    memset(d, 0, BLOCKS * sizeof *d);
-    *level = 0;
+    double values[BLOCKS + 1] = {0}; // the level last
+    char name[128];
+    snprintf(name, sizeof name, "%s %d %d %d %g %d %u", m->room, m->param, rule, m->spp, m->h, m->replayed != NULL, seed);
+    if (kept(name, values, BLOCKS + 1, false)) {
+        memcpy(d, values, BLOCKS * sizeof *d);
+        *level = values[BLOCKS];
+        return;
+    }
     for (int k = 0; k < rules[rule].n; k++) {
         double blocks[BLOCKS];
         moved(room, m, rules[rule].at[k] * m->h, seed, blocks);
         for (int i = 0; i < BLOCKS; i++) {
-            d[i] += rules[rule].weight[k] * blocks[i] / m->h;
-            *level += k == 0 ? blocks[i] / BLOCKS : 0;
+            values[i] += rules[rule].weight[k] * blocks[i] / m->h;
+            values[BLOCKS] += k == 0 ? blocks[i] / BLOCKS : 0;
         }
     }
+    kept(name, values, BLOCKS + 1, true);
+    memcpy(d, values, BLOCKS * sizeof *d);
+    *level = values[BLOCKS];
     ok(room, rey_param_set(m->replayed ? m->replayed : room.scene, m->param, m->start, m->count));
 }
 
@@ -244,7 +254,7 @@ typedef struct RoomCase {
 // Whether the parameter could be judged, or need not be.
 static bool compare(Room room, rey_scene *copy, int param, const RoomCase *r, Score *score) {
     const bool strict = r->strict;
-    Move m = move_make(room, param, &quick);
+    Move m = move_make(room, r->file, param, &quick);
     Blocks fresh = {.level = 0}, again = {.level = 0};
     double rms;
     int seeds;
@@ -258,7 +268,7 @@ static bool compare(Room room, rey_scene *copy, int param, const RoomCase *r, Sc
         score->fresh_n++;
     }
     const Effort *effort = replays ? (r->media ? &foggy : &replayed) : &thorough;
-    m = move_make(room, param, effort);
+    m = move_make(room, r->file, param, effort);
     m.replayed = replays ? copy : NULL;
     if ((strict || replays) && measure(room, &m, effort, &again, &rms, &seeds)) {
         judge(room, &m, &again, rms, score);
@@ -301,21 +311,15 @@ static void test_differences(void **state) {
     assert_true(fabs(fresh) < 3);
 }
 
-// The rooms whose names are given, all without a name.
+// Arguments: what the names of rooms begin with.
 int main(int argc, char **argv) {
     // Thousands of short renders: their memory is kept.
     mallopt(M_MMAP_THRESHOLD, 1 << 30);
     mallopt(M_TRIM_THRESHOLD, 1 << 30);
     struct CMUnitTest tests[COUNT_OF(rooms)];
-    size_t count = 0;
     for (int i = 0; i < COUNT_OF(rooms); i++) {
-        bool wanted = argc < 2;
-        for (int k = 1; k < argc; k++) {
-            wanted |= strcmp(argv[k], rooms[i].file) == 0;
-        }
-        if (wanted) {
-            tests[count++] = (struct CMUnitTest){rooms[i].file, test_differences, NULL, NULL, (void *)(uintptr_t)(rooms + i)};
-        }
+        tests[i] = (struct CMUnitTest){rooms[i].file, test_differences, NULL, NULL, (void *)(uintptr_t)(rooms + i)};
     }
+    size_t count = tests_asked(tests, COUNT_OF(rooms), argc, argv);
     return _cmocka_run_group_tests("differences", tests, count, write_pictures, remove_pictures);
 }

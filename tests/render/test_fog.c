@@ -256,11 +256,13 @@ static void test_refusals(void **state) {
     room_close(room);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
+// Arguments: what the names of tests begin with.
+int main(int argc, char **argv) {
+    struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_borders),
                                        cmocka_unit_test(test_outline)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
+    return _cmocka_run_group_tests("fog", tests, count, NULL, NULL);
 }

@@ -203,9 +203,11 @@ static void test_places_are_refused(void **state) {
     room_close(room);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_reverse_is_forward), cmocka_unit_test(test_differences),
+// Arguments: what the names of tests begin with.
+int main(int argc, char **argv) {
+    struct CMUnitTest tests[] = {cmocka_unit_test(test_reverse_is_forward), cmocka_unit_test(test_differences),
                                        cmocka_unit_test(test_path_gradient), cmocka_unit_test(test_threads),
                                        cmocka_unit_test(test_places_are_refused)};
-    return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
+    size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
+    return _cmocka_run_group_tests("particle_gradients", tests, count, write_pictures, remove_pictures);
 }
