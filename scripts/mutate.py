@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 """Proves that the tests of derivatives can fail.
 
-Every statement in a function named *_adj (and in the sink and the backward sweep) that assigns or accumulates a
-derivative is mutated: its contribution is dropped, or its sign is flipped. The tests of leaves, kinds, lights or whole
-renders must fail for each. All mutants are compiled into one program, in which the environment variable REY_MUTANT
-turns one of them on: nothing is rebuilt between them.
-Usage: scripts/mutate.py [--sample N] [--seed N] [--file PART] [--part K/N] [--jobs N] [--tree DIR] [--quick] [--list]
-Works in a copy of the tree, which --tree keeps for further runs; exit status 1 when a mutant survives that is not listed
-as equivalent below."""
+In every function that carries derivatives terms are dropped, signs flipped, and factors and calls of adjoints left out
+(scripts/mutants.py), one at a time. The tests that the table below names must fail for each. All mutants are compiled into
+one copy of the sources, for one SIMD width; the environment variable REY_MUTANT turns one of them on, so that nothing is
+rebuilt between them. Finite differences, which no mutant changes, are kept from run to run.
+Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--again] [--list]
+The tree (default: build-mutate) keeps build, differences and verdicts: a run goes on where the last one ended; --again
+tries survivors once more. Exit status 1 when a mutant survives that is not listed as equivalent."""
 import argparse
+import collections
 import json
 import os
 import pathlib
@@ -17,233 +18,226 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
+import time
+
+import mutants
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-FILES = ["src/bsdf/*.h", "src/math/fresnel.h", "src/math/microfacet.h", "src/math/vec.h", "src/emitter/emitter.h",
-         "src/scene/texture.h", "src/scene/texture_gradient.h", "src/scene/sink.h", "src/shape/*.h",
-         "src/integrator/path_adj.h"]
-LEAVES, RENDERS = ["test_math_leaves", "test_kinds_adjoint", "test_lights"], ["test_gradients", "test_differences"]
+ADJOINTS = r"\w*_adj(_\w+)?|\w*_scatter_[A-Z]+|\w*_slopes?|\w*_slide|slide_\w+"
+# Files, and which of their functions are mutated.
+FILES = [("src/bsdf/*.h", ADJOINTS), ("src/math/fresnel.h", ADJOINTS), ("src/math/microfacet.h", ADJOINTS),
+         ("src/emitter/*.h", ADJOINTS), ("src/medium/*.h", ADJOINTS), ("src/sensor/*.h", ADJOINTS),
+         ("src/scene/volume.h", ADJOINTS + "|volume_to_world_adj"), ("src/scene/texture*.h", ADJOINTS),
+         ("src/scene/attribute.h", ADJOINTS), ("src/shape/*.h", ADJOINTS + r"|curve_twist|pose_\w+_inverse|matrix_\w+"),
+         ("src/shape/normals_adj.c", r"\w+"), ("src/integrator/path_adj.h", r"\w+"),
+         ("src/integrator/path_move.h", r"\w+"), ("src/integrator/passage_move.h", r"\w+"),
+         ("src/integrator/flight_adj.h", r"\w+"), ("src/integrator/border.h", r"\w+"),
+         ("src/integrator/collision_adj.h", r"\w+"), ("src/integrator/walk_adj.h", r"\w+"),
+         ("src/integrator/probe.h", r"\w+"), ("src/integrator/particle_adj.h", r"(?!particle_replay)\w+"),
+         ("src/integrator/boundary/*.h", r"\w+")]
 
-FUNCTION = re.compile(r"^(?:KFN|static|static NOINLINE) (\w+) .*?\b(\w+_adj|\w+_adj_real|sink_add\w*|path_backward|forward_flush|"
-                      r"slot_adjoint|surface_values)\(")
-# x = x + rest;  or  x = x - rest;  or  x += rest;
-ACCUMULATE = re.compile(r"^(\s*)(\*?[\w>.\[\]-]+) = \2 ([+-]) (.*);(\s*//.*)?$")
-ADD_TO = re.compile(r"^(\s*)(.*\S) \+= (.*);$")
-# v3_acc(a, b);  spec_acc(a, b);
-ACC = re.compile(r"^(\s*)(v3|spec)_acc\((&?[\w>.-]+), (.*)\);$")
-# sink_add(s, at, d, m);
-SINK = re.compile(r"^(\s*)(sink_add\w*)\((.*)\);$")
-# x_adj(...);  dropped only
-CALL = re.compile(r"^(\s*)(\w+_adj(?:_real)?)\(.*\);$")
-# Float dx = expression;
-DECLARE = re.compile(r"^(\s*)(Float|Spec|Vec3) (d\w*|g\w?|l|weight|both) = ([^,]*(?:\(.*\))?[^,]*);$")
-# return expression;  of an adjoint that returns it
-RETURN = re.compile(r"^(\s*)return (.*);$")
-FLIPPED = {"Float": "({sign}) * ({x})", "Spec": "spec_scale({x}, f_set({sign}))", "Vec3": "v3_scale({x}, f_set({sign}))"}
+# What should kill the mutants of files that begin so: programs with arguments, the quickest first. BOUNDARY: all motions
+# of test_boundary in rooms that begin so, one at a time; {stem}: the kind that a file is named after.
+BOUNDARY = "test_boundary"
+LOCAL = ["test_differences materials.xml", "test_differences shapes.xml", "test_differences layers.xml",
+         "test_differences lights.xml", "test_differences tiles.xml", "test_differences edges.xml"]
+MOVING = ["test_chains chains_sky.xml", "test_chains chains_lens.xml", "test_chains chains_coat.xml", "test_chains chains_bowl.xml",
+          "test_differences moving_ball.xml", "test_differences moving_box.xml", "test_differences moving_disk.xml"]
+MEDIA = ["test_fog", BOUNDARY + " media_", BOUNDARY + " air_", "test_differences fog.xml", "test_differences smoke.xml"]
+EDGES = [BOUNDARY + " boundary_", BOUNDARY + " meeting_", BOUNDARY + " turning_", BOUNDARY + " mirror_", BOUNDARY + " air_"]
+TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_adjoint principledthin"]),
+         ("src/bsdf/", ["test_kinds_adjoint {stem}", "test_kinds_adjoint"] + LOCAL + MOVING[:4]),
+         ("src/math/", ["test_math_leaves", "test_kinds_adjoint"]),
+         ("src/emitter/", ["test_lights"] + LOCAL[3:4] + [BOUNDARY + " boundary_bulb", BOUNDARY + " air_", "test_chains chains_sky.xml"]),
+         ("src/medium/", ["test_phases", "test_media"]),
+         ("src/sensor/", ["test_cameras", "test_chains chains_sky.xml", BOUNDARY + " boundary_view"]),
+         ("src/scene/volume.h", ["test_media", "test_phases", BOUNDARY + " media_"]),
+         ("src/scene/", ["test_kinds_adjoint"] + LOCAL),
+         ("src/shape/normals_adj.c", ["test_normals", BOUNDARY + " boundary_bulb.xml hat"]),
+         ("src/shape/", ["test_moves"] + LOCAL[:2] + ["test_differences tiles.xml"] + MOVING),
+         ("src/integrator/path_adj.h", LOCAL + MOVING + MEDIA[3:]),
+         ("src/integrator/path_move.h", MOVING + EDGES),
+         ("src/integrator/particle_adj.h", ["test_particle_gradients"]),
+         ("src/integrator/boundary/airborne.h", [BOUNDARY + " air_"]),
+         ("src/integrator/boundary/meeting.h", [BOUNDARY + " meeting_"]),
+         ("src/integrator/boundary/facet.h", [BOUNDARY + " turning_"]),
+         ("src/integrator/boundary/turning.h", [BOUNDARY + " turning_"]),
+         ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
+         ("src/integrator/boundary/upstream.h", [BOUNDARY + " mirror_"]),
+         ("src/integrator/boundary/", EDGES),
+         ("src/integrator/", MEDIA)]
 
-# Mutants that change nothing: part of the line, and why.
+# Mutants that change nothing: "file: function: text: kind", as they are printed, and why.
 EQUIVALENT = {}
 
-
-def statements(lines):
-    """The one-line form of the statements inside of functions that carry derivatives: first line, number of lines, text
-    without its comment, and the type that the function returns."""
-    inside, number = None, 0
-    while number < len(lines):
-        line = lines[number]
-        header = FUNCTION.match(line)
-        count = 1
-        if header:
-            while not lines[number + count - 1].rstrip().endswith(("{", ";", "}")):
-                count += 1
-            inside = header[1] if lines[number + count - 1].endswith("{") else None
-        elif line.startswith("}"):
-            inside = None
-        elif inside:
-            text = re.sub(r"\s*//.*", "", line)
-            while text.strip() and not text.endswith((";", "{", "}", ":", "\\")) and not text.lstrip().startswith("#"):
-                text += " " + re.sub(r"\s*//.*", "", lines[number + count]).strip()
-                count += 1
-            if text.endswith(";"):
-                yield number, count, text, inside
-        number += count
+Mutant = collections.namedtuple("Mutant", "file line function text kind site times plus")
+KINDS = {"flip": (-1, 0), "drop": (0, 0), "one": (0, 1)}
 
 
-def arguments_of(text):
-    """What commas outside of brackets separate."""
-    parts, depth = [""], 0
-    for letter in text:
-        depth += (letter in "([") - (letter in ")]")
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return [part.strip() for part in parts]
-
-
-def mutations(text, returns):
-    """Kind and text of the mutated statement; SIGN stands for a factor of 1 or -1."""
-    m = ACCUMULATE.match(text)
-    if m:
-        other = "-" if m[3] == "+" else "+"
-        return [("drop", f"UNUSED({m[4]});"), ("flip", f"{m[2]} = {m[2]} {other} ({m[4]});")]
-    m = ADD_TO.match(text)
-    if m:
-        return [("drop", f"UNUSED({m[3]});"), ("flip", f"{m[2]} -= {m[3]};")]
-    m = ACC.match(text)
-    if m:
-        return [("drop", f"UNUSED({m[4]});"), ("flip", f"{m[2]}_acc({m[3]}, {m[2]}_scale({m[4]}, f_set(-1)));")]
-    m = SINK.match(text)
-    if m:
-        sink, at, d, mask = arguments_of(m[3])
-        return [(kind, f"{m[2]}({sink}, {at}, {factor} * ({d}), {mask});") for kind, factor in (("drop", "0.0f"), ("flip", "-1.0f"))]
-    if CALL.match(text):
-        return [("drop", ";")]
-    m = DECLARE.match(text)
-    if m and not re.search(r", \w+ =", m[4]) and not m[4].endswith(("_zero()", "f_set(0)")):
-        return [("sign", f"{m[2]} {m[3]} = " + FLIPPED[m[2]].format(sign="SIGN", x=m[4]) + ";")]
-    m = RETURN.match(text)
-    if m and returns in FLIPPED and not m[2].endswith("_zero()"):
-        return [("sign", "return " + FLIPPED[returns].format(sign="SIGN", x=m[2]) + ";")]
-    return []
-
-
-def mutants_of(path):
-    """The statements of a file that are mutated: first line, number of lines, text, mutations."""
-    lines = path.read_text().split("\n")
-    for number, count, text, returns in statements(lines):
-        found = mutations(text, returns)
-        if found:
-            yield number, count, text, found
-
-
-def combine(text, numbered):
-    """The statement that is one of its mutants when REY_MUTANT says so."""
-    indent = text[:len(text) - len(text.lstrip())]
-    kind, mutated, number = numbered[0]
-    if kind == "sign":
-        return indent + mutated.replace("SIGN", f"rey_mutant == {number} ? -1.0f : 1.0f")
-    out = indent
-    for _, mutated, number in numbered:
-        out += f"if (rey_mutant == {number}) {{ {mutated} }} else "
-    return out + f"{{ {text.strip()} }}"
-
-
-def instrument(tree):
-    """Writes all mutants into the sources of a tree; returns them as (file, line, kind, statement)."""
-    mutants = []
-    for pattern in FILES:
+def instrument(tree, part):
+    """Writes all mutants of files whose path contains `part` into the sources of a tree, and returns them."""
+    found, number = [], 0
+    source = mutants.Source([path.read_text() for path in sorted(tree.glob("src/**/*.[ch]"))])
+    for pattern, wanted in FILES:
         for path in sorted(tree.glob(pattern)):
-            name = str(path.relative_to(tree))
-            lines = path.read_text().split("\n")
-            for number, count, text, found in reversed(list(mutants_of(path))):
-                numbered = []
-                for kind, mutated in found:
-                    mutants.append((name, number + 1, kind, text.strip()))
-                    numbered.append((kind, mutated, len(mutants)))
-                lines[number:number + count] = [combine(text, numbered)] + [""] * (count - 1)
-            path.write_text("\n".join(lines))
-    with open(tree / "src/base/platform.h", "a") as f:
-        f.write("extern int rey_mutant;\n")
+            name, text, sites = str(path.relative_to(tree)), path.read_text(), []
+            if part not in name:
+                continue
+            for begin, end, type, kinds, function in mutants.sites_of(text, source, wanted)[0]:
+                own = re.sub(r"\s+", " ", text[begin:end])
+                found += [Mutant(name, text.count("\n", 0, begin) + 1, function, own, kind, number, *KINDS[kind]) for kind in kinds]
+                sites.append((begin, end, type, number))
+                number += 1
+            if sites:
+                declared = re.sub(r"^#include|^#pragma once\n", lambda m: m[0] + "extern int rey_times[], rey_plus[];\n"
+                                  if m[0].startswith("#p") else "extern int rey_times[], rey_plus[];\n" + m[0],
+                                  mutants.rewrite(text, sites), count=1, flags=re.M)
+                path.write_text(declared)
     with open(tree / "src/base/context.c", "a") as f:
-        f.write("int rey_mutant;\n__attribute__((constructor)) static void choose(void) {\n"
-                '    const char *text = getenv("REY_MUTANT");\n    rey_mutant = text ? atoi(text) : 0;\n}\n')
-    return mutants
+        f.write(f"#include <stdlib.h>\nint rey_times[{number + 1}], rey_plus[{number + 1}];\n"
+                "__attribute__((constructor)) static void choose(void) {\n    int site, times, plus;\n"
+                f"    for (int i = 0; i < {number}; i++) {{\n        rey_times[i] = 1;\n    }}\n"
+                '    const char *text = getenv("REY_MUTANT");\n'
+                '    if (text && sscanf(text, "%d,%d,%d", &site, &times, &plus) == 3) {\n'
+                "        rey_times[site] = times;\n        rey_plus[site] = plus;\n    }\n}\n")
+    return found
 
 
-def fails(tree, test, arguments, mutant, limit=3600):
-    """Whether a test fails; it is stopped at its first complaint."""
-    process = subprocess.Popen([str(tree / "build/bin" / test), *arguments], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE, text=True, errors="replace",
-                               env=dict(os.environ, REY_MUTANT=str(mutant)))
-    timer = threading.Timer(limit, process.kill)
-    timer.start()
-    try:
-        for line in process.stderr:
-            if line.strip() and not re.match(r"\[(=| +PASSED| +SKIPPED|-| *\w+ *\] *\d+ test)", line.strip()):
-                process.kill()
-                return True
-        return process.wait() != 0
-    finally:
-        timer.cancel()
-        process.kill()
-        process.wait()
-
-
-def killed_by(tree, name, mutant, quick=False):
-    attempts = [(test, []) for test in LEAVES]
-    stem = pathlib.Path(name).stem.replace("_adj", "").replace("_lobes", "")
-    if name.startswith("src/bsdf/") and mutant:
-        attempts.insert(0, ("test_kinds_adjoint", [stem]))
-    if name.startswith(("src/shape/", "src/integrator/")):
-        attempts = []
-    for test, arguments in attempts + [(test, []) for test in RENDERS if not quick]:
-        if fails(tree, test, arguments, mutant):
-            return test
-    return None
-
-
-def prepare(tree, jobs):
-    """Copies, instruments and builds; the mutants, or null when the tests fail without any."""
-    shutil.copytree(ROOT, tree, dirs_exist_ok=True, ignore=shutil.ignore_patterns("build", ".git", "build-*"))
-    mutants = instrument(tree)
-    # Unused numbers are no errors here.
+def narrow(tree):
+    """One width, quickly compiled."""
     cmake = tree / "CMakeLists.txt"
-    cmake.write_text(cmake.read_text().replace(" -Werror", " -w").replace(" -O3 ", " -O1 ").replace("-O2 -g1", "-O1"))
+    text = cmake.read_text().replace("foreach(lanes 1 8 16)", "foreach(lanes 8)").replace("kernel_options -O3", "kernel_options -O1 -w")
+    text = re.sub(r"\$<TARGET_OBJECTS:kernel_w(1|16)>", "", text)
+    cmake.write_text(text)
+    cpu = tree / "src/backend/cpu.c"
+    cpu.write_text(re.sub(r"(\w+)_w(?:1|16)\b", r"\1_w8", cpu.read_text()))
+    for name in ("tests/CMakeLists.txt", "tests/kinds/CMakeLists.txt"):
+        path = tree / name
+        path.write_text(path.read_text().replace("if(REYNOLDS_SANITIZE OR REYNOLDS_TSAN)", "if(TRUE)"))
+
+
+class Runner:
+    """Runs tests on mutants, those first that have killed before, and keeps what no mutant changes."""
+
+    def __init__(self, tree):
+        self.tree, self.kills, self.seconds = tree, collections.Counter(), {}
+        self.keep = tree / "kept"
+        self.keep.mkdir(exist_ok=True)
+        rows = re.findall(r'\{"(\w+\.xml)", "([\w.]+)", (?:SHIFT|TURN|GROW|ADD|SHEAR)', (tree / "tests/render/test_boundary.c").read_text())
+        self.rows = list(dict.fromkeys(rows))
+
+    def commands(self, name):
+        begin, commands = next(row for row in TESTS if name.startswith(row[0]))
+        stem = re.sub(r"_(adj|lobes)$", "", pathlib.Path(name).stem)
+        out = []
+        for command in commands:
+            program, *rest = command.split(" ", 1)
+            if program == BOUNDARY:
+                out += [(program, f"{room} {param}") for room, param in self.rows if f"{room} {param}".startswith(rest[0])]
+            elif (self.tree / "build/bin" / program).exists():
+                out.append((program, *[part.format(stem=stem) for part in rest]))
+        return list(dict.fromkeys(out))
+
+    def fails(self, command, mutant, limit):
+        """Whether a test fails; it is stopped at its first complaint."""
+        changed = f"{mutant.site},{mutant.times},{mutant.plus}" if mutant else ""
+        process = subprocess.Popen([str(self.tree / "build/bin" / command[0]), *command[1:]], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True, errors="replace",
+                                   env=dict(os.environ, REY_MUTANT=changed, REYNOLDS_TEST_KEEP=str(self.keep)))
+        timer = threading.Timer(limit, process.kill)
+        timer.start()
+        try:
+            for line in process.stderr:
+                if line.strip() and not re.match(r"\[(=| +PASSED| +SKIPPED|-| *\w+ *\] *\d+ test)", line.strip()):
+                    process.kill()
+                    return True
+            return process.wait() != 0
+        finally:
+            timer.cancel()
+            process.kill()
+            process.wait()
+
+    def passes_unchanged(self, command):
+        """Whether the test passes without a mutant, which it must; the second run shows how long it takes."""
+        for _ in range(2 if command not in self.seconds else 0):
+            begin = time.monotonic()
+            failed = self.fails(command, None, 1800)
+            self.seconds[command] = None if failed else time.monotonic() - begin
+            if failed:
+                print(f"{' '.join(command)} fails without a mutant and is left out", file=sys.stderr)
+                break
+        return self.seconds[command] is not None
+
+    def killer(self, mutant):
+        order = sorted(self.commands(mutant.file), key=lambda command: -self.kills[mutant.file, command])
+        for command in order:
+            if self.passes_unchanged(command) and self.fails(command, mutant, 20 + 10 * self.seconds[command]):
+                self.kills[mutant.file, command] += 1
+                return " ".join(command)
+        return None
+
+
+def prepare(tree, part):
+    """Copies, instruments and builds; the mutants."""
+    shutil.copytree(ROOT, tree, dirs_exist_ok=True, ignore=shutil.ignore_patterns("build*", ".git", "examples", "bench"))
+    found = instrument(tree, part)
+    narrow(tree)
+    (tree / "mutants.json").write_text(json.dumps(found))
+
+
+def build(tree, jobs):
+    programs = {command.split()[0] for _, commands in TESTS for command in commands}
     subprocess.run(["cmake", "-S", ".", "-B", "build"], cwd=tree, stdout=subprocess.DEVNULL, check=True)
-    result = subprocess.run(["make", "-C", "build", f"-j{jobs}", *LEAVES, *RENDERS], cwd=tree, capture_output=True, text=True)
-    if result.returncode != 0:
-        print(result.stderr[-4000:], file=sys.stderr)
-        return None
-    if killed_by(tree, "", 0):
-        print("the tests must pass before anything is mutated", file=sys.stderr)
-        return None
-    (tree / "mutants.json").write_text(json.dumps(mutants))
-    return mutants
+    targets = subprocess.run(["make", "-C", "build", "help"], cwd=tree, capture_output=True, text=True, check=True).stdout
+    known = sorted(program for program in programs if f"... {program}\n" in targets)
+    subprocess.run(["make", "-C", "build", f"-j{jobs}", *known], cwd=tree, stdout=subprocess.DEVNULL, check=True)
+
+
+def name_of(mutant):
+    return f"{mutant.file}: {mutant.function}: {mutant.text}: {mutant.kind}"
+
+
+def judge(chosen, tree, again):
+    """Prints a verdict on each mutant; how many survive."""
+    runner, path, survivors = Runner(tree), tree / "verdicts.json", 0
+    verdicts = json.loads(path.read_text()) if path.exists() else {}
+    for mutant in chosen:
+        key = f"{mutant.site},{mutant.kind}"
+        if key not in verdicts or (again and not verdicts[key]):
+            verdicts[key] = runner.killer(mutant)
+            path.write_text(json.dumps(verdicts))
+        why = EQUIVALENT.get(name_of(mutant))
+        verdict = f"killed by {verdicts[key]}" if verdicts[key] else f"equivalent: {why}" if why else "SURVIVED"
+        survivors += verdict == "SURVIVED"
+        print(f"{mutant.line}: {name_of(mutant)}: {verdict}", flush=True)
+    return survivors
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--file", default="", help="only files whose path contains this")
     parser.add_argument("--sample", type=int, default=0, help="this many mutants, drawn at random (default: all)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--file", default="", help="only files whose path contains this")
-    parser.add_argument("--part", default="1/1", help="K/N: every N-th mutant from the K-th")
     parser.add_argument("--jobs", type=int, default=2, help="compilers at a time")
-    parser.add_argument("--quick", action="store_true", help="only the tests of leaves, kinds and lights")
-    parser.add_argument("--tree", default="", help="where to build, kept and used again (default: a temporary folder)")
+    parser.add_argument("--tree", default=str(ROOT / "build-mutate"))
+    parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--list", action="store_true", help="print the mutants and stop")
     args = parser.parse_args()
-    tree = pathlib.Path(args.tree or tempfile.mkdtemp(prefix="reynolds_mutants_"))
-    try:
-        if (tree / "mutants.json").exists():
-            mutants = json.loads((tree / "mutants.json").read_text())
-        elif args.list:
-            shutil.copytree(ROOT / "src", tree / "src", dirs_exist_ok=True)
-            mutants = instrument(tree)
-        else:
-            mutants = prepare(tree, args.jobs)
-        if mutants is None:
-            return 1
-        chosen = [(number, *mutant) for number, mutant in enumerate(mutants, 1) if args.file in mutant[0]]
-        if args.sample and args.sample < len(chosen):
-            chosen = random.Random(args.seed).sample(chosen, args.sample)
-        part, parts = map(int, args.part.split("/"))
-        survivors = 0
-        for number, name, line, kind, text in chosen[part - 1::parts]:
-            verdict = ""
-            if not args.list:
-                test = killed_by(tree, name, number, args.quick)
-                known = [why for part_of_line, why in EQUIVALENT.items() if part_of_line in text]
-                verdict = f": killed by {test}" if test else f": equivalent: {known[0]}" if known else ": SURVIVED"
-                survivors += verdict == ": SURVIVED"
-            print(f"{number} {name}:{line}: {kind}: {text}{verdict}", flush=True)
-        print(f"{len(chosen[part - 1::parts])} mutants, {survivors} survived")
-        return 1 if survivors else 0
-    finally:
-        if not args.tree:
-            shutil.rmtree(tree, ignore_errors=True)
+    tree = pathlib.Path(args.tree)
+    if not (tree / "mutants.json").exists():
+        prepare(tree, "")
+    chosen = [mutant for mutant in (Mutant(*row) for row in json.loads((tree / "mutants.json").read_text())) if args.file in mutant.file]
+    total = len(chosen)
+    if args.sample and args.sample < total:
+        chosen = random.Random(args.seed).sample(chosen, args.sample)
+    if args.list:
+        print("\n".join(f"{mutant.line}: {name_of(mutant)}" for mutant in chosen))
+        return 0
+    build(tree, args.jobs)
+    survivors = judge(chosen, tree, args.again)
+    print(f"{len(chosen)} of {total} mutants, {survivors} survived")
+    return 1 if survivors else 0
 
 
 if __name__ == "__main__":
