@@ -7,7 +7,7 @@ import re
 
 TOKEN = re.compile(r"\s+|//[^\n]*|/\*.*?\*/|#(?:[^\n]*\\\n)*[^\n]*|\"(?:\\.|[^\"])*\"|[A-Za-z_]\w*|"
                    r"(?:0x[\da-fA-F.p+-]+|\d*\.?\d+(?:[eE][+-]?\d+)?\.?)[fuUlL]*|->|\+\+|--|<<=?|>>=?|[-+*/|&=!<>]=|&&|\|\||.", re.S)
-HEADER = re.compile(r"^(?:KFN|static(?: inline)?(?: NOINLINE)?|rey_result)(?: const)? ?(\w*) ?\*?(\w+)\(", re.M)
+HEADER = re.compile(r"^(?:KFN|static(?: inline)?(?: NOINLINE)?|rey_result)(?: const)? ?(\w*) ?(\*?)(\w+)\(", re.M)
 STRUCT = re.compile(r"^typedef struct \w* ?\{(.*?)^\} (\w+);", re.M | re.S)
 BINARY = [["||"], ["&&"], ["|"], ["^"], ["&"], ["==", "!="], ["<", ">", "<=", ">="], ["<<", ">>"], ["+", "-"],
           ["*", "/", "%"]]
@@ -30,7 +30,7 @@ class Node:
 
 
 class Source:
-    """Types of the structs' fields and of what functions return, from all sources."""
+    """Types of the structs' fields and of what functions return, from all sources; pointers and arrays end in `*`."""
 
     def __init__(self, texts):
         self.fields, self.returns = {}, {}
@@ -39,10 +39,15 @@ class Source:
                 own = self.fields.setdefault(name, {})
                 for line in re.sub(r"//[^\n]*", "", body).split(";"):
                     m = re.match(r"\s*(?:const )?(\w+) (.*)", line, re.S)
-                    for field in re.findall(r"(\w+)(?:\[[^\]]*\])*\s*(?:,|$)", m[2]) if m else ():
-                        own[field] = m[1]
+                    for stars, field, array in re.findall(r"(\*?)(\w+)(\[)?[^,]*", m[2]) if m else ():
+                        own[field] = m[1] + "*" * (len(stars) + len(array))
             for m in HEADER.finditer(text):
-                self.returns[m[2]] = m[1]
+                self.returns[m[3]] = m[1] + m[2]
+
+
+def pointed(type):
+    """What a pointer or an array of that type holds."""
+    return type[:-1] if type and type.endswith("*") else None
 
 
 class Parser:
@@ -61,7 +66,7 @@ class Parser:
         return self.tokens[self.at - 1]
 
     def member(self, base, name):
-        return self.source.fields.get(base, {}).get(name)
+        return self.source.fields.get((base or "").rstrip("*"), {}).get(name)
 
     def list_until(self, close):
         parts = []
@@ -85,8 +90,9 @@ class Parser:
                 (self.peek() in self.source.fields or self.peek() in MUTABLE or re.match(r"u?int\d+_t|size_t|Int|UInt|Mask|int|bool", self.peek()))
             if cast:
                 type = self.take()[0]
-                while self.take()[0] != ")":
-                    pass
+                while self.peek() != ")":
+                    type += self.take()[0]
+                self.take()
                 if self.peek() == "{":
                     inner = self.list_braced()
                     return Node(begin, inner.end, "list", inner.parts, type)
@@ -106,7 +112,8 @@ class Parser:
         if self.peek() in ("-", "+", "!", "~", "*", "&", "++", "--"):
             text, begin, _ = self.take()
             inner = self.unary()
-            return Node(begin, inner.end, "unary" + text, [inner], inner.type if text in "-+*" else None)
+            type = {"-": inner.type, "+": inner.type, "*": pointed(inner.type)}.get(text)
+            return Node(begin, inner.end, "unary" + text, [inner], type)
         node = self.primary()
         while self.peek() in ("(", "[", ".", "->", "++", "--"):
             text = self.take()[0]
@@ -115,7 +122,7 @@ class Parser:
                 node = Node(node.begin, end, "call", parts, self.source.returns.get(node.name), node.name)
             elif text == "[":
                 self.ternary()
-                node = Node(node.begin, self.take("]")[2], "index", (), node.type)
+                node = Node(node.begin, self.take("]")[2], "index", (), pointed(node.type))
             elif text in ("++", "--"):
                 node = Node(node.begin, self.tokens[self.at - 1][2], "name")
             else:
@@ -164,7 +171,7 @@ class Finder:
     def site(self, node, mutants, type=None):
         type = node.type or type
         if type in MUTABLE and node.kind != "list" and not is_trivial(node):
-            shared = "double" if type == "double" else "Float" if type in NUMBERS else type
+            shared = "Float" if type == "real" else type
             _, own = self.sites.setdefault((node.begin, node.end), (shared, []))
             own += [mutant for mutant in mutants if mutant not in own]
 
@@ -240,14 +247,14 @@ def declarators(parser, type, finder):
     """The rest of a declaration after its type."""
     while parser.peek():
         pointer = False
-        while parser.peek() in ("*", "const"):
+        while parser.peek() in ("*", "const", "RESTRICT"):
             pointer = pointer or parser.take()[0] == "*"
         name, array = parser.take()[0], False
         while parser.peek() == "[":
             array = True
             while parser.take()[0] != "]":
                 pass
-        parser.symbols[name] = type
+        parser.symbols[name] = type + "*" * (pointer + array)
         if parser.peek() == "=":
             parser.take()
             node = parser.list_braced() if parser.peek() == "{" else parser.ternary()
@@ -312,20 +319,20 @@ def functions(text, wanted):
     """(name, begin of the parameters, begin and end of the body) of the functions whose name matches."""
     for m in HEADER.finditer(text):
         brace, semicolon = text.find("{", m.end()), text.find(";", m.end())
-        if brace < 0 or (0 <= semicolon < brace) or not re.fullmatch(wanted, m[2]):
+        if brace < 0 or (0 <= semicolon < brace) or not re.fullmatch(wanted, m[3]):
             continue
         line_end = text.find("\n", brace)
         end = line_end if text[:line_end].endswith("}") else text.find("\n}", brace) + 1
-        yield m[2], m[1], m.end(), brace + 1, end
+        yield m[3], m.end(), brace + 1, end
 
 
 def sites_of(text, source, wanted):
     """The sites of a file's functions, and how many statements could not be read."""
     found, unread = [], 0
-    for name, returns, parameters, begin, end in functions(text, wanted):
+    for name, parameters, begin, end in functions(text, wanted):
         symbols = {}
-        for m in re.finditer(r"(?:const )?(\w+) (?:const )?\*?(\w+)(?:\[\w*\])?(?=,|\)|$)", text[parameters:begin - 1].rstrip(" {")):
-            symbols[m[2]] = m[1]
+        for m in re.finditer(r"(\w+) (?:const )?(\**)(?:const )?(\w+)(\[)?", text[parameters:begin]):
+            symbols[m[3]] = m[1] + m[2] + "*" * bool(m[4])
         finder = Finder()
         statements.braces = 0
         for run in statements(tokens_of(text, begin, end)):
@@ -344,10 +351,9 @@ def wrapped(type, number, opening):
     a, b = f"rey_times[{number}]", f"rey_plus[{number}]"
     if type == "call":
         return f"if ({a}) {{ " if opening else "; }"
-    if type == "double":
-        return f"({a} * (" if opening else f") + {b})"
-    if type == "Float":
-        return f"((real){a} * (" if opening else f") + (real){b})"
+    if type in NUMBERS:
+        own = "real" if type == "Float" else type
+        return f"(({own}){a} * (" if opening else f") + ({own}){b})"
     prefix = "v3" if type == "Vec3" else "spec"
     if opening:
         return f"{prefix}_scale((" if type == "Vec3" else "spec_add(spec_scale(("

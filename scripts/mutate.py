@@ -61,7 +61,9 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/particle_adj.h", ["test_particle_gradients"]),
          ("src/integrator/boundary/airborne.h", [BOUNDARY + " air_"]),
          ("src/integrator/boundary/meeting.h", [BOUNDARY + " meeting_"]),
-         ("src/integrator/boundary/facet.h", [BOUNDARY + " turning_"]),
+         ("src/integrator/boundary/facet.h", ["test_edge_points", BOUNDARY + " turning_"]),
+         ("src/integrator/boundary/edge.h", ["test_edge_points"] + EDGES),
+         ("src/integrator/boundary/view.h", ["test_edge_points"] + EDGES),
          ("src/integrator/boundary/turning.h", [BOUNDARY + " turning_"]),
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/upstream.h", [BOUNDARY + " mirror_"]),
@@ -180,7 +182,7 @@ class Runner:
 
 def prepare(tree, part):
     """Copies, instruments and builds; the mutants."""
-    shutil.copytree(ROOT, tree, dirs_exist_ok=True, ignore=shutil.ignore_patterns("build*", ".git", "examples", "bench"))
+    shutil.copytree(ROOT, tree, dirs_exist_ok=True, ignore=shutil.ignore_patterns("build*", ".git", "bench", "out"))
     found = instrument(tree, part)
     narrow(tree)
     (tree / "mutants.json").write_text(json.dumps(found))
