@@ -175,6 +175,15 @@ class Finder:
             _, own = self.sites.setdefault((node.begin, node.end), (shared, []))
             own += [mutant for mutant in mutants if mutant not in own]
 
+    def grows(self, node):
+        """The terms of x in x = x + e, but for the first one."""
+        for part in node.parts[1:2] if node.kind == "call" else node.parts[1:]:
+            self.term_of_sum(part, node.type)
+            if node.name.endswith("madd"):
+                self.factor_alone(part)
+        for part in node.parts[2:] if node.kind == "call" else ():
+            self.inside(part)
+
     def term(self, node, drop):
         """What stands alone, or is added to something."""
         inner = node
@@ -289,7 +298,10 @@ def statement(tokens, source, symbols, finder):
             if parser.peek() != "=":
                 break
             parser.take()
-        if operator in ("=", "+=", "-=") and left.type in MUTABLE:
+        texts = [[text for text, begin, _ in tokens if part.begin <= begin < part.end] for part in [left] + node.parts[:1]]
+        if operator == "=" and (node.kind == "sum" or node.name in SUMS) and texts[0] == texts[-1]:
+            finder.grows(node)
+        elif operator in ("=", "+=", "-=") and left.type in MUTABLE:
             node.type = node.type or left.type
             finder.term(node, drop=operator != "=")
         else:

@@ -5,17 +5,17 @@ In every function that carries derivatives terms are dropped, signs flipped, and
 (scripts/mutants.py), one at a time. The tests that the table below names must fail for each. All mutants are compiled into
 one copy of the sources, for one SIMD width; the environment variable REY_MUTANT turns one of them on, so that nothing is
 rebuilt between them. Finite differences, which no mutant changes, are kept from run to run.
-Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--again] [--list]
+Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--quick] [--again] [--list]
 The tree (default: build-mutate) keeps build, differences and verdicts: a run goes on where the last one ended; --again
 tries survivors once more. Exit status 1 when a mutant survives that is not listed as equivalent."""
 import argparse
 import collections
+import fnmatch
 import json
 import os
 import pathlib
 import random
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -61,8 +61,8 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/particle_adj.h", ["test_particle_gradients"]),
          ("src/integrator/boundary/airborne.h", [BOUNDARY + " air_"]),
          ("src/integrator/boundary/meeting.h", [BOUNDARY + " meeting_"]),
-         ("src/integrator/boundary/facet.h", ["test_edge_points", BOUNDARY + " turning_"]),
-         ("src/integrator/boundary/edge.h", ["test_edge_points"] + EDGES),
+         ("src/integrator/boundary/facet.h", ["test_edge_curves", BOUNDARY + " turning_"]),
+         ("src/integrator/boundary/edge.h", ["test_edge_points", "test_edge_curves"] + EDGES),
          ("src/integrator/boundary/view.h", ["test_edge_points"] + EDGES),
          ("src/integrator/boundary/turning.h", [BOUNDARY + " turning_"]),
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
@@ -70,60 +70,88 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/boundary/", EDGES),
          ("src/integrator/", MEDIA)]
 
+RENDERS = {BOUNDARY, "test_chains", "test_differences", "test_fog", "test_particle_gradients"}
+
 # Mutants that change nothing: "file: function: text: kind", as they are printed, and why.
 EQUIVALENT = {}
 
-Mutant = collections.namedtuple("Mutant", "file line function text kind site times plus")
+# One of several alike in a function has a number.
+Mutant = collections.namedtuple("Mutant", "file line function text kind number site")
 KINDS = {"flip": (-1, 0), "drop": (0, 0), "one": (0, 1)}
+MOST_SITES = 1000 # of a file
+DECLARED = "extern int rey_times[], rey_plus[];\n"
+CHOOSE = """#include <stdlib.h>
+int rey_times[SIZE], rey_plus[SIZE];
+__attribute__((constructor)) static void choose(void) {
+    int site, times, plus;
+    for (int i = 0; i < SIZE; i++) {
+        rey_times[i] = 1;
+    }
+    const char *text = getenv("REY_MUTANT");
+    if (text && sscanf(text, "%d,%d,%d", &site, &times, &plus) == 3) {
+        rey_times[site] = times;
+        rey_plus[site] = plus;
+    }
+}
+"""
 
 
-def instrument(tree, part):
-    """Writes all mutants of files whose path contains `part` into the sources of a tree, and returns them."""
-    found, number = [], 0
-    source = mutants.Source([path.read_text() for path in sorted(tree.glob("src/**/*.[ch]"))])
+def instrument(files):
+    """Writes all mutants into the sources, texts by name, and returns them."""
+    found, at = [], 0
+    source = mutants.Source(text for name, text in files.items() if name.endswith((".c", ".h")))
     for pattern, wanted in FILES:
-        for path in sorted(tree.glob(pattern)):
-            name, text, sites = str(path.relative_to(tree)), path.read_text(), []
-            if part not in name:
-                continue
-            for begin, end, type, kinds, function in mutants.sites_of(text, source, wanted)[0]:
+        for name in sorted(fnmatch.filter(files, pattern)):
+            text, sites, seen = files[name], [], collections.Counter()
+            for number, (begin, end, type, kinds, function) in enumerate(mutants.sites_of(text, source, wanted)[0], at):
                 own = re.sub(r"\s+", " ", text[begin:end])
-                found += [Mutant(name, text.count("\n", 0, begin) + 1, function, own, kind, number, *KINDS[kind]) for kind in kinds]
+                seen[function, own] += 1
+                line = text.count("\n", 0, begin) + 1
+                found += [Mutant(name, line, function, own, kind, seen[function, own], number) for kind in kinds]
                 sites.append((begin, end, type, number))
-                number += 1
             if sites:
-                declared = re.sub(r"^#include|^#pragma once\n", lambda m: m[0] + "extern int rey_times[], rey_plus[];\n"
-                                  if m[0].startswith("#p") else "extern int rey_times[], rey_plus[];\n" + m[0],
-                                  mutants.rewrite(text, sites), count=1, flags=re.M)
-                path.write_text(declared)
-    with open(tree / "src/base/context.c", "a") as f:
-        f.write(f"#include <stdlib.h>\nint rey_times[{number + 1}], rey_plus[{number + 1}];\n"
-                "__attribute__((constructor)) static void choose(void) {\n    int site, times, plus;\n"
-                f"    for (int i = 0; i < {number}; i++) {{\n        rey_times[i] = 1;\n    }}\n"
-                '    const char *text = getenv("REY_MUTANT");\n'
-                '    if (text && sscanf(text, "%d,%d,%d", &site, &times, &plus) == 3) {\n'
-                "        rey_times[site] = times;\n        rey_plus[site] = plus;\n    }\n}\n")
+                text = re.sub(r"^#(include|pragma once\n)", lambda m: DECLARED + m[0] if m[1] == "include" else m[0] + DECLARED,
+                              mutants.rewrite(text, sites), count=1, flags=re.M)
+            files[name] = text
+            at += MOST_SITES # other files' numbers stay when a file changes
+    files["src/base/context.c"] += CHOOSE.replace("SIZE", str(at))
     return found
 
 
-def narrow(tree):
+def narrow(files):
     """One width, quickly compiled."""
-    cmake = tree / "CMakeLists.txt"
-    text = cmake.read_text().replace("foreach(lanes 1 8 16)", "foreach(lanes 8)").replace("kernel_options -O3", "kernel_options -O1 -w")
-    text = re.sub(r"\$<TARGET_OBJECTS:kernel_w(1|16)>", "", text)
-    cmake.write_text(text)
-    cpu = tree / "src/backend/cpu.c"
-    cpu.write_text(re.sub(r"(\w+)_w(?:1|16)\b", r"\1_w8", cpu.read_text()))
+    text = files["CMakeLists.txt"].replace("foreach(lanes 1 8 16)", "foreach(lanes 8)").replace("kernel_options -O3", "kernel_options -O1 -w")
+    files["CMakeLists.txt"] = re.sub(r"\$<TARGET_OBJECTS:kernel_w(1|16)>", "", text)
+    files["src/backend/cpu.c"] = re.sub(r"(\w+)_w(?:1|16)\b", r"\1_w8", files["src/backend/cpu.c"])
     for name in ("tests/CMakeLists.txt", "tests/kinds/CMakeLists.txt"):
-        path = tree / name
-        path.write_text(path.read_text().replace("if(REYNOLDS_SANITIZE OR REYNOLDS_TSAN)", "if(TRUE)"))
+        files[name] = "add_compile_options(-w)\n" + files[name].replace("if(REYNOLDS_SANITIZE OR REYNOLDS_TSAN)", "if(TRUE)")
+
+
+def prepare(tree):
+    """Writes what differs of the mutated sources; returns the mutants."""
+    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True)
+    files = {name: (ROOT / name).read_bytes().decode("latin-1") for name in listed.stdout.split("\n")[:-1]}
+    found = instrument(files)
+    narrow(files)
+    for name, text in files.items():
+        path, data = tree / name, text.encode("latin-1")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_bytes() != data:
+            path.write_bytes(data)
+    return found
+
+
+def build(tree, jobs):
+    programs = sorted({command.split()[0] for _, commands in TESTS for command in commands})
+    subprocess.run(["cmake", "-S", ".", "-B", "build"], cwd=tree, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(["make", "-C", "build", f"-j{jobs}", *programs], cwd=tree, stdout=subprocess.DEVNULL, check=True)
 
 
 class Runner:
     """Runs tests on mutants, those first that have killed before, and keeps what no mutant changes."""
 
-    def __init__(self, tree):
-        self.tree, self.kills, self.seconds = tree, collections.Counter(), {}
+    def __init__(self, tree, quick):
+        self.tree, self.quick, self.kills, self.seconds = tree, quick, collections.Counter(), {}
         self.keep = tree / "kept"
         self.keep.mkdir(exist_ok=True)
         rows = re.findall(r'\{"(\w+\.xml)", "([\w.]+)", (?:SHIFT|TURN|GROW|ADD|SHEAR)', (tree / "tests/render/test_boundary.c").read_text())
@@ -135,15 +163,17 @@ class Runner:
         out = []
         for command in commands:
             program, *rest = command.split(" ", 1)
+            if self.quick and program in RENDERS:
+                continue
             if program == BOUNDARY:
                 out += [(program, f"{room} {param}") for room, param in self.rows if f"{room} {param}".startswith(rest[0])]
-            elif (self.tree / "build/bin" / program).exists():
+            else:
                 out.append((program, *[part.format(stem=stem) for part in rest]))
         return list(dict.fromkeys(out))
 
     def fails(self, command, mutant, limit):
         """Whether a test fails; it is stopped at its first complaint."""
-        changed = f"{mutant.site},{mutant.times},{mutant.plus}" if mutant else ""
+        changed = "{},{},{}".format(mutant.site, *KINDS[mutant.kind]) if mutant else ""
         process = subprocess.Popen([str(self.tree / "build/bin" / command[0]), *command[1:]], stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE, text=True, errors="replace",
                                    env=dict(os.environ, REY_MUTANT=changed, REYNOLDS_TEST_KEEP=str(self.keep)))
@@ -180,37 +210,24 @@ class Runner:
         return None
 
 
-def prepare(tree, part):
-    """Copies, instruments and builds; the mutants."""
-    shutil.copytree(ROOT, tree, dirs_exist_ok=True, ignore=shutil.ignore_patterns("build*", ".git", "bench", "out"))
-    found = instrument(tree, part)
-    narrow(tree)
-    (tree / "mutants.json").write_text(json.dumps(found))
-
-
-def build(tree, jobs):
-    programs = {command.split()[0] for _, commands in TESTS for command in commands}
-    subprocess.run(["cmake", "-S", ".", "-B", "build"], cwd=tree, stdout=subprocess.DEVNULL, check=True)
-    targets = subprocess.run(["make", "-C", "build", "help"], cwd=tree, capture_output=True, text=True, check=True).stdout
-    known = sorted(program for program in programs if f"... {program}\n" in targets)
-    subprocess.run(["make", "-C", "build", f"-j{jobs}", *known], cwd=tree, stdout=subprocess.DEVNULL, check=True)
-
-
 def name_of(mutant):
-    return f"{mutant.file}: {mutant.function}: {mutant.text}: {mutant.kind}"
+    which = f" ({mutant.number})" if mutant.number > 1 else ""
+    return f"{mutant.file}: {mutant.function}: {mutant.text}{which}: {mutant.kind}"
 
 
-def judge(chosen, tree, again):
+def judge(chosen, tree, quick, again):
     """Prints a verdict on each mutant; how many survive."""
-    runner, path, survivors = Runner(tree), tree / "verdicts.json", 0
+    runner, path, survivors = Runner(tree, quick), tree / "verdicts.json", 0
     verdicts = json.loads(path.read_text()) if path.exists() else {}
     for mutant in chosen:
-        key = f"{mutant.site},{mutant.kind}"
+        key = name_of(mutant)
         if key not in verdicts or (again and not verdicts[key]):
-            verdicts[key] = runner.killer(mutant)
-            path.write_text(json.dumps(verdicts))
-        why = EQUIVALENT.get(name_of(mutant))
-        verdict = f"killed by {verdicts[key]}" if verdicts[key] else f"equivalent: {why}" if why else "SURVIVED"
+            killer = runner.killer(mutant)
+            if killer or not quick:
+                verdicts[key] = killer
+                path.write_text(json.dumps(verdicts))
+        why = EQUIVALENT.get(key)
+        verdict = f"killed by {verdicts[key]}" if verdicts.get(key) else f"equivalent: {why}" if why else "SURVIVED"
         survivors += verdict == "SURVIVED"
         print(f"{mutant.line}: {name_of(mutant)}: {verdict}", flush=True)
     return survivors
@@ -223,13 +240,12 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2, help="compilers at a time")
     parser.add_argument("--tree", default=str(ROOT / "build-mutate"))
+    parser.add_argument("--quick", action="store_true", help="without whole renders")
     parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--list", action="store_true", help="print the mutants and stop")
     args = parser.parse_args()
     tree = pathlib.Path(args.tree)
-    if not (tree / "mutants.json").exists():
-        prepare(tree, "")
-    chosen = [mutant for mutant in (Mutant(*row) for row in json.loads((tree / "mutants.json").read_text())) if args.file in mutant.file]
+    chosen = [mutant for mutant in prepare(tree) if args.file in mutant.file]
     total = len(chosen)
     if args.sample and args.sample < total:
         chosen = random.Random(args.seed).sample(chosen, args.sample)
@@ -237,7 +253,7 @@ def main():
         print("\n".join(f"{mutant.line}: {name_of(mutant)}" for mutant in chosen))
         return 0
     build(tree, args.jobs)
-    survivors = judge(chosen, tree, args.again)
+    survivors = judge(chosen, tree, args.quick, args.again)
     print(f"{len(chosen)} of {total} mutants, {survivors} survived")
     return 1 if survivors else 0
 

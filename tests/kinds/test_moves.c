@@ -327,14 +327,77 @@ static void test_slide(void **state) {
     }
 }
 
+static Vec3 random_vector(uint64_t *random) { return v3(uniform(random), uniform(random), uniform(random)); }
+
+static double frame_worth(const Frame *f, const Frame *d) { return v3_dot(f->s, d->s) + v3_dot(f->t, d->t) + v3_dot(f->n, d->n); }
+
+// The frame that is built on a normal and a tangent, in each of their numbers.
+static void test_frame(void **state) {
+    uint64_t random = 300;
+    (void)state;
+    for (int round = 0; round < 100; round++) {
+        Vec3 v[2] = {v3_normalize(random_vector(&random)), random_vector(&random)}, g[2] = {v3_zero(), v3_zero()};
+        Frame f = frame_from_tangent(v[0], v[1]), d = {random_vector(&random), random_vector(&random), random_vector(&random)};
+        frame_from_tangent_adj(&f, v[1], &d, g, g + 1);
+        for (int i = 0; i < 6; i++) {
+            const double h = 1e-6;
+            double difference = 0, found = (&g[i / 3].x)[i % 3];
+            for (int side = -1; side <= 1; side += 2) {
+                Vec3 w[2] = {v[0], v[1]};
+                (&w[i / 3].x)[i % 3] += side * h;
+                Frame moved = frame_from_tangent(w[0], w[1]);
+                difference += side * frame_worth(&moved, &d) / (2 * h);
+            }
+            if (fabs(found - difference) > 1e-6 * (1 + fabs(difference))) {
+                fail_msg("number %d has derivative %.9g, expected %.9g", i, found, difference);
+            }
+        }
+    }
+}
+
+// The shading frame of a mesh that stands still, in each number of its vertex normals.
+static void test_mesh_frame(void **state) {
+    static World w;
+    uint64_t random = 400;
+    const int32_t normals = NORMALS;
+    (void)state;
+    for (int k = 0; k < 5; k++) {
+        const Case *c = cases + k;
+        for (int round = 0; round < 20; round++) {
+            world_make(&w, c, &random);
+            Hit hit = attached(&w, w.a, w.q);
+            Interaction si = look(&w, &hit);
+            Frame d = {random_vector(&random), random_vector(&random), random_vector(&random)};
+            double gradient[NUMBERS] = {0};
+            Sink sink = {.gradient = gradient, .normals_at = &normals};
+            mesh_interaction_adj(&w.scene, c->flags, &hit, &si, &d, &sink, m_set(true));
+            for (int i = NORMALS; i < UVS; i++) {
+                const double h = 1e-6, start = w.theta[i];
+                double difference = 0;
+                for (int side = -1; side <= 1; side += 2) {
+                    w.theta[i] = start + side * h;
+                    Interaction moved = look(&w, &hit);
+                    difference += side * frame_worth(&moved.sh, &d) / (2 * h);
+                }
+                w.theta[i] = start;
+                if (fabs(gradient[i] - difference) > 1e-6 * (1 + fabs(difference))) {
+                    fail_msg("%s: number %d has derivative %.9g, expected %.9g", c->name, i, gradient[i], difference);
+                }
+            }
+        }
+    }
+}
+
 int main(void) {
     enum { CASES = sizeof cases / sizeof *cases };
-    struct CMUnitTest tests[2 * CASES];
+    struct CMUnitTest tests[2 * CASES + 2];
     static char names[2 * CASES][64];
     for (int i = 0; i < 2 * CASES; i++) {
         void *c = (void *)(uintptr_t)(cases + i / 2);
         snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "slide" : "adjoint", cases[i / 2].name);
         tests[i] = (struct CMUnitTest){names[i], i % 2 ? test_slide : test_adjoint, NULL, NULL, c};
     }
+    tests[2 * CASES] = (struct CMUnitTest)cmocka_unit_test(test_frame);
+    tests[2 * CASES + 1] = (struct CMUnitTest)cmocka_unit_test(test_mesh_frame);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
