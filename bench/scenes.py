@@ -83,9 +83,9 @@ def spheres():
         numbers = {"roughness": 0.1 + 0.2 * row, "metallic": column / 3, "specular": 0.5, "clearcoat": rng.random(),
                    "clearcoat_gloss": rng.random(), "sheen": rng.random(), "anisotropic": 0.8 * rng.random(),
                    "spec_tint": rng.random()}
-        text.append('<shape type="sphere"><point name="center" x="%g" y="%g" z="1"/><float name="radius" value="0.9"/>'
-                    '<bsdf type="principled" id="ball%d"><rgb name="base_color" value="%g, %g, %g"/>%s</bsdf></shape>' % (
-                        2 * column - 3, 2 * row - 3, i, rng.random(), rng.random(), rng.random(),
+        text.append('<shape type="sphere" id="ball%d"><point name="center" x="%g" y="%g" z="1"/><float name="radius" value="0.9"/>'
+                    '<bsdf type="principled"><rgb name="base_color" value="%g, %g, %g"/>%s</bsdf></shape>' % (
+                        i, 2 * column - 3, 2 * row - 3, rng.random(), rng.random(), rng.random(),
                         "".join('<float name="%s" value="%g"/>' % x for x in numbers.items())))
     return "\n".join(text) + SKY_Z
 
@@ -168,7 +168,7 @@ def make(folder):
                     '<ref id="metal"/></shape>', ["metal.alpha.value"]),
         "million": (dict(box, origin="0, 1, -4", target="0, 0, 0", near=0.01), METAL + '<shape type="ply">'
                     '<string name="filename" value="blob1m.ply"/><ref id="metal"/></shape>' + SKY, ["metal.alpha.value"]),
-        "spheres": (board, spheres(), ["ball%d.roughness.value" % i for i in range(16)]),
+        "spheres": (board, spheres(), ["ball%d.bsdf.roughness.value" % i for i in range(16)]),
         "forest": (dict(board, origin="0, -60, 12", target="0, 0, 0"), forest(), ["leaf.reflectance.value"]),
         "cloud": (dict(air, origin="0, 1, -4.5", target="0, 0, 0", near=0.01), CLOUD, ["air.interior_medium.sigma_t.data"]),
         "fog": (dict(air, depth=16), cornell + FOG, ["air.interior_medium.sigma_t.value.value"]),
