@@ -6,6 +6,7 @@
 #include "emitter/emitter.h"
 #include "render/boundary_edges.h"
 #include "render/light_borders.h"
+#include "render/texture_steps.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
 #include "shape/shape.h"
@@ -17,18 +18,6 @@ enum { BOUNDARY_SHARDS = 8, LEAST_SAMPLES = 1024 };
 static rey_result refuse(rey_scene *scene, int term, const char *what) {
     return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                     "the term '%s' does not know %s. --terms interior gives the part without", rey_term_name(term), what);
-}
-
-// Jumps of what the camera sees that no edge explains.
-static bool has_steps(const SceneView *view) {
-    for (int64_t i = 0; i < view->textures_count; i++) {
-        const TextureNode *texture = view->textures + i;
-        if (texture->kind == TEXTURE_CHECKERBOARD || (texture->kind == TEXTURE_ATTRIBUTE && texture->per_face) ||
-            ((texture->kind == TEXTURE_BITMAP || texture->kind == TEXTURE_VOLUME) && texture->filter == FILTER_NEAREST)) {
-            return true;
-        }
-    }
-    return false;
 }
 
 static bool boundary_sees(const SensorRecord *sensor) {
@@ -57,7 +46,7 @@ static bool has_chains(const SceneView *view) {
 }
 
 bool rey_chains_known(const SceneView *view, const SensorRecord *sensor) {
-    if (!boundary_sees(sensor) || view->through || view->has_media || has_steps(view) || !has_chains(view)) {
+    if (!boundary_sees(sensor) || view->through || view->has_media || rey_texture_any_step(view) || !has_chains(view)) {
         return false;
     }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
@@ -100,9 +89,9 @@ static rey_result boundary_check(const Render *r, int term) {
     if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic");
     }
-    if (term == REY_TERM_PRIMARY && has_steps(view)) {
-        return refuse(scene, term, "the jumps of checkerboards, of textures with filter_type=\"nearest\" and of face "
-                                   "attributes, and the scene has one of them");
+    const char *unknown = rey_texture_unknown_step(view, term);
+    if (unknown) {
+        return refuse(scene, term, unknown);
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
@@ -176,7 +165,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
-                              .fans = r->fans.data, .meetings = r->meetings.data, .cdf = plan->cdf,
+                              .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
                               .edge_count = edge_count, .round = plan->job.round,
                               .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};

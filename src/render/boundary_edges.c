@@ -4,6 +4,7 @@
 
 #include "bsdf/table.h"
 #include "render/light_borders.h"
+#include "render/texture_steps.h"
 #include "sensor/kinds.h"
 #include "shape/affine.h"
 #include "shape/shape.h"
@@ -273,6 +274,51 @@ static double see_meeting(const Render *r, const Projection *p, EdgeRecord *e) {
     return see_line(p, ends[0], ends[1], e);
 }
 
+// The world point of a mark's end.
+static void mark_point(const SceneView *view, const EdgeRecord *e, const float uv[2], double p[3]) {
+    const ShapeRecord *shape = view->shapes + e->shape;
+    if (shape->kind == SHAPE_MESH) {
+        const int32_t *corners = view->triangles + 3 * ((int64_t)shape->triangle + e->prim);
+        double q[3][3];
+        for (int k = 0; k < 3; k++) {
+            mesh_point(view, e, corners[k], q[k]);
+        }
+        for (int k = 0; k < 3; k++) {
+            p[k] = q[0][k] + (double)uv[0] * (q[1][k] - q[0][k]) + (double)uv[1] * (q[2][k] - q[0][k]);
+        }
+        return;
+    }
+    const double pi = 3.14159265358979323846;
+    const float *m = view->theta + shape->to_world;
+    bool disk = shape->kind == SHAPE_DISK, sphere = shape->kind == SHAPE_SPHERE;
+    double phi = 2 * pi * (double)uv[disk ? 1 : 0], r = disk ? (double)uv[0] : sphere ? sin(pi * (double)uv[1]) : 1;
+    double x = r * cos(phi), y = r * sin(phi), z = disk ? 0 : sphere ? cos(pi * (double)uv[1]) : (double)uv[1];
+    for (int k = 0; k < 3; k++) {
+        p[k] = (double)m[4 * k] * x + (double)m[4 * k + 1] * y + (double)m[4 * k + 2] * z + (double)m[4 * k + 3];
+    }
+}
+
+static double see_mark(const Render *r, const Projection *p, EdgeRecord *e) {
+    const SceneView *view = &r->scene->view;
+    const float *ends = ARRAY_AT(r->marks, MarkRecord, e->corner).ends;
+    double a[3], b[3], local[2][3], film[2][2];
+    mark_point(view, e, ends, a);
+    mark_point(view, e, ends + 2, b);
+    if (view->shapes[e->shape].kind == SHAPE_MESH) {
+        return see_line(p, a, b, e);
+    }
+    // Beside the straight line between them.
+    to_sensor(p, a, local[0]);
+    to_sensor(p, b, local[1]);
+    const double most = p->high_x - p->low_x + p->high_y - p->low_y;
+    if (local[0][2] < p->near || local[1][2] < p->near) {
+        return local[0][2] < p->near && local[1][2] < p->near ? 0 : most;
+    }
+    to_film(p, local[0], film[0]);
+    to_film(p, local[1], film[1]);
+    return fmin(hypot(film[0][0] - film[1][0], film[0][1] - film[1][1]), most) + 0.01;
+}
+
 // A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
 static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
     const float *m = view->theta + view->shapes[e->shape].to_world;
@@ -407,12 +453,14 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;
-    if (w->kind != BOUNDARY_PRIMARY && turning != (e->kind == EDGE_TERMINATOR)) {
+    if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || e->kind == EDGE_MARK)) {
         return 0;
     }
     switch (e->kind) {
     case EDGE_MEETING:
         return w->kind == BOUNDARY_PRIMARY ? see_meeting(r, &w->projection, e) : meeting_weight(r, e);
+    case EDGE_MARK:
+        return see_mark(r, &w->projection, e);
     case EDGE_TERMINATOR:
         return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
     case EDGE_MESH:
@@ -440,10 +488,23 @@ static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan,
     return result;
 }
 
+static rey_result find_edges(Render *r) {
+    Array steps = {0};
+    rey_result result = rey_texture_steps(r->scene, &steps);
+    if (result == REY_OK) {
+        result = rey_edges_find(r->scene, &steps, &r->edges, &r->fans);
+    }
+    if (result == REY_OK) {
+        result = rey_marks_find(r->scene, &steps, moves_on_film, r, &r->edges, &r->marks);
+    }
+    rey_array_free(r->scene->ctx, &steps);
+    return result;
+}
+
 rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
     const Weigher w = weigher_of(r, kind);
     Array kept = {0}, weights = {0};
-    rey_result result = r->edges.count ? REY_OK : rey_edges_find(r->scene, &r->edges, &r->fans);
+    rey_result result = r->edges.count ? REY_OK : find_edges(r);
     for (size_t i = 0; i < r->edges.count && result == REY_OK; i++) {
         EdgeRecord e = ARRAY_AT(r->edges, EdgeRecord, i);
         double weight = edge_weight(r, &w, &e);

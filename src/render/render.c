@@ -32,6 +32,7 @@ static void render_free(Render *r) {
     rey_array_free(ctx, &r->edges);
     rey_array_free(ctx, &r->fans);
     rey_array_free(ctx, &r->meetings);
+    rey_array_free(ctx, &r->marks);
     rey_free(ctx, r->films);
     rey_free(ctx, r->squares);
     rey_free(ctx, r->coverage);

@@ -1,6 +1,5 @@
 // edges.c: which triangles of a mesh share which edges. Vertices at the same position are one (UV seams are no edges).
-#include "shape/edges.h"
-
+#include "shape/marks.h"
 #include "shape/shape.h"
 
 #include <stdlib.h>
@@ -165,7 +164,38 @@ static rey_result push_edge(rey_scene *scene, Array *edges, EdgeRecord e) {
     return REY_OK;
 }
 
-static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges, Array *fans) {
+// The uv of the ends of an edge as one of the triangles there has them, in the order of the welded vertices.
+static void side_uv(const SceneView *view, const ShapeRecord *shape, const Side *side, double uv[2][2]) {
+    const int32_t *indices = mesh_indices(view, shape), *welded = view->welded + shape->welded;
+    int32_t prim = side->at / 3, corners[2] = {side->at % 3, (side->at % 3 + 1) % 3};
+    for (int k = 0; k < 2; k++) {
+        int32_t vertex = indices[3 * prim + corners[k]];
+        int end = welded[vertex] == side->low ? 0 : 1;
+        for (int c = 0; c < 2; c++) {
+            uv[end][c] = shape->uvs >= 0 ? (double)view->theta[shape->uvs + 2 * (int64_t)vertex + c] : corners[k] == c + 1;
+        }
+    }
+}
+
+// Whether the textures of a shape, whose steps begin at number `first`, jump along an edge.
+static bool texture_jumps(const SceneView *view, const Array *steps, size_t first, const Side *sides, const Around *r) {
+    const int32_t id = first < steps->count ? ARRAY_AT(*steps, TextureStep, first).shape : -1;
+    if (id < 0 || r->count < 2) {
+        return false;
+    }
+    double uv[2][2][2];
+    side_uv(view, view->shapes + id, sides + r->side[0], uv[0]);
+    side_uv(view, view->shapes + id, sides + r->side[1], uv[1]);
+    for (size_t i = first; i < steps->count && ARRAY_AT(*steps, TextureStep, i).shape == id; i++) {
+        int32_t sort = ARRAY_AT(*steps, TextureStep, i).sort;
+        if (sort == STEP_FACES || (sort == STEP_SEAMS && memcmp(uv[0], uv[1], sizeof uv[0]) != 0)) {
+            return true;
+        }
+    }
+    return rey_step_along(steps, first, uv[0][0], uv[0][1]) || rey_step_along(steps, first, uv[1][0], uv[1][1]);
+}
+
+static rey_result mesh_edges(rey_scene *scene, int32_t id, const Array *steps, size_t first, Array *edges, Array *fans) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
     const int32_t n = 3 * shape->triangle_count;
@@ -183,9 +213,11 @@ static rey_result mesh_edges(rey_scene *scene, int32_t id, Array *edges, Array *
             continue;
         }
         Around around = look_around(view, shape, sides + i, next - i);
-        if (!is_flat(&around)) {
+        bool jumps = texture_jumps(view, steps, first, sides + i, &around);
+        if (jumps || !is_flat(&around)) {
             EdgeRecord e;
             result = mesh_edge(scene, id, sides + i, next - i, &around, fans, &e);
+            e.crease = jumps ? EDGE_CREASE : e.crease;
             result = result == REY_OK ? push_edge(scene, edges, e) : result;
         }
     }
@@ -217,16 +249,21 @@ static rey_result curve_edges(rey_scene *scene, int32_t id, int32_t kind, int32_
     return result;
 }
 
-rey_result rey_edges_find(rey_scene *scene, Array *edges, Array *fans) {
+rey_result rey_edges_find(rey_scene *scene, const Array *steps, Array *edges, Array *fans) {
     rey_result result = REY_OK;
+    size_t step = 0;
     for (int32_t id = 0; id < scene->view.shapes_count && result == REY_OK; id++) {
         const ShapeRecord *shape = scene->view.shapes + id;
+        while (step < steps->count && ARRAY_AT(*steps, TextureStep, step).shape < id) {
+            step++;
+        }
+        bool own = step < steps->count && ARRAY_AT(*steps, TextureStep, step).shape == id;
         if (shape->flags & SHAPE_UNSEEN) {
             continue;
         }
         switch (shape->kind) {
         case SHAPE_MESH:
-            result = mesh_edges(scene, id, edges, fans);
+            result = mesh_edges(scene, id, steps, own ? step : steps->count, edges, fans);
             result = result == REY_OK ? mesh_terminators(scene, id, edges) : result;
             break;
         case SHAPE_SPHERE:

@@ -5,8 +5,9 @@
 #include "scene/scene.h"
 
 // EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer; EDGE_TERMINATOR: the curve in
-// a triangle along which its shading normal is at right angles to the viewer; EDGE_MEETING: a MeetingRecord (meetings.h).
-enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TERMINATOR, EDGE_MEETING };
+// a triangle along which its shading normal is at right angles to the viewer; EDGE_MEETING: a MeetingRecord (meetings.h);
+// EDGE_MARK: a MarkRecord (marks.h).
+enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TERMINATOR, EDGE_MEETING, EDGE_MARK };
 enum { EDGE_OPEN = -1 };
 enum { EDGE_NONE = -1, EDGE_ANY = -2 };
 // EDGE_SOFT: only the plane does behind which rays start
@@ -16,7 +17,7 @@ typedef struct EdgeRecord {
     int32_t kind, shape;
     int32_t instance;    // of shapes with SHAPE_INSTANCED, else 0
     int32_t prim, corner; // meshes: it runs from this corner of this triangle to the next one; rims and sides: which, 0 or 1;
-                          // meetings: prim is the record's number, and the shape its first
+                          // meetings: prim is the record's number, and the shape its first; marks: corner is that number
     int32_t opposite;    // meshes: vertex of the other triangle that is not on it, or EDGE_OPEN
     int32_t other;       // meshes: that triangle, EDGE_NONE, or EDGE_ANY triangle of the mesh
     int32_t fan, fan_count; // meshes: where more than two triangles meet, such vertices of the others, in `fans`
@@ -24,6 +25,7 @@ typedef struct EdgeRecord {
     float first, last;   // the part of it that counts, within [0, 1]
 } EdgeRecord;
 
-// Appends the edges of all surfaces to `edges`, an Array of EdgeRecord, and to `fans`, an Array of int32_t. Grids of distances
-// and curves have none yet.
-rey_result rey_edges_find(rey_scene *scene, Array *edges, Array *fans);
+// Appends the edges of all surfaces to `edges`, an Array of EdgeRecord, and to `fans`, an Array of int32_t; also those in a
+// plane along which textures jump: `steps` are TextureSteps (marks.h), sorted by shape. Grids of distances and curves have
+// none yet.
+rey_result rey_edges_find(rey_scene *scene, const Array *steps, Array *edges, Array *fans);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "integrator/job.h"
-#include "shape/edges.h"
+#include "shape/marks.h"
 #include "shape/meetings.h"
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
@@ -24,6 +24,7 @@ typedef struct BoundaryJob {
     const EdgeRecord *edges;
     const int32_t *fans;      // see EdgeRecord
     const MeetingRecord *meetings;
+    const MarkRecord *marks;
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;
     bool round;               // there are outlines of round surfaces among them

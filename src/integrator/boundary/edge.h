@@ -3,6 +3,7 @@
 
 #include "integrator/boundary/boundary_job.h"
 #include "integrator/boundary/facet.h"
+#include "integrator/boundary/mark.h"
 #include "integrator/path_move.h"
 
 // A point x(t) of an edge, attached to its surface.
@@ -259,6 +260,18 @@ static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e,
     out->open = out->open & ~m;
 }
 
+// The line along which a texture jumps, on both sides of which the same surface is seen.
+static void edge_of_mark(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
+    Vec3 tangent;
+    out->hit.prim = i_select(m, EDGE_FIELD(b, e, prim), out->hit.prim);
+    MarkPoint at = mark_at(scene, b, EDGE_FIELD(b, e, corner), t, &out->hit, m, &tangent);
+    out->p = v3_select(m, at.p, out->p);
+    out->tangent = v3_select(m, tangent, out->tangent);
+    out->side[0] = v3_select(m, v3_cross(tangent, v3_cross(at.du, at.dv)), out->side[0]);
+    out->side[1] = v3_select(m, v3_neg(out->side[0]), out->side[1]);
+    out->open = out->open & ~m;
+}
+
 // A point of a random edge; u in the unit square.
 static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob *b, Vec2 u, Vec3 eye, bool parallel) {
     EdgePoint out;
@@ -297,6 +310,10 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     }
     if (m_any(out.meeting)) {
         edge_of_meeting(scene, b, e, t, out.meeting, &out);
+    }
+    Mask mark = mi_eq(kind, i_set(EDGE_MARK));
+    if (m_any(mark)) {
+        edge_of_mark(scene, b, e, t, mark, &out);
     }
     out.round = outline | side;
     out.hit.p = out.p;

@@ -1,0 +1,153 @@
+// texture_steps.c: follows textures and nested scattering functions to find what jumps.
+#include "render/texture_steps.h"
+
+#include "bsdf/table.h"
+#include "emitter/table.h"
+#include "shape/shape.h"
+
+#include <math.h>
+
+static bool jumps_itself(const TextureNode *t) {
+    return t->kind == TEXTURE_CHECKERBOARD || (t->kind == TEXTURE_ATTRIBUTE && t->per_face) ||
+           ((t->kind == TEXTURE_BITMAP || t->kind == TEXTURE_VOLUME) && t->filter == FILTER_NEAREST);
+}
+
+static bool texture_jumps(const SceneView *view, int32_t id) {
+    return id >= 0 && (jumps_itself(view->textures + id) || texture_jumps(view, view->textures[id].child[0]) ||
+                       texture_jumps(view, view->textures[id].child[1]));
+}
+
+bool rey_texture_any_step(const SceneView *view) {
+    for (int64_t i = 0; i < view->textures_count; i++) {
+        if (jumps_itself(view->textures + i)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+const char *rey_texture_unknown_step(const SceneView *view, int term) {
+    // Later vertices are attached to where they are on their surfaces.
+    const bool film = term == REY_TERM_PRIMARY;
+    for (int64_t i = 0; i < view->textures_count && film; i++) {
+        if (view->textures[i].kind == TEXTURE_VOLUME && jumps_itself(view->textures + i)) {
+            return "the jumps of volumes with filter_type=\"nearest\", and the scene has one of them";
+        }
+    }
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        for (int k = 0; k < MAX_SLOTS && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
+            if (texture_jumps(view, view->bsdfs[i].slot[k])) {
+                return "the jumps of opacities, and the scene has one of them";
+            }
+        }
+    }
+    for (int64_t i = 0; i < view->emitters_count && film; i++) {
+        const EmitterRecord *e = view->emitters + i;
+        const EmitterKind *kind = rey_emitter_kinds + e->kind;
+        for (int k = 0; k < kind->param_count && e->shape < 0; k++) {
+            if (kind->params[k].type < EMITTER_PARAM_POSITION && texture_jumps(view, e->slot[k])) {
+                return "the jumps of the textures of lights that are no surfaces, and the scene has one of them";
+            }
+        }
+    }
+    return NULL;
+}
+
+// Which textures of a shape have been met.
+typedef struct Steps {
+    rey_scene *scene;
+    Array *steps;
+    size_t first;
+    int32_t shape;
+    bool varies; // with uv
+} Steps;
+
+static rey_result push_step(Steps *s, TextureStep step) {
+    step.shape = s->shape;
+    for (size_t i = s->first; i < s->steps->count; i++) {
+        const TextureStep *t = &ARRAY_AT(*s->steps, TextureStep, i);
+        if (t->sort == step.sort && t->u == step.u && t->v == step.v && t->offset == step.offset && t->low == step.low &&
+            t->high == step.high) {
+            return REY_OK;
+        }
+    }
+    TextureStep *one = rey_array_push(s->scene->ctx, s->steps, sizeof *one, 1);
+    if (!one) {
+        return REY_ERROR_MEMORY;
+    }
+    *one = step;
+    return REY_OK;
+}
+
+// Lines x' = level / width and y' = level / height, (x', y') = to_uv (x, y). Behind the border of a picture that is clamped
+// nothing jumps.
+static rey_result push_grid(Steps *s, const TextureNode *t, int32_t width, int32_t height, bool clamped) {
+    static const float identity[6] = {1, 0, 0, 0, 1, 0};
+    const float *m = t->to_uv >= 0 ? s->scene->view.theta + t->to_uv : identity;
+    rey_result result = REY_OK;
+    for (int k = 0; k < 2 && result == REY_OK; k++) {
+        double n = k ? height : width;
+        result = push_step(s, (TextureStep){.sort = STEP_LINES, .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
+                                            .offset = n * (double)m[3 * k + 2], .low = clamped ? 1 : -INFINITY,
+                                            .high = clamped ? n - 1 : INFINITY});
+    }
+    return result;
+}
+
+static rey_result add_texture(Steps *s, int32_t id) {
+    if (id < 0) {
+        return REY_OK;
+    }
+    const TextureNode *t = s->scene->view.textures + id;
+    rey_result result = REY_OK;
+    s->varies |= t->kind == TEXTURE_BITMAP || t->kind == TEXTURE_CHECKERBOARD;
+    if (t->kind == TEXTURE_CHECKERBOARD) {
+        result = push_grid(s, t, 2, 2, false);
+    } else if (t->kind == TEXTURE_BITMAP && t->filter == FILTER_NEAREST) {
+        result = push_grid(s, t, t->width, t->height, t->wrap == WRAP_CLAMP);
+    } else if (t->kind == TEXTURE_ATTRIBUTE && t->per_face) {
+        result = push_step(s, (TextureStep){.sort = STEP_FACES});
+    }
+    for (int k = 0; k < 2 && result == REY_OK; k++) {
+        result = add_texture(s, t->child[k]);
+    }
+    return result;
+}
+
+static rey_result add_bsdf(Steps *s, int32_t id) {
+    rey_result result = REY_OK;
+    for (int k = 0; id >= 0 && k < MAX_SLOTS && result == REY_OK; k++) {
+        result = add_texture(s, s->scene->view.bsdfs[id].slot[k]);
+    }
+    for (int k = 0; id >= 0 && k < MAX_CHILDREN && result == REY_OK; k++) {
+        result = add_bsdf(s, s->scene->view.bsdfs[id].child[k]);
+    }
+    return result;
+}
+
+static rey_result add_emitter(Steps *s, int32_t id) {
+    const EmitterRecord *e = s->scene->view.emitters + id;
+    const EmitterKind *kind = id >= 0 ? rey_emitter_kinds + e->kind : NULL;
+    rey_result result = REY_OK;
+    for (int k = 0; kind && k < kind->param_count && result == REY_OK; k++) {
+        result = kind->params[k].type < EMITTER_PARAM_POSITION ? add_texture(s, e->slot[k]) : REY_OK;
+    }
+    return result;
+}
+
+rey_result rey_texture_steps(rey_scene *scene, Array *steps) {
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
+        const ShapeRecord *shape = scene->view.shapes + i;
+        Steps s = {.scene = scene, .steps = steps, .first = steps->count, .shape = i};
+        if (shape->flags & SHAPE_UNSEEN) {
+            continue;
+        }
+        result = add_bsdf(&s, shape->bsdf);
+        result = result == REY_OK ? add_emitter(&s, shape->emitter) : result;
+        if (result == REY_OK && s.varies) {
+            result = push_step(&s, (TextureStep){.sort = STEP_SEAMS});
+        }
+    }
+    return result;
+}
