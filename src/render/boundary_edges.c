@@ -4,107 +4,9 @@
 
 #include "bsdf/table.h"
 #include "render/light_borders.h"
+#include "render/projection.h"
 #include "render/texture_steps.h"
-#include "sensor/kinds.h"
-#include "shape/affine.h"
 #include "shape/shape.h"
-
-typedef struct Projection {
-    double inverse[12];     // of the sensor's pose
-    double scale_x, scale_y, shift_x, shift_y; // pixels per slope, and the centre
-    double low_x, low_y, high_x, high_y;       // what of the film counts [pixels]
-    double near, lens; // lens: no point of it is further from the middle
-    bool parallel, pinhole;
-} Projection;
-
-// Largest entry of a pose's linear part.
-static double pose_size(const float *m) {
-    double size = 0;
-    for (int k = 0; k < 11; k++) {
-        size = k % 4 < 3 ? fmax(size, fabs((double)m[k])) : size;
-    }
-    return size;
-}
-
-static Projection projection_of(const SceneView *view, const FilmPlan *plan) {
-    const SensorRecord *s = plan->sensor;
-    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
-                    .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
-    rey_affine_inverse(view->theta + s->to_world, p.inverse);
-    p.lens = p.pinhole ? 0 : 3 * pose_size(view->theta + s->to_world) * (double)view->theta[s->lens];
-    double tangent = p.parallel ? 1 : tan(0.5 * 3.14159265358979323846 / 180 * (double)view->theta[s->fov]);
-    p.scale_x = -0.5 * s->width / tangent;
-    p.scale_y = -0.5 * s->width / tangent; // pixels are square
-    p.shift_x = s->width * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal]));
-    p.shift_y = s->height * (0.5 - (p.parallel ? 0 : (double)view->theta[s->principal + 1]));
-    p.low_x = plan->x;
-    p.low_y = plan->y;
-    p.high_x = plan->x + plan->width;
-    p.high_y = plan->y + plan->height;
-    return p;
-}
-
-static void to_sensor(const Projection *p, const double *world, double *out) {
-    for (int k = 0; k < 3; k++) {
-        const double *row = p->inverse + 4 * k;
-        out[k] = row[0] * world[0] + row[1] * world[1] + row[2] * world[2] + row[3];
-    }
-}
-
-static void to_film(const Projection *p, const double *local, double *film) {
-    double z = p->parallel ? 1 : local[2];
-    film[0] = p->shift_x + p->scale_x * local[0] / z;
-    film[1] = p->shift_y + p->scale_y * local[1] / z;
-}
-
-// Cuts the range [*s0, *s1] of a line from a to b to low <= coordinate <= high.
-static void clip(double a, double b, double low, double high, double *s0, double *s1) {
-    double d = b - a;
-    if (d == 0) {
-        *s1 = a < low || a > high ? -1 : *s1;
-        return;
-    }
-    double enter = ((d > 0 ? low : high) - a) / d, leave = ((d > 0 ? high : low) - a) / d;
-    *s0 = fmax(*s0, enter);
-    *s1 = fmin(*s1, leave);
-}
-
-// Cuts a straight edge to what the film sees; returns its length there [pixels].
-static double see_line(const Projection *p, const double from[3], const double to[3], EdgeRecord *e) {
-    double a[3], b[3], fa[2], fb[2];
-    to_sensor(p, from, a);
-    to_sensor(p, to, b);
-    double t0 = 0, t1 = 1;
-    clip(a[2], b[2], p->near, INFINITY, &t0, &t1);
-    if (t0 >= t1) {
-        return 0;
-    }
-    double q[2][3];
-    for (int k = 0; k < 3; k++) {
-        q[0][k] = a[k] + t0 * (b[k] - a[k]);
-        q[1][k] = a[k] + t1 * (b[k] - a[k]);
-    }
-    to_film(p, q[0], fa);
-    to_film(p, q[1], fb);
-    double length = hypot(fb[0] - fa[0], fb[1] - fa[1]), s0 = 0, s1 = 1;
-    if (!p->pinhole) {
-        return fmin(length, 4 * (p->high_x - p->low_x)) + 1;
-    }
-    clip(fa[0], fb[0], p->low_x, p->high_x, &s0, &s1);
-    clip(fa[1], fb[1], p->low_y, p->high_y, &s0, &s1);
-    if (s0 >= s1) {
-        return 0;
-    }
-    // Back from the film to the line, which perspective does not divide evenly.
-    double z0 = p->parallel ? 1 : q[0][2], z1 = p->parallel ? 1 : q[1][2], ends[2] = {s0, s1};
-    for (int i = 0; i < 2; i++) {
-        double s = ends[i], t = s * z0 / ((1 - s) * z1 + s * z0);
-        ends[i] = t0 + t * (t1 - t0);
-    }
-    e->first = (float)ends[0];
-    e->last = (float)ends[1];
-    return length * (s1 - s0);
-}
 
 static void instance_point(const SceneView *view, const EdgeRecord *e, double p[3]) {
     const float *m = view->theta + view->instances[e->instance].to_world;
@@ -191,7 +93,7 @@ static double see_mesh_edge(const SceneView *view, const Projection *p, const do
         double angle = e->crease == EDGE_SOFT ? mesh_edge_angle(view, e, &length) : 0;
         part = fmin(1, angle * angle);
     }
-    return part > 0 ? part * see_line(p, a, b, e) : 0;
+    return part > 0 ? part * rey_see_line(p, a, b, e) : 0;
 }
 
 // The normal of a vertex in the world.
@@ -234,9 +136,9 @@ static double see_triangle(const Projection *p, const double world[3][3]) {
     int behind = 0;
     for (int i = 0; i < 3; i++) {
         double local[3];
-        to_sensor(p, world[i], local);
+        rey_to_sensor(p, world[i], local);
         behind += local[2] < p->near;
-        to_film(p, local, film[i]);
+        rey_to_film(p, local, film[i]);
     }
     if (behind) {
         return behind < 3 ? most : 0;
@@ -271,7 +173,7 @@ static double see_meeting(const Render *r, const Projection *p, EdgeRecord *e) {
     for (int k = 0; k < 6; k++) {
         ends[k / 3][k % 3] = (double)m->ends[k];
     }
-    return see_line(p, ends[0], ends[1], e);
+    return rey_see_line(p, ends[0], ends[1], e);
 }
 
 // The world point of a mark's end.
@@ -305,25 +207,25 @@ static double see_mark(const Render *r, const Projection *p, EdgeRecord *e) {
     mark_point(view, e, ends, a);
     mark_point(view, e, ends + 2, b);
     if (view->shapes[e->shape].kind == SHAPE_MESH) {
-        return see_line(p, a, b, e);
+        return rey_see_line(p, a, b, e);
     }
     // Beside the straight line between them.
-    to_sensor(p, a, local[0]);
-    to_sensor(p, b, local[1]);
+    rey_to_sensor(p, a, local[0]);
+    rey_to_sensor(p, b, local[1]);
     const double most = p->high_x - p->low_x + p->high_y - p->low_y;
     if (local[0][2] < p->near || local[1][2] < p->near) {
         return local[0][2] < p->near && local[1][2] < p->near ? 0 : most;
     }
-    to_film(p, local[0], film[0]);
-    to_film(p, local[1], film[1]);
+    rey_to_film(p, local[0], film[0]);
+    rey_to_film(p, local[1], film[1]);
     return fmin(hypot(film[0][0] - film[1][0], film[0][1] - film[1][1]), most) + 0.01;
 }
 
 // A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
 static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
     const float *m = view->theta + view->shapes[e->shape].to_world;
-    double centre[3] = {m[3], m[7], m[11]}, local[3], size = pose_size(m);
-    to_sensor(p, centre, local);
+    double centre[3] = {m[3], m[7], m[11]}, local[3], size = rey_pose_size(m);
+    rey_to_sensor(p, centre, local);
     if (local[2] + 2 * size < p->near) {
         return 0;
     }
@@ -396,7 +298,7 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
 }
 
 static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
-    return 20 * pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
+    return 20 * rey_pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
 }
 
 // World area of a triangle times the largest sine of the angles between its normals.
@@ -435,7 +337,7 @@ typedef struct Weigher {
 static Weigher weigher_of(const Render *r, int32_t kind) {
     const SceneView *view = &r->scene->view;
     const float *m = view->theta + r->plan.sensor->to_world;
-    Weigher w = {projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, kind, r->job.any_camera ? 1 : 0.25};
+    Weigher w = {rey_projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, kind, r->job.any_camera ? 1 : 0.25};
     if (w.projection.parallel) {
         w.eye[0] = m[2], w.eye[1] = m[6], w.eye[2] = m[10], w.eye[3] = 0;
     }
