@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
+#include "render/blame.h"
 #include "render/boundary_edges.h"
 #include "render/light_borders.h"
 #include "render/texture_steps.h"
@@ -11,13 +12,16 @@
 #include "sensor/kinds.h"
 #include "shape/shape.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { BOUNDARY_SHARDS = 8, LEAST_SAMPLES = 1024 };
 
-static rey_result refuse(rey_scene *scene, int term, const char *what) {
+// object: the one of the scene that it is about, null = none.
+static rey_result refuse(rey_scene *scene, int term, const char *what, const char *object) {
     return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the term '%s' does not know %s. --terms interior gives the part without", rey_term_name(term), what);
+                    "the term '%s' does not know %s%s%s%s. --terms interior gives the part without", rey_term_name(term), what,
+                    object ? " ('" : "", object ? object : "", object ? "')" : "");
 }
 
 static bool boundary_sees(const SensorRecord *sensor) {
@@ -45,22 +49,34 @@ static bool has_chains(const SceneView *view) {
     return false;
 }
 
-bool rey_chains_known(const SceneView *view, const SensorRecord *sensor) {
-    if (!boundary_sees(sensor) || view->through || view->has_media || rey_texture_any_step(view) || !has_chains(view)) {
-        return false;
+ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
+    int32_t texture = rey_texture_any_step(view);
+    const char *what = !boundary_sees(sensor) ? "this sensor"
+                       : view->through        ? "the integrator 'volpath'"
+                       : view->has_media      ? "participating media"
+                       : texture >= 0         ? "the jumps of the texture"
+                       : !has_chains(view)    ? "functions that let light pass"
+                                              : NULL;
+    if (what) {
+        bool jumps = boundary_sees(sensor) && !view->through && !view->has_media;
+        return (ChainObstacle){what, -1, -1, jumps ? texture : -1};
     }
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+    for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
         int kind = view->bsdfs[i].kind;
         if (rey_bsdf_opens(kind) || rey_bsdf_turns(kind)) {
-            return false;
+            return (ChainObstacle){rey_bsdf_opens(kind) ? "light that passes undeviated through" : "the normals of", -1, i, -1};
         }
     }
-    for (int64_t i = 0; i < view->shapes_count; i++) {
+    for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
         if (view->shapes[i].flags & SHAPE_HAS_NORMALS) {
-            return false;
+            return (ChainObstacle){"the vertex normals of", i, -1, -1};
         }
     }
-    return true;
+    return (ChainObstacle){NULL, -1, -1, -1};
+}
+
+bool rey_chains_known(const SceneView *view, const SensorRecord *sensor) {
+    return !rey_chains_obstacle(view, sensor).what;
 }
 
 static bool moves_always(const void *user, int32_t shape, int32_t instance) {
@@ -74,11 +90,18 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
 static rey_result check_meetings(rey_scene *scene) {
     Array meetings = {0};
     rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
-    bool any = meetings.count > 0;
+    if (result == REY_OK && meetings.count > 0) {
+        const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, 0);
+        char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a projector's light"};
+        for (int k = 0; k < 2 && m->shape[k] >= 0; k++) {
+            rey_name_shape(scene, m->shape[k], names[k]);
+        }
+        snprintf(text, sizeof text, "the curves along which surfaces pass through each other, as '%s' and '%s' do", names[0],
+                 names[1]);
+        result = refuse(scene, REY_TERM_SPECULAR, text, NULL);
+    }
     rey_array_free(scene->ctx, &meetings);
-    return result == REY_OK && any
-               ? refuse(scene, REY_TERM_SPECULAR, "the curves along which surfaces pass through each other, and the scene has one of them")
-               : result;
+    return result;
 }
 
 // Whether a term of a selection can be computed; records why not.
@@ -86,33 +109,34 @@ static rey_result boundary_check(const Render *r, int term) {
     rey_scene *scene = r->scene;
     const SceneView *view = &scene->view;
     const SensorRecord *sensor = r->plan.sensor;
+    char name[OBJECT_NAME];
     if (!boundary_sees(sensor)) {
-        return refuse(scene, term, "sensors other than perspective, thinlens and orthographic");
+        return refuse(scene, term, "sensors other than perspective, thinlens and orthographic", NULL);
     }
-    const char *unknown = rey_texture_unknown_step(view, term);
+    int32_t jumps;
+    const char *unknown = rey_texture_unknown_step(view, term, &jumps);
     if (unknown) {
-        return refuse(scene, term, unknown);
+        rey_name_texture(scene, jumps, name);
+        return refuse(scene, term, unknown, name);
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
-        if (shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_BSPLINE || shape->kind == SHAPE_LINEAR) {
-            return refuse(scene, term, "the outlines of curves and grids of distances, and the scene has one of them");
-        }
-        if (shape->collection >= 0 && shape->kind != SHAPE_MESH) {
-            return refuse(scene, term, "the outlines of spheres, disks and cylinders in shapegroups, and the scene has one of them");
+        bool curved = shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_BSPLINE || shape->kind == SHAPE_LINEAR;
+        if (curved || (shape->collection >= 0 && shape->kind != SHAPE_MESH)) {
+            rey_name_shape(scene, (int32_t)i, name);
+            return refuse(scene, term, curved ? "the outlines of curves and grids of distances"
+                                              : "the outlines of spheres, disks and cylinders in shapegroups", name);
         }
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
-        if (view->emitters[i].kind == EMITTER_DIRECTIONALAREA) {
-            return refuse(scene, term, "the emitter 'directionalarea', and the scene has one of them");
-        }
-        bool moves = r->job.any_motion;
+        bool directional = view->emitters[i].kind == EMITTER_DIRECTIONALAREA, moves = r->job.any_motion;
         for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
             moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
         }
-        if (moves && rey_light_is_abrupt(view, view->emitters + i)) {
-            return refuse(scene, term, "the border of the light of a spot whose beam_width is its cutoff_angle, and the scene "
-                                       "has one of them");
+        if (directional || (moves && rey_light_is_abrupt(view, view->emitters + i))) {
+            rey_name_emitter(scene, (int32_t)i, name);
+            return refuse(scene, term, directional ? "emitters of the kind 'directionalarea'"
+                                                   : "the border of the light of spots whose beam_width is their cutoff_angle", name);
         }
     }
     return term == REY_TERM_SPECULAR ? check_meetings(scene) : REY_OK;

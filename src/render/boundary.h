@@ -8,6 +8,12 @@
 rey_result rey_boundaries_begin(Render *r);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.
 bool rey_chains_known(const SceneView *view, const SensorRecord *sensor);
+// Why not: null, or words and the object, -1 = none of that sort, that they are followed by.
+typedef struct ChainObstacle {
+    const char *what;
+    int32_t shape, bsdf, texture;
+} ChainObstacle;
+ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor);
 // The term that boundaries of a kind (BOUNDARY_) belong to.
 int rey_boundary_term(int32_t kind);
 void rey_boundary_free(Render *r, BoundaryPlan *plan);

@@ -6,6 +6,8 @@
 #include "shape/normals.h"
 #include "shape/shape.h"
 
+#include <stdio.h>
+
 // Sensors whose rays do not depend on surfaces.
 static bool ray_is_free(const SceneView *view, const SensorRecord *s) {
     if (s->kind != SENSOR_BATCH) {
@@ -19,14 +21,18 @@ static bool ray_is_free(const SceneView *view, const SensorRecord *s) {
     return true;
 }
 
-// Whether all surfaces know how to slide; group: of this shapegroup alone, unless it is -1.
-static bool surfaces_slide(const SceneView *view, int32_t group) {
-    for (int64_t i = 0; i < view->shapes_count; i++) {
+// A surface that does not know how to slide, -1 = all do; group: of this shapegroup alone, unless it is -1.
+static int32_t stuck_surface(const SceneView *view, int32_t group) {
+    for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
         if (!shape_moves(view->shapes[i].kind) && (group < 0 || view->shapes[i].collection == group)) {
-            return false;
+            return i;
         }
     }
-    return true;
+    return -1;
+}
+
+static bool surfaces_slide(const SceneView *view, int32_t group) {
+    return stuck_surface(view, group) < 0;
 }
 
 bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p) {
@@ -41,6 +47,21 @@ bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const 
         return surfaces_slide(view, view->instances[p->instance].group);
     }
     return p->camera >= 0 && sensor->kind != SENSOR_BATCH && surfaces_slide(view, -1);
+}
+
+void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char text[OBJECT_NAME]) {
+    const SceneView *view = &scene->view;
+    int32_t group = p->instance >= 0 ? view->instances[p->instance].group : -1;
+    int32_t stuck = p->geometry >= 0 ? p->geometry : stuck_surface(view, group);
+    char name[OBJECT_NAME];
+    if (!ray_is_free(view, sensor)) {
+        snprintf(text, OBJECT_NAME, "the rays of this sensor begin or end on surfaces");
+    } else if (stuck < 0) {
+        snprintf(text, OBJECT_NAME, "this sensor is a batch of sensors");
+    } else {
+        rey_name_shape(scene, stuck, name);
+        snprintf(text, OBJECT_NAME, "points do not slide over the shape '%.120s' yet", name);
+    }
 }
 
 // Where a sensor keeps one of its numbers.

@@ -1,10 +1,14 @@
 // motion.h: the selected parameters that move surfaces or the sensor.
 #pragma once
 
+#include "render/blame.h"
 #include "render/render_parts.h"
 
 // Whether the kernels know the interior term of a parameter that moves something, as the sensor sees it.
 bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p);
+
+// Why not, in words that name the object.
+void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char text[OBJECT_NAME]);
 
 // Whether the parameter moves nothing but surfaces that light passes undeviated and undimmed: in scenes with media these are
 // where media end, and neither the path's vertices nor what hides light are among them.

@@ -6,19 +6,25 @@
 #include "render/motion.h"
 #include "scene/sink.h"
 
+#include <stdio.h>
 #include <string.h>
 
-// Why a parameter needs a term.
-static const char *term_reason(int bit, const rey_param_info *info) {
-    switch (bit) {
-    case REY_TERM_SPECULAR:
-        return "the scene has smooth mirrors or glass, smooth coats, or surfaces that let a part of the light pass, and the "
-               "edges that are seen in or through them are not found beside vertex normals, textures that jump, surfaces "
-               "that let light pass undeviated, or with this sensor or integrator";
-    case REY_TERM_TERMINATOR:
-        return "the picture jumps where the normals of maps turn away from the viewer";
-    default:
-        return info->why;
+enum { REASON = 3 * OBJECT_NAME };
+
+// Why a parameter needs a term, and what keeps it from being computed.
+static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int bit, const Param *p, char reason[REASON]) {
+    char object[OBJECT_NAME], obstacle[OBJECT_NAME];
+    if (bit == REY_TERM_SPECULAR && rey_name_bender(scene, object)) {
+        rey_name_obstacle(scene, sensor, obstacle);
+        snprintf(reason, REASON, "'%.190s' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the "
+                                 "edges that are seen in or through it are not found because of %s", object, obstacle);
+    } else if (bit == REY_TERM_TERMINATOR) {
+        snprintf(reason, REASON, "the picture jumps where the normals of maps turn away from the viewer");
+    } else if ((p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) && !rey_motion_known(scene, sensor, p)) {
+        rey_motion_obstacle(scene, sensor, p, obstacle);
+        snprintf(reason, REASON, "%s, and %s", p->why, obstacle);
+    } else {
+        snprintf(reason, REASON, "%s", p->why);
     }
 }
 
@@ -120,9 +126,11 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         bool interior = known & REY_TERM_INTERIOR;
         if (missing && !def->terms) {
             int bit = missing & -missing;
+            char reason[REASON];
+            term_reason(scene, scene->view.sensors + def->sensor, bit, p, reason);
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "the gradient of %s needs the term '%s', which does not cover this yet: %s%s", info.name,
-                            rey_term_name(bit), term_reason(bit, &info), interior ? ". --terms interior gives the part that does" : "");
+                            rey_term_name(bit), reason, interior ? ". --terms interior gives the part that does" : "");
         }
         if (missing && !interior) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,

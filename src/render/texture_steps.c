@@ -17,27 +17,29 @@ static bool texture_jumps(const SceneView *view, int32_t id) {
                        texture_jumps(view, view->textures[id].child[1]));
 }
 
-bool rey_texture_any_step(const SceneView *view) {
-    for (int64_t i = 0; i < view->textures_count; i++) {
+int32_t rey_texture_any_step(const SceneView *view) {
+    for (int32_t i = 0; i < (int32_t)view->textures_count; i++) {
         if (jumps_itself(view->textures + i)) {
-            return true;
+            return i;
         }
     }
-    return false;
+    return -1;
 }
 
-const char *rey_texture_unknown_step(const SceneView *view, int term) {
+const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture) {
     // Later vertices are attached to where they are on their surfaces.
     const bool film = term == REY_TERM_PRIMARY;
-    for (int64_t i = 0; i < view->textures_count && film; i++) {
+    for (int32_t i = 0; i < (int32_t)view->textures_count && film; i++) {
         if (view->textures[i].kind == TEXTURE_VOLUME && jumps_itself(view->textures + i)) {
-            return "the jumps of volumes with filter_type=\"nearest\", and the scene has one of them";
+            *texture = i;
+            return "the jumps of volumes with filter_type=\"nearest\"";
         }
     }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
         for (int k = 0; k < MAX_SLOTS && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
-            if (texture_jumps(view, view->bsdfs[i].slot[k])) {
-                return "the jumps of opacities, and the scene has one of them";
+            *texture = view->bsdfs[i].slot[k];
+            if (texture_jumps(view, *texture)) {
+                return "the jumps of opacities";
             }
         }
     }
@@ -45,8 +47,9 @@ const char *rey_texture_unknown_step(const SceneView *view, int term) {
         const EmitterRecord *e = view->emitters + i;
         const EmitterKind *kind = rey_emitter_kinds + e->kind;
         for (int k = 0; k < kind->param_count && e->shape < 0; k++) {
-            if (kind->params[k].type < EMITTER_PARAM_POSITION && texture_jumps(view, e->slot[k])) {
-                return "the jumps of the textures of lights that are no surfaces, and the scene has one of them";
+            *texture = kind->params[k].type < EMITTER_PARAM_POSITION ? e->slot[k] : -1;
+            if (texture_jumps(view, *texture)) {
+                return "the jumps of the textures of lights that are no surfaces";
             }
         }
     }

@@ -5,7 +5,8 @@
 
 // Appends the steps of all surfaces' textures to `steps`, an Array of TextureStep, by shape.
 rey_result rey_texture_steps(rey_scene *scene, Array *steps);
-// Whether any texture jumps.
-bool rey_texture_any_step(const SceneView *view);
-// What of the scene's textures jumps in a way that a boundary term (REY_TERM_) does not know; NULL if nothing does.
-const char *rey_texture_unknown_step(const SceneView *view, int term);
+// A texture that jumps, -1 = there is none.
+int32_t rey_texture_any_step(const SceneView *view);
+// What of the scene's textures jumps in a way that a boundary term (REY_TERM_) does not know, and *texture, one that does; NULL
+// if nothing does.
+const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture);

@@ -65,6 +65,35 @@ static void reasons_are_said_once(void **state) {
     assert_int_equal(count_words(f->out, "the term 'specular' does not know"), 1);
 }
 
+// A refusal names the object that causes it.
+static void refusals_name_objects(void **state) {
+    Fixture *f = *state;
+    static const char head[] =
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective' id='camera'><film type='hdrfilm'><integer "
+        "name='width' value='4'/><integer name='height' value='4'/></film></sensor><emitter type='constant'/>"
+        "<shape type='cube' id='box'/>";
+    static const char *const scenes[][2] = {
+        {"<emitter type='spot' id='torch'><float name='cutoff_angle' value='20'/><float name='beam_width' value='20'/></emitter>",
+         "does not know the border of the light of spots whose beam_width is their cutoff_angle ('torch')"},
+        {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='obj' id='hill'><string name='filename' "
+         "value='hill.obj'/></shape>",
+         "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in or "
+         "through it are not found because of the vertex normals of 'hill'"},
+    };
+    FILE *file = fopen("hill.obj", "w");
+    assert_non_null(file);
+    fputs("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0.1 1\nvn 0.1 0 1\nf 1//1 2//2 3//3\n", file);
+    assert_int_equal(fclose(file), 0);
+    for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; i++) {
+        file = fopen("objects.xml", "w");
+        assert_non_null(file);
+        fprintf(file, "%s%s</scene>", head, scenes[i][0]);
+        assert_int_equal(fclose(file), 0);
+        expect_words(f, 1, "grad objects.xml --param box.to_world:translate=1,0,0 --spp 1", scenes[i][1]);
+    }
+    expect_words(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16", "as 'floor' and 'wall' do");
+}
+
 // Patterns stand for the parameters that move nothing, with an operation for those that it fits.
 static void patterns_choose(void **state) {
     Fixture *f = *state;
@@ -159,6 +188,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unused_objects_are_told),
         cmocka_unit_test(reasons_are_said_once),
+        cmocka_unit_test(refusals_name_objects),
         cmocka_unit_test(patterns_choose),
         cmocka_unit_test(suggestions_are_listed),
         cmocka_unit_test(terms_that_do_not_exist_are_errors),
