@@ -44,20 +44,26 @@ LOCAL = ["test_differences materials.xml", "test_differences shapes.xml", "test_
          "test_differences lights.xml", "test_differences tiles.xml", "test_differences edges.xml"]
 MOVING = ["test_chains chains_sky.xml", "test_chains chains_lens.xml", "test_chains chains_coat.xml", "test_chains chains_bowl.xml",
           "test_differences moving_ball.xml", "test_differences moving_box.xml", "test_differences moving_disk.xml"]
-MEDIA = ["test_fog", BOUNDARY + " media_", BOUNDARY + " air_", "test_differences fog.xml", "test_differences smoke.xml"]
-EDGES = [BOUNDARY + " boundary_", BOUNDARY + " meeting_", BOUNDARY + " turning_", BOUNDARY + " mirror_", BOUNDARY + " air_"]
+MEDIA = ["test_fog", BOUNDARY + " media_box.xml", BOUNDARY + " media_cloud.xml puff.sigma_t", BOUNDARY + " air_beam", BOUNDARY + " media_tiles",
+         "test_differences fog.xml", "test_differences smoke.xml"]
+SEEN = [BOUNDARY + " boundary_lamp.xml ball", BOUNDARY + " boundary_plan", BOUNDARY + " boundary_view.xml camera.to_world",
+        BOUNDARY + " boundary_bulb.xml crate"]
+EDGES = SEEN + [BOUNDARY + " boundary_lamp.xml lamp", BOUNDARY + " boundary_lamp.xml camera.to_world", BOUNDARY + " boundary_bulb.xml bulb",
+                BOUNDARY + " boundary_lamp.xml card", BOUNDARY + " boundary_sky.xml camera", BOUNDARY + " meeting_view.xml crate",
+                BOUNDARY + " meeting_slide.xml ball", BOUNDARY + " meeting_lamp.xml bulb", BOUNDARY + " turning_lamp.xml ball",
+                BOUNDARY + " turning_light.xml ball.positions", BOUNDARY + " mirror_wall", BOUNDARY + " air_beam.xml bulb"]
 TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_adjoint principledthin"]),
          ("src/bsdf/", ["test_kinds_adjoint {stem}", "test_kinds_adjoint"] + LOCAL + MOVING[:4]),
          ("src/math/", ["test_math_leaves", "test_kinds_adjoint"]),
-         ("src/emitter/", ["test_lights"] + LOCAL[3:4] + [BOUNDARY + " boundary_bulb", BOUNDARY + " air_", "test_chains chains_sky.xml"]),
-         ("src/medium/", ["test_phases", "test_media"]),
+         ("src/emitter/", ["test_lights test_adjoints"] + LOCAL[3:4] + [BOUNDARY + " boundary_bulb", BOUNDARY + " air_", "test_chains chains_sky.xml"]),
+         ("src/medium/", ["test_phases test_adjoint", "test_media test_adjoint"]),
          ("src/sensor/", ["test_cameras", "test_chains chains_sky.xml", BOUNDARY + " boundary_view"]),
-         ("src/scene/volume.h", ["test_media", "test_phases", BOUNDARY + " media_"]),
+         ("src/scene/volume.h", ["test_media test_adjoint", "test_phases test_adjoint", BOUNDARY + " media_"]),
          ("src/scene/", ["test_kinds_adjoint"] + LOCAL),
          ("src/shape/normals_adj.c", ["test_normals", BOUNDARY + " boundary_bulb.xml hat"]),
          ("src/shape/", ["test_moves"] + LOCAL[:2] + ["test_differences tiles.xml"] + MOVING),
-         ("src/integrator/path_adj.h", LOCAL + MOVING + MEDIA[3:]),
-         ("src/integrator/path_move.h", MOVING + EDGES),
+         ("src/integrator/path_adj.h", LOCAL[:1] + MOVING[4:6] + LOCAL[3:4] + MOVING[:4] + LOCAL[1:3] + LOCAL[4:] + MEDIA[5:]),
+         ("src/integrator/path_move.h", ["test_places"] + MOVING[:4] + EDGES + MOVING[4:]),
          ("src/integrator/particle_adj.h", ["test_particle_gradients"]),
          ("src/integrator/boundary/airborne.h", [BOUNDARY + " air_"]),
          ("src/integrator/boundary/meeting.h", [BOUNDARY + " meeting_"]),
@@ -68,6 +74,7 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/upstream.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/", EDGES),
+         ("src/integrator/border.h", ["test_places"] + MEDIA),
          ("src/integrator/", MEDIA)]
 
 RENDERS = {BOUNDARY, "test_chains", "test_differences", "test_fog", "test_particle_gradients"}

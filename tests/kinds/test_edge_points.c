@@ -84,6 +84,7 @@ static float round_off(const World *w, Vec3 p) {
 // Into the surface; and beside it the eye sees the surface, all but from the side.
 static void check_inner(const World *w, const EdgePoint *e, Vec3 n, Vec3 view, Vec3 eye, bool parallel) {
     if (w->edges[1].shape == SPHERE) {
+        assert_true(v3_length(v3_sub(e->inner, e->p)) < 0.01f);
         assert_near("angle beside it", v3_dot(round_normal(w, e->inner), view), OUTLINE_TURN, 0.01 * OUTLINE_TURN);
         assert_near("into the surface", v3_dot(v3_normalize(e->side[0]), n), -1, 1e-5);
         return;

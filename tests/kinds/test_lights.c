@@ -275,8 +275,12 @@ static void test_widths(void **state) {
     assert_int_equal(failures, 0);
 }
 
-int main(void) {
+// The name of a test as an argument runs that one only.
+int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sampling), cmocka_unit_test(test_adjoints),
                                        cmocka_unit_test(test_widths)};
+    if (argc > 1) {
+        cmocka_set_test_filter(argv[1]);
+    }
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -256,9 +256,13 @@ static void test_widths(void **state) {
     }
 }
 
-int main(void) {
+// The name of a test as an argument runs that one only.
+int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_lookups), cmocka_unit_test(test_adjoint),
                                        cmocka_unit_test(test_bounds), cmocka_unit_test(test_tracking),
                                        cmocka_unit_test(test_widths)};
+    if (argc > 1) {
+        cmocka_set_test_filter(argv[1]);
+    }
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -407,9 +407,13 @@ static void test_reciprocity(void **state) {
     }
 }
 
-int main(void) {
+// The name of a test as an argument runs that one only.
+int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sampling), cmocka_unit_test(test_adjoint),
                                        cmocka_unit_test(test_widths), cmocka_unit_test(test_values),
                                        cmocka_unit_test(test_reciprocity)};
+    if (argc > 1) {
+        cmocka_set_test_filter(argv[1]);
+    }
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
