@@ -56,9 +56,9 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/bsdf/", ["test_kinds_adjoint {stem}", "test_kinds_adjoint"] + LOCAL + MOVING[:4]),
          ("src/math/", ["test_math_leaves", "test_kinds_adjoint"]),
          ("src/emitter/", ["test_lights test_adjoints"] + LOCAL[3:4] + [BOUNDARY + " boundary_bulb", BOUNDARY + " air_", "test_chains chains_sky.xml"]),
-         ("src/medium/", ["test_phases test_adjoint", "test_media test_adjoint"]),
+         ("src/medium/", ["test_phases test_adjoint", "test_media test_adjoint", "test_volumes_move"]),
          ("src/sensor/", ["test_cameras", "test_chains chains_sky.xml", BOUNDARY + " boundary_view"]),
-         ("src/scene/volume.h", ["test_media test_adjoint", "test_phases test_adjoint", BOUNDARY + " media_"]),
+         ("src/scene/volume.h", ["test_volumes_move", "test_media test_adjoint", "test_phases test_adjoint", BOUNDARY + " media_"]),
          ("src/scene/", ["test_kinds_adjoint"] + LOCAL),
          ("src/shape/normals_adj.c", ["test_normals", BOUNDARY + " boundary_bulb.xml hat"]),
          ("src/shape/", ["test_moves"] + LOCAL[:2] + ["test_differences tiles.xml"] + MOVING),
@@ -224,19 +224,21 @@ def name_of(mutant):
 
 def judge(chosen, tree, quick, again):
     """Prints a verdict on each mutant; how many survive."""
-    runner, path, survivors = Runner(tree, quick), tree / "verdicts.json", 0
-    verdicts = json.loads(path.read_text()) if path.exists() else {}
+    runner, path, survivors = Runner(tree, quick), tree / "verdicts.jsonl", 0
+    path.touch()
+    verdicts = dict(json.loads(line) for line in path.read_text().splitlines())
     for mutant in chosen:
         key = name_of(mutant)
         if key not in verdicts or (again and not verdicts[key]):
             killer = runner.killer(mutant)
             if killer or not quick:
                 verdicts[key] = killer
-                path.write_text(json.dumps(verdicts))
+                with path.open("a") as f:
+                    f.write(json.dumps([key, killer]) + "\n")
         why = EQUIVALENT.get(key)
         verdict = f"killed by {verdicts[key]}" if verdicts.get(key) else f"equivalent: {why}" if why else "SURVIVED"
         survivors += verdict == "SURVIVED"
-        print(f"{mutant.line}: {name_of(mutant)}: {verdict}", flush=True)
+        print(f"{mutant.line}: {key}: {verdict}", flush=True)
     return survivors
 
 

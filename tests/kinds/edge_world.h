@@ -113,6 +113,10 @@ static inline void check_tangent(const World *w, const EdgePoint *e, float u, Ve
     assert_near_v3("hit", e->hit.p, e->p, 0);
 }
 
+static inline Vec3 towards_eye(Vec3 eye, bool parallel, Vec3 p) {
+    return parallel ? v3(-eye.x, -eye.y, -eye.z) : v3(eye.x - p.x, eye.y - p.y, eye.z - p.z);
+}
+
 static inline Vec3 vertex(const World *w, int i) {
     return v3(w->theta[3 * i], w->theta[3 * i + 1], w->theta[3 * i + 2]);
 }

@@ -25,7 +25,7 @@ static void check_facet(const World *w, const Facet *f) {
 
 // The shading normal at u, v along the view.
 static float facing(const Facet *f, Vec3 eye, bool parallel, float u, float v) {
-    return v3_dot(v3_normalize(facet_at(f->n, u, v)), facet_view(eye, parallel, facet_at(f->p, u, v)));
+    return v3_dot(v3_normalize(facet_at(f->n, u, v)), towards_eye(eye, parallel, facet_at(f->p, u, v)));
 }
 
 // Length of the part of the curve in the small triangle with these values at its corners.
@@ -69,7 +69,7 @@ static void check_terminator(const Facet *f, const EdgePoint *e, Vec3 eye, bool 
     assert_near_v3("point", e->p, facet_at(f->p, u, v), 1e-5);
     assert_near("normal along the view", facing(f, eye, parallel, u, v), 0, 2e-4 * view);
     assert_near_v3("normal", e->normal, v3_normalize(facet_at(f->n, u, v)), 1e-5);
-    assert_near_v3("view", e->view, facet_view(eye, parallel, e->p), 1e-5 * view);
+    assert_near_v3("view", e->view, towards_eye(eye, parallel, e->p), 1e-5 * view);
     const Vec3 ways[2] = {v3_normalize(e->tangent), e->rise};
     for (int k = 0; k < 2; k++) { // along the curve it does not change, along the rise by 1
         float size = h / v3_length(ways[k]), du = v3_dot(v3_cross(ways[k], e2), cross) / area2 * size;

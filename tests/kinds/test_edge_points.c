@@ -117,7 +117,7 @@ static void test_outlines(void **state) {
             continue; // an eye in the cylinder
         }
         judged++;
-        Vec3 n = round_normal(&w, e.p), view = v3_normalize(facet_view(eye, parallel, e.p));
+        Vec3 n = round_normal(&w, e.p), view = v3_normalize(towards_eye(eye, parallel, e.p));
         assert_near("distance from the surface", round_off(&w, e.p), 0, 1e-5);
         assert_near("normal along the view", v3_dot(n, view), 0, 1e-5);
         assert_near("distance of the inner point", round_off(&w, e.inner), 0, 1e-5);
