@@ -5,7 +5,7 @@ In every function that carries derivatives terms are dropped, signs flipped, and
 (scripts/mutants.py), one at a time. The tests that the table below names must fail for each. All mutants are compiled into
 one copy of the sources, for one SIMD width; the environment variable REY_MUTANT turns one of them on, so that nothing is
 rebuilt between them. Finite differences, which no mutant changes, are kept from run to run.
-Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--quick] [--again] [--list]
+Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--quick] [--effort SHARE] [--again] [--list]
 The tree (default: build-mutate) keeps build, differences and verdicts: a run goes on where the last one ended; --again
 tries survivors once more. Exit status 1 when a mutant survives that is not listed as equivalent."""
 import argparse
@@ -77,7 +77,8 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/border.h", ["test_places"] + MEDIA),
          ("src/integrator/", MEDIA)]
 
-RENDERS = {BOUNDARY, "test_chains", "test_differences", "test_fog", "test_particle_gradients"}
+COARSE = {BOUNDARY, "test_chains", "test_fog"} # know --effort
+RENDERS = COARSE | {"test_differences", "test_particle_gradients"}
 
 # Mutants that change nothing: "file: function: text: kind", as they are printed, and why.
 EQUIVALENT = {}
@@ -157,8 +158,9 @@ def build(tree, jobs):
 class Runner:
     """Runs tests on mutants, those first that have killed before, and keeps what no mutant changes."""
 
-    def __init__(self, tree, quick):
-        self.tree, self.quick, self.kills, self.seconds = tree, quick, collections.Counter(), {}
+    def __init__(self, tree, quick, effort):
+        self.tree, self.quick, self.effort = tree, quick, effort
+        self.kills, self.seconds = collections.Counter(), {}
         self.keep = tree / "kept"
         self.keep.mkdir(exist_ok=True)
         rows = re.findall(r'\{"(\w+\.xml)", "([\w.]+)", (?:SHIFT|TURN|GROW|ADD|SHEAR)', (tree / "tests/render/test_boundary.c").read_text())
@@ -181,9 +183,11 @@ class Runner:
     def fails(self, command, mutant, limit):
         """Whether a test fails; it is stopped at its first complaint."""
         changed = "{},{},{}".format(mutant.site, *KINDS[mutant.kind]) if mutant else ""
+        environment = dict(os.environ, REY_MUTANT=changed, REYNOLDS_TEST_KEEP=str(self.keep))
+        if command[0] in COARSE:
+            environment["REYNOLDS_TEST_EFFORT"] = str(self.effort)
         process = subprocess.Popen([str(self.tree / "build/bin" / command[0]), *command[1:]], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.PIPE, text=True, errors="replace",
-                                   env=dict(os.environ, REY_MUTANT=changed, REYNOLDS_TEST_KEEP=str(self.keep)))
+                                   stderr=subprocess.PIPE, text=True, errors="replace", env=environment)
         timer = threading.Timer(limit, process.kill)
         timer.start()
         try:
@@ -222,16 +226,16 @@ def name_of(mutant):
     return f"{mutant.file}: {mutant.function}: {mutant.text}{which}: {mutant.kind}"
 
 
-def judge(chosen, tree, quick, again):
+def judge(chosen, tree, runner, again):
     """Prints a verdict on each mutant; how many survive."""
-    runner, path, survivors = Runner(tree, quick), tree / "verdicts.jsonl", 0
+    path, survivors = tree / "verdicts.jsonl", 0
     path.touch()
     verdicts = dict(json.loads(line) for line in path.read_text().splitlines())
     for mutant in chosen:
         key = name_of(mutant)
         if key not in verdicts or (again and not verdicts[key]):
             killer = runner.killer(mutant)
-            if killer or not quick:
+            if killer or not runner.quick:
                 verdicts[key] = killer
                 with path.open("a") as f:
                     f.write(json.dumps([key, killer]) + "\n")
@@ -250,6 +254,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2, help="compilers at a time")
     parser.add_argument("--tree", default=str(ROOT / "build-mutate"))
     parser.add_argument("--quick", action="store_true", help="without whole renders")
+    parser.add_argument("--effort", type=float, default=1, help="share of the usual samples of renders")
     parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--list", action="store_true", help="print the mutants and stop")
     args = parser.parse_args()
@@ -262,7 +267,7 @@ def main():
         print("\n".join(f"{mutant.line}: {name_of(mutant)}" for mutant in chosen))
         return 0
     build(tree, args.jobs)
-    survivors = judge(chosen, tree, args.quick, args.again)
+    survivors = judge(chosen, tree, Runner(tree, args.quick, args.effort), args.again)
     print(f"{len(chosen)} of {total} mutants, {survivors} survived")
     return 1 if survivors else 0
 

@@ -143,7 +143,7 @@ static void quotient(Room room, const Motion *m, int param, const float *start, 
                      double *blocks) {
     static float image[NUMBERS];
     char name[128];
-    snprintf(name, sizeof name, "%s %s %d %g %u", m->room, m->param, (int)m->sort, m->h, seed);
+    snprintf(name, sizeof name, "%s %s %d %g %u %g", m->room, m->param, (int)m->sort, m->h, seed, sample_share());
     if (kept(name, blocks, BLOCKS, false)) {
         return;
     }
@@ -228,7 +228,7 @@ static void test_motion(void **state) {
     assert_true(rms > 0);
     // Differences of where paths collide are noisy, and so are the edges of mirrors.
     const double most = begins_with(m->room, "mirror_") ? 0.25 : in_media ? 0.08 : 0.02;
-    assert_true(sqrt(noise) <= most * rms);
+    assert_true(sqrt(noise * sample_share()) <= most * rms);
     // At 1 % for all motions together [Sidak].
     assert_true(erfc(worst / sqrt(2)) > -expm1(log1p(-0.01) / (BLOCKS * COUNT_OF(motions))));
     assert_true(fabs(sum) / sqrt(BLOCKS) < 3);

@@ -71,7 +71,7 @@ static void subtract_quotient(Room room, const Step *s, int param, const float *
     static float image[NUMBERS];
     double blocks[BLOCKS] = {0};
     char name[128];
-    snprintf(name, sizeof name, "%s %s %g %u", s->room, s->param, s->h, def->seed);
+    snprintf(name, sizeof name, "%s %s %g %u %d", s->room, s->param, s->h, def->seed, def->spp);
     if (!kept(name, blocks, BLOCKS, false)) {
         for (int sign = -1; sign <= 1; sign += 2) {
             float values[POSE];
@@ -129,7 +129,7 @@ static void test_step(void **state) {
     print_message("%s %s: worst z %.2f, sum %.2f, error/rms %.3f%%\n", s->room, s->param, worst, sum / sqrt(BLOCKS),
                   100 * sqrt(noise / rms));
     assert_true(rms > 0);
-    assert_true(noise <= 0.02 * 0.02 * rms);
+    assert_true(noise * sample_share() <= 0.02 * 0.02 * rms);
     assert_true(worst < 5.5 && fabs(sum) / sqrt(BLOCKS) < 3.5); // t with 7 degrees of freedom
     room_close(room);
 }

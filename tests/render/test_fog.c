@@ -59,7 +59,7 @@ static void expect(const Case *c, const char *what, const double *mean, const do
                    double scale) {
     for (int k = 0; k < 3; k++) {
         double off = fabs(mean[k] - expected[k]);
-        if (off > 4 * error[k] + 2e-4 * scale || error[k] > 0.02 * scale) {
+        if (off > 4 * error[k] + 2e-4 * scale || error[k] * sqrt(sample_share()) > 0.02 * scale) {
             fail_msg("%s, %s, channel %d: %.6g +- %.2g, expected %.6g", c->text, what, k, mean[k], error[k], expected[k]);
         }
     }
