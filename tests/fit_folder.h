@@ -22,7 +22,7 @@ static inline Fixture *fixture_make(void) {
         return NULL;
     }
     snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_fit_XXXXXX");
-    return mkdtemp(f->folder) ? f : NULL;
+    return folder_make(f->folder) ? f : NULL;
 }
 
 static inline int tear_down(void **state) {

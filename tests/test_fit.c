@@ -36,7 +36,7 @@ static int set_up(void **state) {
         return 1;
     }
     snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_fit_XXXXXX");
-    if (!mkdtemp(f->folder) || rey_scene_load(f->ctx, TEST_DATA_DIR "/jobs/truth.xml", NULL, 0, &scene)) {
+    if (!folder_make(f->folder) || rey_scene_load(f->ctx, TEST_DATA_DIR "/jobs/truth.xml", NULL, 0, &scene)) {
         return 1;
     }
     snprintf(f->target, sizeof f->target, "%s/target.exr", f->folder);

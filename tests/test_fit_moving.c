@@ -112,7 +112,7 @@ static int set_up(void **state) {
         return 1;
     }
     snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_moving_XXXXXX");
-    if (!mkdtemp(f->folder)) {
+    if (!folder_make(f->folder)) {
         return 1;
     }
     write_ball(f);

@@ -27,7 +27,7 @@ static int set_up(void **state) {
     static Fixture f;
     *state = &f;
     snprintf(f.folder, sizeof f.folder, "/tmp/reynolds_test_file_XXXXXX");
-    return rey_context_create(NULL, &f.ctx) || !mkdtemp(f.folder) || chdir(f.folder);
+    return rey_context_create(NULL, &f.ctx) || !folder_make(f.folder) || chdir(f.folder);
 }
 
 static int tear_down(void **state) {

@@ -36,7 +36,7 @@ static int make_folder(void **state) {
     static const float box[6] = {1, 2, 3, 2, 4, 6}, flat[6] = {1, 2, 3, 1, 4, 6};
     static const float data[8] = {0, 1, 2, 3, 4, 5, 6, 7};
     rey_context *ctx;
-    if (rey_context_create(NULL, &ctx) || !mkdtemp(folder) || chdir(folder)) {
+    if (rey_context_create(NULL, &ctx) || !folder_make(folder) || chdir(folder)) {
         return -1;
     }
     write_vol(ctx, "smoke.vol", 3, 4, 5, 1, box);

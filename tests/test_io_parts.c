@@ -1,4 +1,5 @@
 // test_io_parts.c: an OBJ whose materials have scattering functions of their own.
+#include "folder.h"
 #include "scene/scene.h"
 
 #include <setjmp.h>
@@ -22,7 +23,7 @@ static char folder[64], scene_path[96], object_path[96];
 static int make_files(void **state) {
     (void)state;
     snprintf(folder, sizeof folder, "/tmp/reynolds_parts_XXXXXX");
-    if (!mkdtemp(folder)) {
+    if (!folder_make(folder)) {
         return 1;
     }
     snprintf(scene_path, sizeof scene_path, "%s/scene.xml", folder);

@@ -63,7 +63,7 @@ static void write_scene(int broken) {
 static int make_folder(void **state) {
     UNUSED(state);
     snprintf(folder, sizeof folder, "/tmp/reynolds_load_XXXXXX");
-    return mkdtemp(folder) == NULL;
+    return !folder_make(folder);
 }
 
 static int remove_folder(void **state) {

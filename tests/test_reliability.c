@@ -124,7 +124,7 @@ static int write_scene(void **state) {
     static char text[sizeof scene_text + 8 * sizeof folder];
     size_t used = 0;
     snprintf(folder, sizeof folder, "/tmp/reynolds_reliability_XXXXXX");
-    if (!mkdtemp(folder)) {
+    if (!folder_make(folder)) {
         return 1;
     }
     for (const char *at = scene_text, *next; *at; at = next) {

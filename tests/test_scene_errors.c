@@ -1,4 +1,5 @@
 // test_scene_errors.c: scenes that are wrong, and where and in which words they are refused.
+#include "folder.h"
 #include "reynolds/reynolds.h"
 
 #include <setjmp.h>
@@ -26,7 +27,7 @@ static char folder[64], path[96];
 static int make_folder(void **state) {
     (void)state;
     snprintf(folder, sizeof folder, "/tmp/reynolds_scene_errors_XXXXXX");
-    if (!mkdtemp(folder)) {
+    if (!folder_make(folder)) {
         return 1;
     }
     snprintf(path, sizeof path, "%s/scene.xml", folder);

@@ -1,6 +1,7 @@
 // test_texels.c: bitmaps that lie in 8 or 16 bits until somebody changes them: the same numbers, pictures and gradients to the
 // bit as floats, in less memory.
 #include "base/parallel.h"
+#include "folder.h"
 #include "io/image.h"
 #include "io/pack.h"
 #include "reynolds/reynolds.h"
@@ -25,7 +26,7 @@ static float numbers[NUMBERS];
 static int make_folder(void **state) {
     (void)state;
     snprintf(folder, sizeof folder, "/tmp/reynolds_texels_XXXXXX");
-    return mkdtemp(folder) ? 0 : 1;
+    return !folder_make(folder);
 }
 
 static int remove_folder(void **state) {

@@ -27,7 +27,7 @@ static inline int make_folder(void **state) {
     static Fixture fixture;
     snprintf(fixture.folder, sizeof fixture.folder, "/tmp/reynolds-test-XXXXXX");
     *state = &fixture;
-    return !mkdtemp(fixture.folder) || chdir(fixture.folder);
+    return !folder_make(fixture.folder) || chdir(fixture.folder);
 }
 
 static inline int remove_folder(void **state) {

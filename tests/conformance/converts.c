@@ -102,7 +102,7 @@ void run_converts(Suite *suite) {
     Converts c = {.suite = suite, .root = strlen(suite->folder)};
     const char *folder = getenv("TMPDIR");
     snprintf(c.folder, sizeof c.folder, "%s/reynolds-converts-XXXXXX", folder && folder[0] ? folder : "/tmp");
-    if (!mkdtemp(c.folder)) {
+    if (!folder_make(c.folder)) {
         suite_report(suite, "convert", VERDICT_FAIL, true, "no temporary folder could be made");
         return;
     }

@@ -2,6 +2,7 @@
 // settings, and the numbers of a test's own random sequence.
 #pragma once
 
+#include "../folder.h"
 #include "io/image.h"
 #include "reynolds/reynolds.h"
 
@@ -57,15 +58,18 @@ static inline double picture_value(const Picture *p, int k, double u) {
 
 enum { PICTURES = COUNT_OF(pictures), PATH = 64 };
 
+static char pictures_folder[PATH / 2];
+
 static inline void picture_path(int i, char path[PATH]) {
-    snprintf(path, PATH, "/tmp/reynolds_%s_%ld.exr", pictures[i].name, (long)getpid());
+    snprintf(path, PATH, "%s/%s.exr", pictures_folder, pictures[i].name);
 }
 
 static inline int write_pictures(void **state) {
     UNUSED(state);
-    rey_context *ctx;
+    rey_context *ctx = NULL;
     uint64_t random = 1;
-    rey_result result = rey_context_create(NULL, &ctx);
+    snprintf(pictures_folder, sizeof pictures_folder, "/tmp/reynolds_rooms_XXXXXX");
+    rey_result result = folder_make(pictures_folder) ? rey_context_create(NULL, &ctx) : REY_ERROR_IO;
     for (int i = 0; i < PICTURES && result == REY_OK; i++) {
         const Picture *p = pictures + i;
         float values[128];
@@ -82,12 +86,7 @@ static inline int write_pictures(void **state) {
 
 static inline int remove_pictures(void **state) {
     UNUSED(state);
-    for (int i = 0; i < PICTURES; i++) {
-        char path[PATH];
-        picture_path(i, path);
-        unlink(path);
-    }
-    return 0;
+    return folder_remove(pictures_folder);
 }
 
 // A scene of this folder with those pictures that its text names.

@@ -28,7 +28,7 @@ static int set_up(void **state) {
     }
     snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_film_XXXXXX");
     *state = f;
-    return mkdtemp(f->folder) == NULL;
+    return !folder_make(f->folder);
 }
 
 static int tear_down(void **state) {

@@ -33,7 +33,7 @@ static int set_up(void **state) {
         return 1;
     }
     snprintf(f->folder, sizeof f->folder, "/tmp/reynolds_test_save_XXXXXX");
-    if (!mkdtemp(f->folder)) {
+    if (!folder_make(f->folder)) {
         return 1;
     }
     snprintf(f->texels, sizeof f->texels, "%s/texels.exr", f->folder);

@@ -136,7 +136,7 @@ static void test_saved(void **state) {
     static float before[MOST], after[MOST];
     char folder[] = "/tmp/reynolds_sensors_XXXXXX", path[64];
     rey_scene *again;
-    assert_non_null(mkdtemp(folder));
+    assert_true(folder_make(folder));
     snprintf(path, sizeof path, "%s/saved.xml", folder);
     assert_int_equal(rey_scene_save(f->scene, path), REY_OK);
     if (rey_scene_load(f->ctx, path, NULL, 0, &again)) {

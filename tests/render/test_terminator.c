@@ -67,7 +67,7 @@ static int set_up(void **state) {
     }
     snprintf(s->folder, sizeof s->folder, "/tmp/reynolds_test_terminator_XXXXXX");
     *state = s;
-    return !mkdtemp(s->folder);
+    return !folder_make(s->folder);
 }
 
 static int tear_down(void **state) {
