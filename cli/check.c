@@ -308,8 +308,9 @@ static rey_result work_prepare(Work *w, int64_t largest) {
     w->moved = rey_alloc_array(s->ctx, (size_t)largest, sizeof *w->moved);
     bool good = w->derivative && w->difference && w->rough && w->fresh && w->image && w->adjoint && w->original && w->moved;
     const Options *o = s->options;
-    rey_result result = good ? rey_scene_load(s->ctx, o->files[0], o->defines, o->define_count, &w->displaced)
-                             : REY_ERROR_MEMORY;
+    rey_result (*load)(rey_context *, const char *, const rey_define *, int, rey_scene **) =
+        o->lenient ? rey_scene_load_lenient : rey_scene_load;
+    rey_result result = good ? load(s->ctx, o->files[0], o->defines, o->define_count, &w->displaced) : REY_ERROR_MEMORY;
     return result ? result : cli_load_values(o, s->ctx, w->displaced);
 }
 

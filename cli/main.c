@@ -7,14 +7,14 @@
 #include <string.h>
 
 #define DIRECTION_NOTES                                                                                                \
-    "\nA direction P is NAME[:OP]; several form one joint direction. Names are listed by 'reynolds params'; a * in NAME\n"   \
-    "stands for any text: for the parameters that move nothing, with OP for those that OP fits. OP is one of\n"                                                                                                         \
-    "  add=V                     every entry moves by theta*V (default add=1); V may list the last dimension\n"        \
-    "  translate=x,y,z           positions or to_world, in the world\n"                                                \
-    "  local_translate=x,y,z     to_world, in the object's own frame\n"                                                \
+    "\nA direction P is NAME[:OP]. Names are listed by 'reynolds params'; a * in NAME stands for any text: for the\n"  \
+    "parameters that move nothing, with OP for those that OP fits. OP is one of\n"                                     \
+    "  add=V                       every entry moves by theta*V (default add=1); V may list the last dimension\n"      \
+    "  translate=x,y,z             positions or to_world, in the world\n"                                              \
+    "  local_translate=x,y,z       to_world, in the object's own frame\n"                                              \
     "  rotate=ax,ay,az[@cx,cy,cz]  theta in degrees, about an axis through a centre\n"                                 \
-    "  scale=S[@cx,cy,cz]        positions or to_world, about a centre\n"                                              \
-    "  file=TANGENT.npy          a tangent of the parameter's size\n"
+    "  scale=S[@cx,cy,cz]          positions or to_world, about a centre\n"                                            \
+    "  file=TANGENT.npy            a tangent of the parameter's size\n"
 
 typedef struct CommandRow {
     const char *name;
@@ -34,7 +34,7 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "\nForward mode writes the derivative image along the direction; its value is the mean over pixels and\n"
          "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
          "for\n"
-         "each parameter, and gradient.json, into the folder -o.\n" DIRECTION_NOTES},
+         "each parameter, and gradient.json, into the folder -o. Several P form one joint direction.\n" DIRECTION_NOTES},
     [COMMAND_CHECK] = {"check", cli_check, "SCENE --param P [--param P]... | --all [options]",
                        "compare gradients with correlated finite differences",
                        "\nEach P is checked by itself, in blocks of the image. Where nothing moves, differences are taken along the\n"
@@ -49,9 +49,10 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
         {"convert", cli_convert, "IN OUT.xml [options]", "write a scene back, with its meshes and images",
          "\nOUT.xml renders the same bits as IN. It is of the current version of the format, needs no define, include "
          "or\nsearch path, and its files lie in the folder OUT_data beside it.\n"},
-    [COMMAND_COMPARE] = {"compare", cli_compare, "A.exr B.exr [--json]",
+    [COMMAND_COMPARE] = {"compare", cli_compare, "A B [--json]",
                          "differences between two images; B is the reference",
-                         "\npsnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
+                         "\nPictures are EXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY files.\n"
+                         "psnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
                          "either are left out and counted, and make the exit status 1.\n"},
     [COMMAND_DOCTOR] = {"doctor", cli_doctor, "[options]", "examine this machine and this build", ""},
 };

@@ -67,6 +67,7 @@ static void lenient_reading_lists_what_it_leaves_out(void **state) {
     }
     expect(f, 1, "info broken.xml");
     assert_non_null(strstr(f->words, "stokes"));
+    expect(f, 0, "check broken.xml --lenient --param kept.reflectance.value --spp 16"); // which reads it twice
     expect(f, 0, "render mended.xml --spp 2 -o b.npy");
     assert_int_equal(system("cmp -s a.npy b.npy"), 0);
     expect(f, 0, "params mended.xml");
