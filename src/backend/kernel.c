@@ -139,7 +139,7 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         if (t->job->mode == MODE_REPLAY) {
             path_replay(t);
         } else {
-            path_backward(t);
+            path_backward(t, count);
         }
     }
     if (t->job->mode != MODE_REVERSE) {

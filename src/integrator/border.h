@@ -8,6 +8,7 @@
 // surface's. What is scattered is found by a path of its own, at one border of each path.
 #pragma once
 
+#include "integrator/glide.h"
 #include "integrator/probe.h"
 #include "shape/move.h"
 
@@ -96,6 +97,9 @@ static NOINLINE void face_adj(const SceneView *scene, const VolumeNode *v, const
                               Sink *sink) {
     const bool box = medium_fills_box(v);
     const int32_t at = sink->volume_at[v - scene->volumes];
+    if (at < 0) {
+        return;
+    }
     Vec3 q = volume_to_local(scene, v, p, 1), way = volume_to_local(scene, v, d, 0);
     const Float along[3] = {box ? d.x : way.x, box ? d.y : way.y, box ? d.z : way.z};
     Vec3 dq = v3_zero();
@@ -146,7 +150,8 @@ KFN bool box_is_live(const Tracer *t, int32_t medium) {
 
 // Whether the surfaces of a batch are borders that move.
 KFN bool border_is_live(const Tracer *t, const RecordBatch *batch) {
-    return batch->tag == VERTEX_SURFACE && t->job->any_borders && (t->job->live[batch->group] & LIVE_MOTION);
+    bool moves = t->job->any_borders && (t->job->live[batch->group] & LIVE_MOTION);
+    return batch->tag == VERTEX_SURFACE && (moves || t->job->glides);
 }
 
 // Offers points of the records from `at` on to the paths' reservoirs, each with the medium that it is in.
@@ -248,8 +253,18 @@ static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffi
         Float dx = spec_dot(spec_mul(slot_adjoint(t, s.slot, c), s.beta), jump);
         SurfaceAdj d = surface_adj_zero();
         d.p = v3_scale(s.si.ng, f_zero_unless(m, dx * s.rcp));
-        shape_move_adj(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit, &s.si, &d, sink, m);
+        if (t->job->live[batch->group] & LIVE_MOTION) {
+            shape_move_adj(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit, &s.si, &d, sink, m);
+        }
+        if (t->job->glides) {
+            Glide g = glide_load(t, c, s.slot, glide_reference(t, s.slot, s.hit.p), s.d);
+            glide_add(&g, s.hit.p, v3_neg(d.p), m);
+            glide_store(t, &g, c, s.slot, m);
+        }
         forward_flush(t, sink, s.slot, c, m);
+    }
+    if (t->job->glides) {
+        glide_refer(t, s.slot, glide_reference(t, s.slot, s.hit.p), m);
     }
 }
 
@@ -318,9 +333,18 @@ static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, S
         Spec delta = spec_mul(slot_adjoint(t, b.slot, c), b.beta);
         for (int k = 0; k < 2; k++) {
             Float dx = f_zero_unless(b.face[k].m, spec_dot(delta, gain[k]));
-            face_adj(t->scene, b.sigma_t, b.face + k, b.p[k], b.d, k ? dx : -dx, sink);
+            dx = k ? dx : -dx;
+            face_adj(t->scene, b.sigma_t, b.face + k, b.p[k], b.d, dx, sink);
+            if (t->job->glides) {
+                Glide g = glide_load(t, c, b.slot, glide_reference(t, b.slot, b.o), b.d);
+                glide_add(&g, b.p[k], v3_neg(face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx)), b.face[k].m);
+                glide_store(t, &g, c, b.slot, b.face[k].m);
+            }
         }
         forward_flush(t, sink, b.slot, c, b.m);
+    }
+    if (t->job->glides) {
+        glide_refer(t, b.slot, glide_reference(t, b.slot, b.o), b.face[0].m | b.face[1].m);
     }
 }
 

@@ -47,52 +47,73 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     return s;
 }
 
-static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int32_t live, Spec delta, Sink *sink) {
+// g: the ray that the collision ended; null unless it glides.
+static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int32_t live, Spec delta, Glide *g, Sink *sink) {
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, s->beta);
     Spec lit = spec_zero_unless(s->connected, spec_mul(worth, s->lit)), onward = spec_mul(worth, s->onward);
     LightMove move = light_move_zero();
+    Vec3 dwi = v3_zero(), dwo = v3_zero();
+    const bool moves = sink->any_places || g;
     if (t->job->live_lights && m_any(s->connected)) {
         Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
         lights_adj(scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
-                   spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), sink->any_places ? &move : NULL, sink);
+                   spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), moves ? &move : NULL, sink);
     }
-    if (sink->any_places && m_any(s->connected)) {
-        Vec3 unused = v3_zero();
-        phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &unused, &move.d);
+    if (moves && m_any(s->connected)) {
+        phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
         lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
     }
     if (live & LIVE_ALBEDO) {
         const VolumeNode *albedo = scene->volumes + s->at.medium->albedo;
         Spec d = spec_add(spec_scale(lit, s->light_phase), spec_scale(onward, s->phase));
         volume_world_adj(scene, albedo, s->hit.p, spec_zero_unless(s->m, d), sink, s->m);
+        if (g) {
+            glide_look(scene, g, albedo, s->hit.p, d, s->m);
+        }
     }
     if (live & LIVE_PHASE) {
-        Vec3 dwi = v3_zero(), dwo = v3_zero();
-        if (!sink->any_places) {
+        if (!moves) {
             phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &dwo);
         }
         phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), sink, s->scattered, &dwi, &dwo);
+    }
+    if (g) {
+        glide_add(g, s->hit.p, move.ref, s->connected);
+        g->turn = v3_select(s->m, v3_neg(dwi), v3_zero());
     }
 }
 
 static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
                             Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
-    if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing) {
+    const bool glides = t->job->glides;
+    if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing && !glides) {
         return;
     }
     Walk walk;
     CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
-        collision_adj(t, &s, live, delta, sink);
+        // Where it goes on, its direction stays: the ray ahead is dragged along as a whole.
+        Glide g = {.ref = s.hit.p, .d = s.at.wi};
+        if (glides) {
+            g.position = rows_gather(&t->ws.drag, c, slot);
+        }
+        collision_adj(t, &s, live, delta, glides ? &g : NULL, sink);
         if (live_passing) {
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
-            connection_passage_adj(t, &walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p, s.light,
-                                   s.connected, s.light_d, s.light_distance, sink);
+            Vec3 dp = connection_passage_adj(t, &walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p,
+                                             s.light, s.connected, s.light_d, s.light_distance, sink);
+            g.position = v3_add(g.position, dp);
         }
         forward_flush(t, sink, slot, c, s.m);
+        if (glides) {
+            glide_store(t, &g, c, slot, finite);
+        }
+    }
+    if (glides) {
+        glide_refer(t, slot, s.hit.p, finite);
     }
 }

@@ -84,7 +84,18 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     return a;
 }
 
-static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Sink *sink) {
+// Accumulates the adjoint d of the extinction at a distance along the flight.
+KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
+    const SceneView *scene = t->scene;
+    Vec3 p = v3_madd(a->f.o, at, a->f.d);
+    extinction_adj(scene, a->medium, p, d, sink, m);
+    if (g) {
+        glide_look(scene, g, scene->volumes + a->medium->sigma_t, p, spec_scale(d, f_set((real)scene->theta[a->medium->scale])), m);
+    }
+}
+
+// g: null unless the ray glides.
+static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Glide *g, Sink *sink) {
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, a->f.beta);
     const Mask m = a->f.m;
@@ -93,17 +104,21 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
         for (int k = 0; k < FLIGHT_POINTS; k++) {
             Spec behind = spec_zero_unless(m_lt(a->point[k], a->emission_at), a->emission);
             Spec lost = spec_scale(spec_mul(worth, spec_add(a->onward, behind)), -each);
-            extinction_adj(scene, a->medium, v3_madd(a->f.o, a->point[k], a->f.d), lost, sink, m);
+            flight_point_adj(t, a, a->point[k], lost, g, sink, m);
         }
-        extinction_adj(scene, a->medium, v3_madd(a->f.o, a->end, a->f.d), spec_mul(worth, a->hit), sink, a->collided);
+        flight_point_adj(t, a, a->end, spec_mul(worth, a->hit), g, sink, a->collided);
         if (m_any(a->probed)) {
-            extinction_adj(scene, a->medium, v3_madd(a->f.o, a->f.probe, a->f.d), spec_mul(worth, a->gain), sink, a->probed);
+            flight_point_adj(t, a, a->f.probe, spec_mul(worth, a->gain), g, sink, a->probed);
         }
     }
     if (live & LIVE_GLOW) {
         const VolumeNode *emission = scene->volumes + a->medium->emission;
         Vec3 p = v3_madd(a->f.o, a->emission_at, a->f.d);
-        volume_world_adj(scene, emission, p, spec_zero_unless(m, spec_mul(worth, a->emission_weight)), sink, m);
+        Spec d = spec_zero_unless(m, spec_mul(worth, a->emission_weight));
+        volume_world_adj(scene, emission, p, d, sink, m);
+        if (g) {
+            glide_look(scene, g, emission, p, d, m);
+        }
     }
 }
 
@@ -116,9 +131,21 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
     a.f.m = a.f.m & finite;
     a.probed = a.probed & finite;
     a.collided = a.collided & finite;
+    const bool glides = t->job->glides;
+    Vec3 ref = glides ? glide_reference(t, slot, a.f.o) : a.f.o;
     for (int c = 0; c < drives(t); c++) {
-        flight_adj(t, &a, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), sink);
+        Glide g = {.ref = ref};
+        if (glides) {
+            g = glide_load(t, c, slot, ref, a.f.d);
+        }
+        flight_adj(t, &a, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), glides ? &g : NULL, sink);
         forward_flush(t, sink, slot, c, finite);
+        if (glides) {
+            glide_store(t, &g, c, slot, a.f.m);
+        }
+    }
+    if (glides) {
+        glide_refer(t, slot, ref, a.f.m);
     }
     if (live & LIVE_BORDER) {
         border_box_sweep(t, batch, a.onward, a.emission, finite, sink);

@@ -36,6 +36,7 @@ typedef struct PathJob {
     const int32_t *points_at, *pose_at, *instance_at, *camera_at, *volume_at;
     bool any_normals, any_attributes, any_places, any_motion, any_camera;
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
+    bool glides;                  // the camera moves, and paths with it (glide.h)
     const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
     bool live_extinctions;        // that of some medium depends on the selection
     bool live_borders;            // so does where some medium begins and ends

@@ -11,6 +11,7 @@
 // Adjoint of a shadow ray's direction and length; from: where its vertex lies; points: lanes whose light lies at a point and moves.
 typedef struct Turn {
     Vec3 from, d;
+    Vec3 shift;    // of all points alike
     Float distance;
     Mask points;
 } Turn;
@@ -50,6 +51,7 @@ static NOINLINE void passed_surfaces_adj(const Tracer *t, const Walk *walk, int3
         if (turn) {
             Float far = f_zero_unless(m, v3_dot(v3_sub(hit.p, turn->from), walk->d));
             turn->d = v3_madd(turn->d, -far, d.p);
+            turn->shift = v3_sub(turn->shift, d.p);
         }
     }
 }
@@ -77,7 +79,9 @@ static NOINLINE void passed_boxes_adj(const Tracer *t, const Walk *walk, int32_t
             }
             if (turn) {
                 Float far = f_zero_unless(face[k].m, v3_dot(v3_sub(p, turn->from), walk->d));
-                turn->d = v3_madd(turn->d, -far, face_turn(t->scene, v, face + k, walk->d, dx));
+                Vec3 share = face_turn(t->scene, v, face + k, walk->d, dx);
+                turn->d = v3_madd(turn->d, -far, share);
+                turn->shift = v3_sub(turn->shift, share);
             }
         }
     }
@@ -111,6 +115,7 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
                 Float far = v3_dot(v3_sub(p, turn->from), walk->d);
                 Vec3 slope = volume_slope(scene, v, p, spec_zero_unless(m, spec_scale(dt, each)));
                 turn->d = v3_madd(turn->d, f_zero_unless(m, far), slope);
+                turn->shift = v3_add(turn->shift, v3_select(m, slope, v3_zero()));
             }
         }
     }

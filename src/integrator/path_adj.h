@@ -18,20 +18,21 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     Spec beta = spec_load(r->beta, at);
     Float mis = f_load(r->mis + at);
     Vec2 uv = environment_uv(t->scene, e, d);
+    const bool moves = sink->any_places || sink->any_motion || t->job->glides;
     spec_scatter(t->ws.suffix, slot, spec_load(r->local, at), m);
     for (int c = 0; c < drives(t) && t->job->live_lights; c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
         LightMove move = light_move_zero();
         emitter_adj(t->scene, t->scene->environment, texcoord(uv, NULL), f_set(1), spec_zero_unless(m, dl),
-                    sink->any_places || sink->any_motion ? &move : NULL, sink, m);
-        if (sink->any_places || sink->any_motion) {
+                    moves ? &move : NULL, sink, m);
+        if (moves) {
             emitter_move_adj(t->scene, t->scene->environment, v3_zero(), d, f_set(1), &move, sink, m);
         }
-        if (sink->any_motion) {
+        if (sink->any_motion || t->job->glides) {
             rows_scatter(&t->ws.turn, c, slot, move.d, m);
         }
-        if (sink->any_camera && batch->first_vertex) {
+        if (sink->any_camera && batch->first_vertex && !t->job->glides) {
             Carried carried = {v3_zero(), move.d};
             camera_move_adj(t, slot, d, &carried, sink, m);
         }
@@ -192,14 +193,32 @@ static Spec attached_keep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     return next;
 }
 
-// Sweeps the chunk's records from the last vertex to the first.
-static void path_backward(Tracer *t) {
+// The sensor's part in the adjoints of rays that glide.
+static void glides_end(Tracer *t, int32_t count, Sink *sink) {
+    for (int32_t k = 0; k < count; k += LANES) {
+        Mask m = m_first_n(count - k);
+        Int slot = i_select(m, i_iota() + k, i_set(k));
+        for (int c = 0; c < drives(t); c++) {
+            Glide g = glide_load(t, c, slot, glide_reference(t, slot, v3_zero()), v3_zero());
+            Carried carried = {g.position, g.turn};
+            Mask finite = m & m_finite(v3_dot(g.position, g.position) + v3_dot(g.turn, g.turn));
+            camera_move_adj(t, slot, g.ref, &carried, sink, finite);
+            forward_flush(t, sink, slot, c, finite);
+        }
+    }
+}
+
+// Sweeps the records of a chunk of so many paths from the last vertex to the first.
+static void path_backward(Tracer *t, int32_t count) {
     PathJob *job = t->job;
     const Records *r = &t->ws.records;
     Sink sink = sink_of(job);
     bool live_passing = passing_is_live(t);
     if (job->any_motion) {
         vertices_forget(t);
+    }
+    if (job->glides) {
+        glides_forget(t);
     }
     for (int32_t b = t->batch_count - 1; b >= 0; b--) {
         const RecordBatch *batch = t->ws.batches + b;
@@ -229,6 +248,9 @@ static void path_backward(Tracer *t) {
         if (job->live[batch->group] || job->live_lights || live_passing) {
             surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &sink);
         }
+    }
+    if (job->glides) {
+        glides_end(t, count, &sink);
     }
     job->faces |= sink.faces;
 }

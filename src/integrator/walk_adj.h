@@ -67,32 +67,34 @@ static void passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, S
     }
 }
 
-// Whether lights move and what media let through with them.
-KFN bool lights_turn(const Tracer *t) { return t->job->any_places && t->scene->has_media; }
+// Whether lights move, or collisions, and what media let through with them.
+KFN bool lights_turn(const Tracer *t) { return (t->job->any_places || t->job->glides) && t->scene->has_media; }
 
-// Lights at a point whose place is selected.
+// Lights at a point whose place is selected, or from which collisions move away.
 KFN Mask points_that_move(const Tracer *t, Int light) {
     const SceneView *scene = t->scene;
     light = i_max(light, i_set(0));
-    Mask moves = m_set(false);
+    Mask moves = m_set(t->job->glides);
     for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
         moves = moves | mi_lt(i_set(-1), i_gather(t->job->place_at, light * MAX_EMITTER_SLOTS + k));
     }
     return moves & light_is_delta(scene, light) & ~mi_eq(EMITTER_FIELD(scene, light, kind), i_set(EMITTER_DIRECTIONAL));
 }
 
-// passage_adj, and what the turning of the shadow rays makes of where their lights are.
-static void connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
+// passage_adj, and what the turning of the shadow rays makes of where their lights are; returns the adjoint of where they begin.
+static Vec3 connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
                                    Vec3 p, Int light, Mask connected, Vec3 light_d, Float light_distance, Sink *sink) {
     bool turns = lights_turn(t);
-    Turn turn = {p, v3_zero(), f_set(0), turns ? connected & points_that_move(t, light) : m_set(false)};
+    Turn turn = {p, v3_zero(), v3_zero(), f_set(0), turns ? connected & points_that_move(t, light) : m_set(false)};
     passage_adj(t, walk, transmittance, spec_zero_unless(connected, dt), slot, bounce, turns ? &turn : NULL, sink);
     if (turns && m_any(connected)) {
         LightMove move = light_move_zero();
         move.d = v3_select(connected, turn.d, v3_zero());
         move.distance = f_zero_unless(connected, turn.distance);
         lights_move_adj(t->scene, light, connected, p, light_d, light_distance, &move, sink);
+        return v3_select(connected, v3_add(turn.shift, move.ref), v3_zero());
     }
+    return v3_zero();
 }
 
 // Whether shadow rays pass surfaces or media whose transmittance depends on the selection.

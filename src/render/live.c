@@ -57,12 +57,20 @@ static bool volume_live(const SceneView *view, const PathJob *job, int32_t id) {
     return id >= 0 && texture_live(view, job, view->volumes[id].texture);
 }
 
+static bool volume_varies(const SceneView *view, int32_t id) { return id >= 0 && view->volumes[id].kind == VOLUME_GRID; }
+
 static int32_t medium_live(const SceneView *view, const PathJob *job, const MediumNode *medium) {
     bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture);
-    return (extinction ? LIVE_EXTINCTION : 0) | (volume_live(view, job, medium->albedo) ? LIVE_ALBEDO : 0) |
-           (phase_live(view, job, medium->phase) ? LIVE_PHASE : 0) |
-           (volume_live(view, job, medium->emission) ? LIVE_GLOW : 0) |
-           (medium->bounded && job->volume_at[medium->sigma_t] >= 0 ? LIVE_BORDER : 0);
+    bool emission = volume_live(view, job, medium->emission), borders = job->volume_at[medium->sigma_t] >= 0;
+    bool albedo = volume_live(view, job, medium->albedo), phase = phase_live(view, job, medium->phase);
+    if (job->glides) { // rays glide over them
+        extinction |= volume_varies(view, medium->sigma_t);
+        albedo |= volume_varies(view, medium->albedo);
+        emission |= volume_varies(view, medium->emission);
+        borders = phase = true;
+    }
+    return (extinction ? LIVE_EXTINCTION : 0) | (albedo ? LIVE_ALBEDO : 0) | (phase ? LIVE_PHASE : 0) |
+           (emission ? LIVE_GLOW : 0) | (medium->bounded && borders ? LIVE_BORDER : 0);
 }
 
 // Groups of surfaces of which something selected moves a point or a vertex normal.
@@ -90,9 +98,9 @@ void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
         job->live_extinctions |= (live[view->groups_count + i] & LIVE_EXTINCTION) != 0;
         job->live_borders |= (live[view->groups_count + i] & LIVE_BORDER) != 0;
     }
-    job->live_borders |= job->any_borders;
+    job->live_borders |= job->any_borders || job->glides;
     job->live = live;
-    job->live_lights |= job->any_motion;
+    job->live_lights |= job->any_motion || job->glides;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
         job->live_lights |= emitter_live(view, job, i);
     }

@@ -109,7 +109,8 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
     if (p->camera >= 0 && camera_theta(r->plan.sensor, p->camera) == p->theta) {
-        job->any_motion = job->any_camera = true;
+        *(view->has_media ? &job->glides : &job->any_motion) = true;
+        job->any_camera = true;
         return (int32_t *)(uintptr_t)job->camera_at + p->camera;
     }
     return NULL;

@@ -2,6 +2,7 @@
 #include "render/terms.h"
 
 #include "bsdf/table.h"
+#include "emitter/emitter.h"
 #include "render/boundary.h"
 #include "render/motion.h"
 #include "scene/sink.h"
@@ -53,6 +54,49 @@ static bool has_jumping_media(const SceneView *view) {
     return false;
 }
 
+static bool is_volume(const SceneView *view, int32_t texture) {
+    if (texture < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + texture;
+    return t->kind == TEXTURE_VOLUME || is_volume(view, t->child[0]) || is_volume(view, t->child[1]);
+}
+
+static bool phases_read_volumes(const SceneView *view) {
+    for (int64_t i = 0; i < view->phases_count; i++) {
+        for (int k = 0; k < MAX_PHASE_SLOTS; k++) {
+            if (is_volume(view, view->phases[i].slot[k])) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+// What is not known of cameras that move in scenes with media, null where all is.
+static const char *gap_of_cameras(const SceneView *view) {
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (view->shapes[i].emitter >= 0 || !rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind)) {
+            return "in scenes with participating media, cameras move past the edges of what they and collisions see. Known are cameras "
+                   "in scenes whose surfaces are all of the kind 'null'";
+        }
+    }
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        if (view->emitters[i].kind == EMITTER_PROJECTOR) {
+            return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
+        }
+    }
+    if (phases_read_volumes(view)) {
+        return "collisions that move with the camera look up volumes of phase functions elsewhere";
+    }
+    for (int64_t i = 0; i < view->volumes_count; i++) {
+        if (view->volumes[i].kind == VOLUME_GRID && view->volumes[i].filter == FILTER_NEAREST) {
+            return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
+        }
+    }
+    return NULL;
+}
+
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
 static const char *gap_in_media(const SceneView *view, const Param *p) {
     const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
@@ -62,7 +106,10 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     if (!view->has_media || rey_moves_border(view, p)) {
         return NULL;
     }
-    if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR))) {
+    if (p->camera >= 0) {
+        return gap_of_cameras(view);
+    }
+    if (p->geometry >= 0 || p->instance >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR))) {
         return "in scenes with participating media, what moves changes what they let through and scatter, and moves the shadows in "
                "them. Known are volumes, surfaces of the kind 'null', at which media end, and lights";
     }
@@ -70,14 +117,6 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
         return "in participating media with filter_type=\"nearest\", light that moves passes jumps from voxel to voxel";
     }
     return NULL;
-}
-
-static bool is_volume(const SceneView *view, int32_t texture) {
-    if (texture < 0) {
-        return false;
-    }
-    const TextureNode *t = view->textures + texture;
-    return t->kind == TEXTURE_VOLUME || is_volume(view, t->child[0]) || is_volume(view, t->child[1]);
 }
 
 // Whether points of surfaces look up volumes: where points move, so does what they find.
@@ -151,8 +190,8 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
     if (result == REY_OK && (r->faces & LIGHT_WITHIN)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                        "the gradient of lights at a point that lie within a participating medium does not exist yet: as they "
-                        "move, so must the points next to them from which their light is scattered");
+                        "the gradient of lights at a point that lie within a participating medium, and of cameras beside them, "
+                        "does not exist yet: points next to a light, from which its light is scattered, must move as it does");
     }
     int missing = r->stats.missing_terms & (REY_TERM_TERMINATOR | (r->terms & REY_TERM_SPECULAR)), bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {

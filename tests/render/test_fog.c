@@ -1,59 +1,8 @@
 // Participating media in closed form: a slab's transmittance, single scattering and emission, a furnace, and the derivatives
 // of all of these, also where the slab is empty. What is refused.
-#include "rooms.h"
+#include "slab.h"
 
 #include <stdlib.h>
-
-enum { PIXELS = 16, SETS = 16, MOST_DEFINES = 10 };
-
-static const double pi = 3.14159265358979323846;
-
-typedef struct Case {
-    const char *text; // of the message
-    rey_define defines[MOST_DEFINES];
-    double value[3];
-    const char *param;
-    float tangent[16];
-    double derivative[3];
-} Case;
-
-static Room slab_open(const rey_define *defines, int threads) {
-    rey_context_def def = rey_default_context_def();
-    def.threads = threads;
-    Room room;
-    int count = 0;
-    while (count < MOST_DEFINES && defines[count].name) {
-        count++;
-    }
-    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    if (rey_scene_load(room.ctx, RENDER_DIR "/slab.xml", defines, count, &room.scene) != REY_OK) {
-        fail_msg("%s", rey_error(room.ctx));
-    }
-    return room;
-}
-
-// Mean over pixels and independent seeds, with its standard error; with tangent null of the picture.
-static void mean_of(Room room, int param, const float *tangent, int spp, double *mean, double *error) {
-    double sum[3] = {0}, squares[3] = {0};
-    for (int s = 0; s < SETS; s++) {
-        float image[3 * PIXELS];
-        rey_render_def def = def_make(spp, (uint32_t)s, 1);
-        ok(room, tangent ? rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL)
-                         : rey_render(room.scene, &def, image, NULL));
-        for (int c = 0; c < 3; c++) {
-            double one = 0;
-            for (int i = 0; i < PIXELS; i++) {
-                one += (double)image[3 * i + c] / PIXELS;
-            }
-            sum[c] += one;
-            squares[c] += one * one;
-        }
-    }
-    for (int c = 0; c < 3; c++) {
-        mean[c] = sum[c] / SETS;
-        error[c] = sqrt(fmax(squares[c] / SETS - mean[c] * mean[c], 0) / (SETS - 1));
-    }
-}
 
 static void expect(const Case *c, const char *what, const double *mean, const double *error, const double *expected,
                    double scale) {
@@ -66,15 +15,6 @@ static void expect(const Case *c, const char *what, const double *mean, const do
 }
 
 static double largest(const double *v) { return fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2])); }
-
-static void define(Case *c, const char *name, const char *value) {
-    int count = 0;
-    while (c->defines[count].name && strcmp(c->defines[count].name, name) != 0) {
-        count++;
-    }
-    assert_true(count < MOST_DEFINES);
-    c->defines[count] = (rey_define){name, value};
-}
 
 static void judge_kind(Case c, const char *kind) {
     define(&c, "kind", kind);
@@ -243,8 +183,7 @@ static void refused(const rey_define *defines, const char *param, const char *wh
 
 static void test_refusals(void **state) {
     UNUSED(state);
-    const rey_define fog[MOST_DEFINES] = {{"kind", "heterogeneous"}}, particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
-    refused(fog, "camera.to_world", "participating media");
+    const rey_define particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
     refused(particles, "fog.scale.value", "'ptracer' knows no participating media");
     static float image[NUMBERS];
     const float along[3] = {1, 0, 0};
@@ -253,6 +192,22 @@ static void test_refusals(void **state) {
     rey_render_def def = def_make(1, 0, 1);
     assert_int_not_equal(rey_jvp(room.scene, &def, (rey_selection){&bulb, 1}, along, image, NULL, NULL), REY_OK);
     assert_non_null(strstr(rey_error(room.ctx), "lie within a participating medium"));
+    // Cameras move where no edges are, and away from no light within a medium.
+    int camera;
+    float shift[16] = {[3] = 1};
+    room_close(room);
+    room = room_open("media_box.xml", 1, 0);
+    camera = rey_param_find(room.scene, "camera.to_world");
+    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+    assert_non_null(strstr(rey_error(room.ctx), "of the kind 'null'"));
+    room_close(room);
+    room = room_open("media_tour.xml", 1, 0);
+    const float within[3] = {-0.7f, 0, 0.2f};
+    camera = rey_param_find(room.scene, "camera.to_world");
+    ok(room, rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL));
+    ok(room, rey_param_set(room.scene, rey_param_find(room.scene, "bulb.position"), within, 3));
+    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+    assert_non_null(strstr(rey_error(room.ctx), "cameras beside them"));
     room_close(room);
 }
 
