@@ -289,7 +289,7 @@ static void test_tree(void **state) {
                            PLACED("<rotate z=\"1\" angle=\"$turn\"/><rotate x=\"1\" angle=\"70\"/><translate y=\"-6\" z=\"3.5\"/>")
                            LAMP("<scale value=\"0.15\"/><lookat origin=\"0, -12, 7\" target=\"0, 0, 0\" up=\"0, 0, 1\"/>", "2400")
                            "</scene>",
-                       "turn=0", "turn=17.188734", "name: thing.to_world, parameterisation: rigid", 64, 80, 16, 0.02};
+                       "turn=0", "turn=17.188734", "name: thing.to_world, parameterisation: rigid", 64, 120, 16, 0.03};
     FitResult result = run(*state, &c);
     const FitRow *row = &ARRAY_AT(result.rows, FitRow, 0);
     // The tree's own x axis, which is the world's when it is not turned.
