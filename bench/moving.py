@@ -52,8 +52,8 @@ def ramp():
 
 def ours(reynolds, path, seed):
     out = subprocess.run([reynolds, "grad", path, "--param", "mover.positions:translate=1,0,0", "--mode", "reverse",
-                          "--adjoint", os.path.join(FOLDER, "ramp.npy"), "--spp", str(SPP), "--seed", str(seed), "--terms", "interior,primary,indirect",
-                          "--json"],
+                          "--adjoint", os.path.join(FOLDER, "ramp.npy"), "--spp", str(SPP), "--seed", str(seed),
+                          "--terms", "interior,primary,indirect", "--json"],
                          check=True, capture_output=True, text=True).stdout
     result = json.loads(out)
     return result["value"], result["seconds"], result["peak_rss_mb"]

@@ -1,6 +1,6 @@
-"""The benchmark scenes: Cornell box, the same by light tracing, box with a 70,000-triangle rough-metal mesh, a million triangles under a sky, 16
-principled spheres under a sky, a forest of 100,000 instances, a cloud of 64^3 cells, the box with fog in it, and the matpreview
-scene of the conformance folder."""
+"""The benchmark scenes: Cornell box, the same by light tracing, box with a 70,000-triangle rough-metal mesh, a million triangles
+under a sky, 16 principled spheres under a sky, a forest of 100,000 instances, a cloud of 64^3 cells, the box with fog in
+it, and the matpreview scene of the conformance folder."""
 import collections
 import importlib.util
 import math
@@ -14,11 +14,14 @@ assets = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(assets)
 
 HEAD = """<scene version="3.0.0">
-<integrator type="%(integrator)s"><integer name="max_depth" value="%(depth)d"/><integer name="rr_depth" value="%(rr_depth)d"/></integrator>
-<sensor type="perspective"><float name="fov" value="39.3"/><float name="near_clip" value="%(near)g"/><float name="far_clip" value="5000"/>
+<integrator type="%(integrator)s"><integer name="max_depth" value="%(depth)d"/>\
+<integer name="rr_depth" value="%(rr_depth)d"/></integrator>
+<sensor type="perspective"><float name="fov" value="39.3"/><float name="near_clip" value="%(near)g"/>\
+<float name="far_clip" value="5000"/>
 <transform name="to_world"><lookat origin="%(origin)s" target="%(target)s" up="%(up)s"/></transform>
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
-<film type="hdrfilm"><integer name="width" value="%(size)d"/><integer name="height" value="%(size)d"/><rfilter type="box"/></film></sensor>
+<film type="hdrfilm"><integer name="width" value="%(size)d"/><integer name="height" value="%(size)d"/>\
+<rfilter type="box"/></film></sensor>
 """
 WALLS = """<bsdf type="diffuse" id="white"><rgb name="reflectance" value="0.725 0.71 0.68"/></bsdf>
 <bsdf type="diffuse" id="red"><rgb name="reflectance" value="0.63 0.065 0.05"/></bsdf>
@@ -122,13 +125,16 @@ def write_cloud(path, n=64):
 CLOUD = """<shape type="cube" id="air"><bsdf type="null"/><medium name="interior" type="heterogeneous" id="cloud">
 <volume name="sigma_t" type="gridvolume"><string name="filename" value="cloud.vol"/>
 <transform name="to_world"><scale value="2"/><translate value="-1"/></transform></volume>
-<rgb name="albedo" value="0.97 0.98 0.99"/><float name="scale" value="20"/><phase type="hg"><float name="g" value="0.5"/></phase></medium></shape>
+<rgb name="albedo" value="0.97 0.98 0.99"/><float name="scale" value="20"/><phase type="hg">\
+<float name="g" value="0.5"/></phase></medium></shape>
 <emitter type="constant"><rgb name="radiance" value="0.4 0.5 0.7"/></emitter>
 <emitter type="directional"><vector name="direction" value="0.3 -1 0.5"/><rgb name="irradiance" value="3 2.8 2.5"/></emitter>
 """
 # Between the walls, under the lamp.
-FOG = """<shape type="cube" id="air"><transform name="to_world"><scale x="270" y="270" z="274"/><translate x="277" y="273" z="279"/></transform>
-<bsdf type="null"/><medium name="interior" type="homogeneous" id="fog"><rgb name="sigma_t" value="0.003"/><rgb name="albedo" value="0.9"/></medium></shape>
+FOG = """<shape type="cube" id="air"><transform name="to_world"><scale x="270" y="270" z="274"/>\
+<translate x="277" y="273" z="279"/></transform>
+<bsdf type="null"/><medium name="interior" type="homogeneous" id="fog"><rgb name="sigma_t" value="0.003"/>\
+<rgb name="albedo" value="0.9"/></medium></shape>
 """
 
 # path and definitions of a scene, what its derivatives are taken with respect to, its depths, and its width and height.

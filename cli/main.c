@@ -35,25 +35,27 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
          "for\n"
          "each parameter, and gradient.json, into the folder -o. Several P form one joint direction.\n" DIRECTION_NOTES},
-    [COMMAND_CHECK] = {"check", cli_check, "SCENE --param P [--param P]... | --all [options]",
-                       "compare gradients with correlated finite differences",
-                       "\nEach P is checked by itself, in blocks of the image. Where nothing moves, differences are taken along the\n"
-                       "paths of the derivative, and held against fresh paths (fresh z); elsewhere along fresh paths. Exits with\n"
-                       "1 when a gradient is wrong, with 0 when all are right or too noisy to say (weak).\n" DIRECTION_NOTES},
+    [COMMAND_CHECK] =
+        {"check", cli_check, "SCENE --param P [--param P]... | --all [options]",
+         "compare gradients with correlated finite differences",
+         "\nEach P is checked by itself, in blocks of the image. Where nothing moves, differences are taken along the\n"
+         "paths of the derivative, and held against fresh paths (fresh z); elsewhere along fresh paths. Exits with\n"
+         "1 when a gradient is wrong, with 0 when all are right or too noisy to say (weak).\n" DIRECTION_NOTES},
     [COMMAND_FIT] = {"fit", cli_fit, "JOB.yaml [--set key=value]... [--resume] [-o DIR] [options]",
                      "recover parameters from images", ""},
-    [COMMAND_PARAMS] = {"params", cli_params, "SCENE [options]", "list every parameter of a scene",
-                        "\nThe column gradient says whether grad computes all of the derivative; below the table stands why not.\n"},
+    [COMMAND_PARAMS] =
+        {"params", cli_params, "SCENE [options]", "list every parameter of a scene",
+         "\nThe column gradient says whether grad computes all of the derivative; below the table stands why not.\n"},
     [COMMAND_INFO] = {"info", cli_info, "SCENE [options]", "say what a scene holds", ""},
     [COMMAND_CONVERT] =
         {"convert", cli_convert, "IN OUT.xml [options]", "write a scene back, with its meshes and images",
          "\nOUT.xml renders the same bits as IN. It is of the current version of the format, needs no define, include "
          "or\nsearch path, and its files lie in the folder OUT_data beside it.\n"},
-    [COMMAND_COMPARE] = {"compare", cli_compare, "A B [--json]",
-                         "differences between two images; B is the reference",
-                         "\nPictures are EXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY files.\n"
-                         "psnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
-                         "either are left out and counted, and make the exit status 1.\n"},
+    [COMMAND_COMPARE] =
+        {"compare", cli_compare, "A B [--json]", "differences between two images; B is the reference",
+         "\nPictures are EXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY files.\n"
+         "psnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
+         "either are left out and counted, and make the exit status 1.\n"},
     [COMMAND_DOCTOR] = {"doctor", cli_doctor, "[options]", "examine this machine and this build", ""},
 };
 

@@ -102,7 +102,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name in options.examples:
             job = os.path.join(ROOT, "examples", name + ".yaml" if "/" in name else os.path.join(name, "job.yaml"))
-            run = subprocess.run([options.reynolds, "fit", job, "-o", os.path.join(folder, name.replace("/", "_")), "--json"], stdout=subprocess.PIPE,
+            output = os.path.join(folder, name.replace("/", "_"))
+            run = subprocess.run([options.reynolds, "fit", job, "-o", output, "--json"], stdout=subprocess.PIPE,
                                  stderr=subprocess.PIPE, text=True)
             if run.returncode:
                 wrong.append("%s: exit code %d: %s" % (name, run.returncode, run.stderr[-400:]))

@@ -104,7 +104,8 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD "optimizer:\n  lerning_rate: 3\n", NULL,
                  "job.yaml:5: unknown key 'lerning_rate', did you mean 'learning_rate'?");
     expect_error(f, HEAD "seed: -1\n", NULL, "job.yaml:4: seed = -1, expected 0 to");
-    expect_error(f, HEAD "terms: interior,primery\n", NULL, "job.yaml:4: 'primery' is no term; expected some of interior,primary,indirect");
+    expect_error(f, HEAD "terms: interior,primery\n", NULL,
+                 "job.yaml:4: 'primery' is no term; expected some of interior,primary,indirect");
     expect_error(f, HEAD "iterations: 2.5\n", NULL, "job.yaml:4: iterations = 2.5, expected a whole number");
     expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: expected a number");
     expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: unknown value 'l3', did you mean");

@@ -18,7 +18,8 @@ enum { SIZE = 8, COARSE = 4, FINE = 6, VIEWS = 3 };
 
 static const char *const HEAD =
     "<scene version=\"3.0.0\"><default name=\"file\" value=\"start.vol\"/><integrator type=\"volpath\"><integer name=\"max_depth\" "
-    "value=\"4\"/></integrator><shape type=\"cube\" id=\"air\"><bsdf type=\"null\"/><medium name=\"interior\" type=\"heterogeneous\">"
+    "value=\"4\"/></integrator><shape type=\"cube\" id=\"air\"><bsdf type=\"null\"/><medium name=\"interior\" "
+    "type=\"heterogeneous\">"
     "<volume name=\"sigma_t\" type=\"gridvolume\"><string name=\"filename\" value=\"$file\"/><transform name=\"to_world\"><scale "
     "value=\"2\"/><translate value=\"-1\"/></transform></volume><rgb name=\"albedo\" value=\"0.8\"/></medium></shape><emitter "
     "type=\"constant\"><rgb name=\"radiance\" value=\"0.3, 0.4, 0.6\"/></emitter><emitter "

@@ -15,9 +15,11 @@ enum { SIZE = 8 };
 
 static const char *const SCENE =
     "<scene version=\"3.0.0\"><default name=\"sigma_t\" value=\"0.9\"/><default name=\"albedo\" value=\"0.5\"/><default name=\"g\" "
-    "value=\"0\"/><default name=\"weights\" value=\"1, 1, 1\"/><integrator type=\"volpath\"><integer name=\"max_depth\" value=\"6\"/>"
+    "value=\"0\"/><default name=\"weights\" value=\"1, 1, 1\"/><integrator type=\"volpath\"><integer name=\"max_depth\" "
+    "value=\"6\"/>"
     "</integrator>"
-    "<medium type=\"homogeneous\" id=\"fog\"><rgb name=\"sigma_t\" value=\"$sigma_t\"/><rgb name=\"albedo\" value=\"$albedo\"/><float "
+    "<medium type=\"homogeneous\" id=\"fog\"><rgb name=\"sigma_t\" value=\"$sigma_t\"/><rgb name=\"albedo\" "
+    "value=\"$albedo\"/><float "
     "name=\"scale\" value=\"2\"/><phase type=\"hg\"><float name=\"g\" value=\"$g\"/></phase></medium>"
     "<shape type=\"cube\"><transform name=\"to_world\"><translate x=\"-1.2\"/></transform><bsdf type=\"null\"/><ref "
     "name=\"interior\" id=\"fog\"/></shape>"
@@ -25,7 +27,8 @@ static const char *const SCENE =
     "name=\"interior\" type=\"homogeneous\"><rgb name=\"sigma_t\" value=\"0.8\"/><rgb name=\"albedo\" value=\"0.9\"/><phase "
     "type=\"dictionary\"><string name=\"weights\" value=\"$weights\"/><phase type=\"hg\"><float name=\"g\" value=\"-0.5\"/></phase>"
     "<phase type=\"isotropic\"/><phase type=\"hg\"><float name=\"g\" value=\"0.7\"/></phase></phase></medium></shape>"
-    "<emitter type=\"directional\"><vector name=\"direction\" value=\"1, -0.3, -0.2\"/><rgb name=\"irradiance\" value=\"5\"/></emitter>"
+    "<emitter type=\"directional\"><vector name=\"direction\" value=\"1, -0.3, -0.2\"/><rgb name=\"irradiance\" "
+    "value=\"5\"/></emitter>"
     "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/><transform name=\"to_world\"><lookat origin=\"0, 0, 5\" "
     "target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer "
     "name=\"height\" value=\"8\"/><rfilter type=\"box\"/></film></sensor>"

@@ -32,7 +32,8 @@ static const char *const SCENE =
     "value=\"24\"/><integer name=\"height\" value=\"24\"/><rfilter type=\"box\"/></film></sensor>"
     "<shape type=\"obj\" id=\"ball\"><string name=\"filename\" value=\"ball.obj\"/><boolean name=\"face_normals\" "
     "value=\"true\"/><bsdf type=\"diffuse\"/></shape>"
-    "<emitter type=\"directional\" id=\"sun\"><vector name=\"direction\" value=\"-1, 2, -1\"/><rgb name=\"irradiance\" value=\"2\"/>"
+    "<emitter type=\"directional\" id=\"sun\"><vector name=\"direction\" value=\"-1, 2, -1\"/><rgb name=\"irradiance\" "
+    "value=\"2\"/>"
     "</emitter><emitter type=\"constant\" id=\"sky\"><rgb name=\"radiance\" value=\"0.2\"/></emitter></scene>";
 
 // A ball of rings whose seam in uv has vertices of both sides.

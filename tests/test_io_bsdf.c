@@ -128,6 +128,7 @@ static void test_terms(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_ranges), cmocka_unit_test(test_terms)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_ranges),
+                                       cmocka_unit_test(test_terms)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

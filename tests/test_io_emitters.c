@@ -159,10 +159,12 @@ static void test_temperatures(void **state) {
     const float hot = 5000;
     rey_context *ctx;
     assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
-    rey_scene *scene = must_load(ctx, POINT("<spectrum type='blackbody' name='intensity'><float name='temperature' value='5000'/></spectrum>"));
+    rey_scene *scene = must_load(
+        ctx, POINT("<spectrum type='blackbody' name='intensity'><float name='temperature' value='5000'/></spectrum>"));
     render(ctx, scene, read);
     rey_scene_destroy(scene);
-    scene = must_load(ctx, POINT("<spectrum type='blackbody' name='intensity'><float name='temperature' value='3000'/></spectrum>"));
+    scene = must_load(ctx,
+                      POINT("<spectrum type='blackbody' name='intensity'><float name='temperature' value='3000'/></spectrum>"));
     render(ctx, scene, before);
     assert_int_equal(rey_param_set(scene, rey_param_find(scene, "lamp.intensity.temperature"), &hot, 1), REY_OK);
     render(ctx, scene, set);

@@ -138,7 +138,8 @@ static const struct {
     {HETERO("<volume type='gridvolum' name='sigma_t'/>"), "did you mean 'gridvolume'?"},
     {HETERO("<texture type='checkerboard' name='sigma_t'/>"), "the texture of a volume must be one value"},
     {"<shape type='sphere'><medium type='homogeneous'/></shape>", "has no use for the medium 'homogeneous'"},
-    {"<bsdf type='null' id='b'/><shape type='sphere'><ref id='b' name='interior'/></shape>", "'interior' must be a medium, not a bsdf"},
+    {"<bsdf type='null' id='b'/><shape type='sphere'><ref id='b' name='interior'/></shape>",
+     "'interior' must be a medium, not a bsdf"},
 };
 
 static void test_refusals(void **state) {
@@ -308,7 +309,8 @@ static void test_update(void **state) {
 // Grids of other files: NanoVDB with its own box, and arrays where an sdfgrid wants its nodes.
 static void test_other_files(void **state) {
     static const float rows[12] = {9, 0, 0, -1.75f, 0, 7.5f, 0, 61.75f, 0, 0, 3.5f, 4.25f};
-    rey_scene *scene = must_load(*state, HETERO(GRID("sigma_t", TEST_DATA_DIR "/nvdb/float.nvdb", "<boolean name='use_grid_bbox' value='true'/>"))
+    rey_scene *scene = must_load(*state, HETERO(GRID("sigma_t", TEST_DATA_DIR "/nvdb/float.nvdb",
+                                                     "<boolean name='use_grid_bbox' value='true'/>"))
                                          "<shape type='sdfgrid' id='blob'><string name='filename' value='dense.npy'/></shape>");
     const VolumeNode *v = scene->view.volumes + scene->view.media[0].sigma_t;
     assert_true(v->nx == 18 && v->ny == 15 && v->nz == 7);
@@ -389,7 +391,8 @@ static void test_round_trip(void **state) {
             for (int64_t k = 0; k < (info.count == 16 ? 12 : info.count); k++) {
                 values[k] = info.high <= 1 ? 0.5f * values[k] + 0.1f : 1.5f * values[k] + 0.01f;
             }
-            bool fixed = strncmp(info.name, "ball", 4) == 0 || strncmp(info.name, "box", 3) == 0 || strncmp(info.name, "eye", 3) == 0;
+            bool fixed = strncmp(info.name, "ball", 4) == 0 || strncmp(info.name, "box", 3) == 0 ||
+                         strncmp(info.name, "eye", 3) == 0;
             if ((only == -1 && !fixed) || (only == i && (!fixed || strstr(info.name, "medium")))) {
                 assert_int_equal(rey_param_set(scene, i, values, info.count), REY_OK);
             }

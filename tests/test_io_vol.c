@@ -139,7 +139,10 @@ static void test_npy(void **state) {
         rey_grid_close(*state, &grid);
         assert_memory_equal(values, data, sizeof data);
     }
-    assert_int_equal(rey_file_write(*state, path, "\x93NUMPY\1\0\x4a\0{'descr': '<f4', 'fortran_order': False, 'shape': (1048576, 1048576, 9), }     ", 84), REY_OK);
+    assert_int_equal(
+        rey_file_write(*state, path,
+                       "\x93NUMPY\1\0\x4a\0{'descr': '<f4', 'fortran_order': False, 'shape': (1048576, 1048576, 9), }     ", 84),
+        REY_OK);
     assert_int_equal(rey_grid_open(*state, path, &grid), REY_ERROR_FORMAT);
     unlink(path);
     assert_non_null(strstr(rey_error(*state), "the file ends before its array of 9895604649984 numbers"));

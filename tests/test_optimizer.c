@@ -239,8 +239,8 @@ static void test_simplex(void **unused) {
                         .moment = MOMENT_SHARED};
         Unknowns u = {.items = {&item, 1, 1}, .count = SHARES, .start = start, .value = value, .variable = numbers[0],
                       .first = numbers[1], .second = numbers[2], .average = numbers[3], .gradient = numbers[4]};
-        JobOptimizer o = {.kind = (OptimizerKind)kind, .learning_rate = kind == OPTIMIZER_ADAM ? 0.1 : 0.5, .beta1 = 0.9, .beta2 = 0.9,
-                          .epsilon = 1e-12, .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 800}};
+        JobOptimizer o = {.kind = (OptimizerKind)kind, .learning_rate = kind == OPTIMIZER_ADAM ? 0.1 : 0.5, .beta1 = 0.9,
+                          .beta2 = 0.9, .epsilon = 1e-12, .schedule = {.kind = SCHEDULE_COSINE, .end = 0.01, .length = 800}};
         rey_unknowns_begin(&u);
         assert_float_equal((double)value[1], 0.5, 1e-5);
         for (int i = 0; i < 800; i++) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Writes what the milk example is made of: four slabs that a projector lights with a narrow beam each, at four angles, and a camera on
-either side of each; and the projector's picture.
+"""Writes what the milk example is made of: four slabs that a projector lights with a narrow beam each, at four angles, and a
+camera on either side of each; and the projector's picture.
 
 usage: make_assets.py FOLDER"""
 import math
@@ -60,7 +60,8 @@ def write_slabs(path):
             across = cross(axis, normal)
             rows = ["%.6f %.6f %.6f %.6f" % (HALF[0] * across[k], HALF[1] * axis[k], HALF[2] * normal[k], centre[k])
                     for k in range(3)]
-            f.write('    <shape type="cube" id="slab_%d">\n        <transform name="to_world"><matrix value="%s 0 0 0 1"/></transform>\n'
+            f.write('    <shape type="cube" id="slab_%d">\n'
+                    '        <transform name="to_world"><matrix value="%s 0 0 0 1"/></transform>\n'
                     '        <bsdf type="null"/>\n        <ref name="interior" id="milk"/>\n    </shape>\n' % (i, " ".join(rows)))
         f.write("</scene>\n")
 

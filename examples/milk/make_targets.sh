@@ -1,6 +1,6 @@
 #!/bin/sh
-# Photographs the four slabs from both sides: target_0.exr to target_7.exr, with other random numbers than the recovery uses; and two of
-# them with the liquid of dictionary_truth.xml, dictionary_0, 1, 6 and 7.exr. make_assets.py comes first.
+# Photographs the four slabs from both sides: target_0.exr to target_7.exr, with other random numbers than the recovery uses; and
+# two of them with the liquid of dictionary_truth.xml, dictionary_0, 1, 6 and 7.exr. make_assets.py comes first.
 # usage: make_targets.sh REYNOLDS [FOLDER] [SPP]
 reynolds=$1
 folder=${2:-$(dirname "$0")}

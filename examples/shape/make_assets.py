@@ -16,7 +16,8 @@ def icosphere(levels):
     points = [(0, s, t * PHI) for s in (-1, 1) for t in (-1, 1)]
     points = [p[k:] + p[:k] for k in range(3) for p in points]
     faces = [(a, b, c) for a in range(12) for b in range(12) for c in range(12)
-             if a < min(b, c) and b != c and all(abs(math.dist(points[i], points[j]) - 2) < 1e-6 for i, j in ((a, b), (b, c), (c, a)))]
+             if a < min(b, c) and b != c and
+             all(abs(math.dist(points[i], points[j]) - 2) < 1e-6 for i, j in ((a, b), (b, c), (c, a)))]
     volume = lambda f: sum(points[f[0]][k] * (points[f[1]][(k + 1) % 3] * points[f[2]][(k + 2) % 3] -
                                               points[f[1]][(k + 2) % 3] * points[f[2]][(k + 1) % 3]) for k in range(3))
     faces = [f for f in faces if volume(f) > 0]
@@ -61,8 +62,10 @@ SCENE = """<!-- A %s seen by 12 cameras; written by make_assets.py. -->
         <boolean name="face_normals" value="true"/>
         <bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.6, 0.5"/></bsdf>
     </shape>
-    <emitter type="directional"><vector name="direction" value="-1, 1.5, -1.2"/><rgb name="irradiance" value="3.2, 3.0, 2.8"/></emitter>
-    <emitter type="directional"><vector name="direction" value="1.4, -0.6, 0.8"/><rgb name="irradiance" value="1.0, 1.2, 1.6"/></emitter>
+    <emitter type="directional"><vector name="direction" value="-1, 1.5, -1.2"/>\
+<rgb name="irradiance" value="3.2, 3.0, 2.8"/></emitter>
+    <emitter type="directional"><vector name="direction" value="1.4, -0.6, 0.8"/>\
+<rgb name="irradiance" value="1.0, 1.2, 1.6"/></emitter>
     <emitter type="constant"><rgb name="radiance" value="0.06, 0.07, 0.09"/></emitter>
 </scene>
 """

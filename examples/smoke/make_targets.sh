@@ -1,5 +1,6 @@
 #!/bin/sh
-# Photographs the smoke: target_0.exr to target_19.exr, with other random numbers than the recovery uses. make_assets.py comes first.
+# Photographs the smoke: target_0.exr to target_19.exr, with other random numbers than the recovery uses. make_assets.py comes
+# first.
 # usage: make_targets.sh REYNOLDS [FOLDER] [SPP]
 reynolds=$1
 folder=${2:-$(dirname "$0")}

@@ -133,7 +133,8 @@ static rey_result check_job(rey_context *ctx, const char *path, const Checkpoint
     rey_result result = REY_OK;
     if (other) {
         const char *was = find_line(old, key), *now = find_line(flat, key);
-        result = rey_fail(ctx, REY_ERROR_ARGUMENT, "%s is from a different job: '%s' was %.*s and is now %.*s; finish with the old job "
+        result = rey_fail(ctx, REY_ERROR_ARGUMENT,
+                          "%s is from a different job: '%s' was %.*s and is now %.*s; finish with the old job "
                           "or use another -o",
                           path, key, (int)strcspn(was, "\n"), was, (int)strcspn(now, "\n"), now);
     }
@@ -166,7 +167,8 @@ static rey_result decode(const char *path, const char *flat, const unsigned char
     if (result) {
         return result;
     }
-    if (header.numbers != (uint64_t)u->count || header.extra != (uint64_t)u->lbfgs_count || header.width != (uint64_t)state->history_width ||
+    if (header.numbers != (uint64_t)u->count || header.extra != (uint64_t)u->lbfgs_count ||
+        header.width != (uint64_t)state->history_width ||
         header.rows != header.iteration || header.rows > INT32_MAX) {
         return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: made for %llu numbers, but the scene now has %lld", path,
                         (unsigned long long)header.numbers, (long long)u->count);

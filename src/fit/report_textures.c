@@ -6,7 +6,8 @@
 enum { TEXTURE_LARGEST = 1024 };
 
 static bool is_texture(const FitRow *row) {
-    return !row->points[COLUMN_FOUND] && !row->grid && row->dims >= 2 && row->count > HISTORY_LARGEST && row->shape[0] > 1 && row->shape[1] > 1 &&
+    return !row->points[COLUMN_FOUND] && !row->grid && row->dims >= 2 && row->count > HISTORY_LARGEST &&
+           row->shape[0] > 1 && row->shape[1] > 1 &&
            row->shape[0] <= TEXTURE_LARGEST && row->shape[1] <= TEXTURE_LARGEST &&
            (row->dims == 2 || row->shape[2] == 1 || row->shape[2] == 3);
 }

@@ -208,8 +208,8 @@ rey_result rey_report_views(Fit *fit, FitResult *out, Text *html) {
     }
     rey_text_add(html,
                  "<p class=\"note\">Error of a picture: root of the sum of (I &minus; R)&sup2; over that of R&sup2;, R "
-                 "the target, I rendered with %d samples per pixel (the start with %d), whose noise it contains. Differences are means of "
-                 "the channels; their scale ends at the 99.5th percentile.%s</p>\n",
+                 "the target, I rendered with %d samples per pixel (the start with %d), whose noise it contains. Differences are "
+                 "means of the channels; their scale ends at the 99.5th percentile.%s</p>\n",
                  fit->job.report_spp, start_spp(fit),
                  out->held_out.count ? " PSNR of views that were not fitted: 10 log<sub>10</sub> of the square of the target's "
                                        "largest number over the mean of (I &minus; R)&sup2;." : "");

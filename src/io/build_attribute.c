@@ -14,9 +14,10 @@ static rey_result note_byte_colours(Builder *b, const rey_mesh_attribute *attrib
         whole = attribute->data[i] >= 0 && attribute->data[i] == floorf(attribute->data[i]);
         largest = fmaxf(largest, attribute->data[i]);
     }
-    return whole && largest > 1 ? rey_scene_add_note(b->scene, "the attribute %s of %s has whole numbers up to %g; colours go from 0 to 1",
-                                                     attribute->name, path, (double)largest)
-                                : REY_OK;
+    return whole && largest > 1
+               ? rey_scene_add_note(b->scene, "the attribute %s of %s has whole numbers up to %g; colours go from 0 to 1",
+                                    attribute->name, path, (double)largest)
+               : REY_OK;
 }
 
 rey_result build_mesh_attribute(Builder *b, const rey_mesh_attribute *attribute, int32_t id, const char *path,

@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "prbvolpath", "depth", "aov", "ptracer"};
+static const char *const words[] = {"path", "direct",     "moment", "volpath", "volpathmis",
+                                    "prb",  "prbvolpath", "depth",  "aov",     "ptracer"};
 
 static const char *integrator_word(void *user, int i) {
     UNUSED(user);

@@ -15,7 +15,8 @@ static const char *const normals_why = "the picture jumps where a shading normal
 enum { GEOMETRY_TERMS = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT };
 
 static const char *shape_word(void *user, int i) {
-    static const char *const words[] = {"rectangle", "cube", "sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "sdfgrid", "shapegroup", "instance", "merge", "obj", "ply", "serialized"};
+    static const char *const words[] = {"rectangle", "cube",       "sphere",   "disk",  "cylinder", "bsplinecurve", "linearcurve",
+                                        "sdfgrid",   "shapegroup", "instance", "merge", "obj",      "ply",          "serialized"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }

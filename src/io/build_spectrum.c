@@ -5,8 +5,8 @@
 #include <string.h>
 
 static const char *texture_word(void *user, int i) {
-    static const char *const words[] = {"bitmap", "checkerboard", "mesh_attribute", "volume", "rawconstant", "srgb", "uniform", "d65", "blackbody",
-                                        "regular", "irregular"};
+    static const char *const words[] = {"bitmap",  "checkerboard", "mesh_attribute", "volume",  "rawconstant", "srgb",
+                                        "uniform", "d65",          "blackbody",      "regular", "irregular"};
     UNUSED(user);
     return i < COUNT_OF(words) ? words[i] : NULL;
 }

@@ -242,8 +242,8 @@ static rey_result build_volume_texture(Builder *b, rey_xml_node *node, TextureUs
     const VolumeNode *v = &ARRAY_AT(b->scene->build.volumes, VolumeNode, id);
     *out = v->texture;
     return v->channels <= 3 ? REY_OK
-                            : rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "the volume of a texture has %d channels, expected 1 or 3",
-                                           v->channels);
+                            : rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE,
+                                           "the volume of a texture has %d channels, expected 1 or 3", v->channels);
 }
 
 bool build_is_volume(const Builder *b, int32_t texture) {

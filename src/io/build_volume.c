@@ -94,7 +94,8 @@ static rey_result add_grid(Builder *b, rey_xml_node *node, const rey_grid *grid,
     volume->nx = grid->nx;
     volume->ny = grid->ny;
     volume->nz = grid->nz;
-    Param p = {PARAM_DEFAULTS, .theta = t->theta, .count = (int32_t)count, .dims = 3, .shape = {grid->nz, grid->ny, grid->nx * grid->channels},
+    Param p = {PARAM_DEFAULTS, .theta = t->theta, .count = (int32_t)count, .dims = 3,
+               .shape = {grid->nz, grid->ny, grid->nx * grid->channels},
                .low = use.low, .high = use.high, .terms = REY_TERM_INTERIOR | use.terms, .why = use.why, .unit = use.unit,
                .description = use.text, .texture = volume->texture};
     build_join(name, path, "data");
@@ -123,7 +124,8 @@ static rey_result build_gridvolume(Builder *b, rey_xml_node *node, TextureUse us
     rey_result result = rey_xml_named_file(b->ctx, rey_xml_find(node, "filename")->at, rey_grid_open(b->ctx, file, &grid));
     if (result == REY_OK) {
         result = box && !grid.placed
-                     ? rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the file says no box along the axes, which 'use_grid_bbox' asks for")
+                     ? rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
+                                    "the file says no box along the axes, which 'use_grid_bbox' asks for")
                      : add_grid(b, node, &grid, use, path, id, volume);
         rey_grid_close(b->ctx, &grid);
     }

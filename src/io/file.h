@@ -3,9 +3,9 @@
 
 #include "base/context.h"
 
-// Reads a whole file (or a pipe that has no name, such as a shell's). *bytes holds *size bytes and one zero byte after them, so text readers may stop there;
-// the caller frees it with rey_free. Directories and files that cannot be opened or read are REY_ERROR_IO; on failure
-// *bytes is null and *size 0.
+// Reads a whole file (or a pipe that has no name, such as a shell's). *bytes holds *size bytes and one zero byte after them, so
+// text readers may stop there; the caller frees it with rey_free. Directories and files that cannot be opened or read are
+// REY_ERROR_IO; on failure *bytes is null and *size 0.
 rey_result rey_file_read(rey_context *ctx, const char *path, unsigned char **bytes, size_t *size);
 
 // A file to read in parts, and its size; no pipe or device. The caller closes it.

@@ -109,7 +109,8 @@ rey_result rey_grid_read(rey_context *ctx, const rey_grid *grid, float *values) 
     if (grid->format == GRID_NVDB) {
         return rey_nvdb_read(ctx, grid->path, &grid->nvdb, values);
     }
-    size_t count = (size_t)rey_grid_count(grid), item = grid->format == GRID_NPY ? (size_t)grid->encoding : rey_vol_item(grid->encoding);
+    size_t count = (size_t)rey_grid_count(grid),
+           item = grid->format == GRID_NPY ? (size_t)grid->encoding : rey_vol_item(grid->encoding);
     unsigned char *bytes = rey_alloc_array(ctx, count < CHUNK ? count : CHUNK, item);
     rey_result result = bytes ? REY_OK : REY_ERROR_MEMORY;
     for (size_t first = 0; first < count && result == REY_OK; first += CHUNK) {

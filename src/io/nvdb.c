@@ -117,7 +117,8 @@ static void place(const unsigned char *grid, rey_nvdb *out) {
 }
 
 static rey_result read_tree(rey_context *ctx, const char *name, const unsigned char *grid, size_t size, rey_nvdb *out) {
-    uint64_t type = size >= GRID_SIZE + 64 ? load(grid + GRID_TYPE, 4) : 0, root = size >= GRID_SIZE + 64 ? load(grid + GRID_SIZE + 24, 8) : 0;
+    uint64_t type = size >= GRID_SIZE + 64 ? load(grid + GRID_TYPE, 4) : 0,
+             root = size >= GRID_SIZE + 64 ? load(grid + GRID_SIZE + 24, 8) : 0;
     if (size < GRID_SIZE + 64 || memcmp(grid, "NanoVDB", 7) != 0 || root > size - GRID_SIZE || size - GRID_SIZE - root < 96) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside its grid", name);
     }

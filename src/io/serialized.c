@@ -262,8 +262,8 @@ static rey_result find_shape(SerializedReader *r, int version, int shape_index) 
     int64_t width = version == 3 ? 4 : 8;
     int64_t count = r->size >= 4 ? (int64_t)load(r->bytes + r->size - 4, 4) : 0;
     if (shape_index >= count) {
-        return fail(r, r->size - 4, "the file has %lld mesh%s, expected more than the shape index %d", (long long)count, count == 1 ? "" : "es",
-                    shape_index);
+        return fail(r, r->size - 4, "the file has %lld mesh%s, expected more than the shape index %d", (long long)count,
+                    count == 1 ? "" : "es", shape_index);
     }
     int64_t list = r->size - 4 - count * width;
     if (list < HEADER_BYTES) {

@@ -11,7 +11,8 @@ typedef struct OldType {
 } OldType;
 
 static const OldType old_types[] = {
-    {REY_XML_FILM, "ldrfilm", "hdrfilm", "the film 'ldrfilm' was read as 'hdrfilm': pictures stay linear, the ending of the output's name decides on sRGB"},
+    {REY_XML_FILM, "ldrfilm", "hdrfilm",
+     "the film 'ldrfilm' was read as 'hdrfilm': pictures stay linear, the ending of the output's name decides on sRGB"},
     {REY_XML_FILM, "mfilm", "hdrfilm", "the film 'mfilm' was read as 'hdrfilm': an output that ends in .npy holds the numbers"},
     {REY_XML_FILM, "tiledhdrfilm", "hdrfilm", NULL},
     {REY_XML_INTEGRATOR, "volpath_simple", "volpath", NULL},

@@ -4,7 +4,8 @@
 #include "sensor/filter.h"
 
 FilmPlan rey_film_plan(const SensorRecord *s, int32_t channels) {
-    FilmPlan plan = {.sensor = s, .channels = channels, .x = s->crop_x, .y = s->crop_y, .width = s->crop_width, .height = s->crop_height};
+    FilmPlan plan = {
+        .sensor = s, .channels = channels, .x = s->crop_x, .y = s->crop_y, .width = s->crop_width, .height = s->crop_height};
     if (s->sample_border && s->filter != FILM_BOX) {
         int32_t reach = (int32_t)ceilf(s->filter_radius - 0.5f);
         plan.x -= reach;

@@ -102,13 +102,13 @@ rey_result rey_scene_freeze(rey_scene *scene) {
         !scene->dirty_volumes || !scene->dirty_media || !scene->dirty_phases) {
         return REY_ERROR_MEMORY;
     }
-#define ARRAY(type, name, comment)                                                                                     \
-    if (settle(scene, &scene->build.name, sizeof(type),                                                                \
-               (void *)&scene->build.name == (void *)&scene->build.theta ? (size_t)packed : 0) != REY_OK) {                                                   \
-        return REY_ERROR_MEMORY;                                                                                       \
-    }                                                                                                                  \
-    scene->view.name = scene->build.name.data ? scene->build.name.data : scene->arena;                                  \
-    scene->view.name##_count = (int64_t)scene->build.name.count;                                                       \
+#define ARRAY(type, name, comment)                                                                                                 \
+    if (settle(scene, &scene->build.name, sizeof(type),                                                                            \
+               (void *)&scene->build.name == (void *)&scene->build.theta ? (size_t)packed : 0) != REY_OK) {                        \
+        return REY_ERROR_MEMORY;                                                                                                   \
+    }                                                                                                                              \
+    scene->view.name = scene->build.name.data ? scene->build.name.data : scene->arena;                                             \
+    scene->view.name##_count = (int64_t)scene->build.name.count;                                                                   \
     scene->arena_bytes += scene->build.name.capacity * sizeof(type);
 #include "scene/arrays.inl"
 #undef ARRAY

@@ -230,7 +230,8 @@ static rey_result mesh_terminators(rey_scene *scene, int32_t id, Array *edges) {
     const ShapeRecord *shape = scene->view.shapes + id;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < shape->triangle_count && (shape->flags & SHAPE_HAS_NORMALS) && result == REY_OK; i++) {
-        EdgeRecord e = {.kind = EDGE_TERMINATOR, .shape = id, .prim = i, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE,
+        EdgeRecord e = {.kind = EDGE_TERMINATOR, .shape = id, .prim = i, .opposite = EDGE_OPEN,
+                        .other = EDGE_ANY, .crease = EDGE_CREASE,
                         .last = 1};
         result = push_edge(scene, edges, e);
     }

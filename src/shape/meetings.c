@@ -78,7 +78,8 @@ static int32_t triangles_of(const SceneView *view, int32_t id) {
 static void round_node(int32_t kind, int32_t column, int32_t row, double p[3]) {
     const double pi = 3.14159265358979323846;
     double phi = 2 * pi * (column % AROUND) / AROUND, x = cos(phi), y = sin(phi);
-    double theta = kind == SHAPE_SPHERE ? pi * row / STACKS : 0, wide = kind == SHAPE_CYLINDER ? 1 : kind == SHAPE_DISK ? row : sin(theta);
+    double theta = kind == SHAPE_SPHERE ? pi * row / STACKS : 0;
+    double wide = kind == SHAPE_CYLINDER ? 1 : kind == SHAPE_DISK ? row : sin(theta);
     p[0] = wide * x;
     p[1] = wide * y;
     p[2] = kind == SHAPE_SPHERE ? cos(theta) : kind == SHAPE_CYLINDER ? row : 0;

@@ -206,8 +206,10 @@ static void terms_have_shares(void **state) {
 // Samples of one term for its own noise; the others keep theirs.
 static void terms_have_budgets(void **state) {
     Fixture *f = *state;
-    JsonNode *few = run_json(f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms primary=16,indirect=32");
-    JsonNode *many = run_json(f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms indirect=2048,primary=1024");
+    JsonNode *few = run_json(f, 0,
+                             "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms primary=16,indirect=32");
+    JsonNode *many = run_json(
+        f, 0, "grad %s --param ball.to_world:translate=1,0.3,0 --spp 32 --json --spp-terms indirect=2048,primary=1024");
     static const char *const bounded[] = {"terms_standard_error.primary", "terms_standard_error.indirect"};
     for (int k = 0; k < 2; k++) {
         double ratio = json_value(few, bounded[k], NAN) / json_value(many, bounded[k], NAN);

@@ -128,8 +128,8 @@ static void files_are_files(void **state) {
     expect_words(f, 1, "fit pipe", "is a pipe");
     for (int i = 0; i < 3; i++) {
         char scene[512];
-        snprintf(scene, sizeof scene, "<scene version='3.0.0'><shape type='ply'><string name='filename' value='%s'/></shape></scene>",
-                 others[i][0]);
+        snprintf(scene, sizeof scene,
+                 "<scene version='3.0.0'><shape type='ply'><string name='filename' value='%s'/></shape></scene>", others[i][0]);
         write_words("mesh.xml", scene);
         expect_words(f, 1, "info mesh.xml", others[i][1]);
     }

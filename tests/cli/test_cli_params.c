@@ -77,8 +77,8 @@ static void refusals_name_objects(void **state) {
          "does not know the border of the light of spots whose beam_width is their cutoff_angle ('torch')"},
         {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='obj' id='hill'><string name='filename' "
          "value='hill.obj'/></shape>",
-         "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in or "
-         "through it are not found because of the vertex normals of 'hill'"},
+         "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in "
+         "or through it are not found because of the vertex normals of 'hill'"},
     };
     FILE *file = fopen("hill.obj", "w");
     assert_non_null(file);

@@ -116,7 +116,8 @@ static void places_of_jobs_are_told(void **state) {
     write_job(f, "defines: {nothing: 1}\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
     expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/start.xml:1:1: the parameter 'nothing' was given");
     write_job(f, "views: [{target: none.exr}]\nparameters:\n  - {name: red.reflectance, parameterisation: log, start: 0}\n");
-    expect_words(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr", "job.yaml:7: parameter 'red.reflectance': entry 0 starts at 0");
+    expect_words(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr",
+                 "job.yaml:7: parameter 'red.reflectance': entry 0 starts at 0");
     write_job(f, "load: none.xml\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
     expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/none.xml: cannot open the scene");
     write_job(f, "views: [{target: none.exr}]\nparameters: [red.reflectance]\n");

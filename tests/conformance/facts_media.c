@@ -72,15 +72,18 @@ static rey_result test_grid(Suite *suite, const JsonNode *fact, const char *file
     const int64_t sizes[3] = {g.n[0], g.n[1], g.n[2]};
     rey_scene *scene = NULL;
     rey_result result = rey_npy_write(suite->ctx, file, g.values, sizes, 3);
-    snprintf(text, sizeof text, "<scene version=\"3.0.0\"><volume type=\"gridvolume\"><string name=\"filename\" value=\"%s\"/>"
-                                "<string name=\"filter_type\" value=\"%s\"/></volume></scene>", file, nearest ? "nearest" : "trilinear");
+    snprintf(text, sizeof text,
+             "<scene version=\"3.0.0\"><volume type=\"gridvolume\"><string name=\"filename\" value=\"%s\"/>"
+             "<string name=\"filter_type\" value=\"%s\"/></volume></scene>",
+             file, nearest ? "nearest" : "trilinear");
     result = result ? result : facts_load(suite, text, &scene);
     result = result ? result : rey_scene_update(scene);
     const JsonNode *lookups = json_get(fact, "lookups");
     for (const JsonNode *l = lookups && !result ? lookups->first : NULL; l; l = l->next) {
         const VolumeNode *v = scene->view.volumes;
         Vec3 p = v3(facts_item(l->first, 0), facts_item(l->first, 1), facts_item(l->first, 2));
-        facts_tally(t, "a voxel", volume_eval(&scene->view, v, volume_to_local(&scene->view, v, p, 1)).c[0], facts_item(l, 1), 1e-5);
+        facts_tally(t, "a voxel", volume_eval(&scene->view, v, volume_to_local(&scene->view, v, p, 1)).c[0], facts_item(l, 1),
+                    1e-5);
     }
     rey_scene_destroy(scene);
     return result;

@@ -145,7 +145,8 @@ static void test_filters(void **state) {
     Fixture *f = *state;
     static float picture[PIXELS * 3], derivative[PIXELS * 3], adjoint[PIXELS * 3];
     for (size_t i = 0; i < sizeof filters / sizeof *filters; i++) {
-        rey_scene *scene = load_good(f, filters[i], "<emitter type=\"constant\" id=\"sky\"><float name=\"radiance\" value=\"2\"/></emitter>");
+        rey_scene *scene = load_good(f, filters[i],
+                                     "<emitter type=\"constant\" id=\"sky\"><float name=\"radiance\" value=\"2\"/></emitter>");
         rey_render_def def = rey_default_render_def();
         int param = rey_param_find(scene, "sky.radiance.value");
         rey_selection selection = {&param, 1};

@@ -271,7 +271,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_closed_sphere),        cmocka_unit_test(test_disc_irradiance),
         cmocka_unit_test(test_attached_variance),    cmocka_unit_test(test_difference_noise),
-        cmocka_unit_test(test_incomplete_is_refused), cmocka_unit_test(test_motion_is_partial), EVERY_ROOM(test_saved_renders_the_same),
+        cmocka_unit_test(test_incomplete_is_refused), cmocka_unit_test(test_motion_is_partial),
+        EVERY_ROOM(test_saved_renders_the_same),
         EVERY_ROOM(test_threads_change_nothing),
         EVERY_ROOM(test_widths),                     EVERY_ROOM(test_reverse_is_forward)};
     return cmocka_run_group_tests(tests, write_pictures, remove_pictures);
