@@ -383,6 +383,22 @@ static void test_values(void **state) {
     }
 }
 
+// d ln p / dg = (g^3 + g^2 c - 5 g + 3 c) / ((1 - g^2) (1 + g^2 - 2 g c)), c the cosine of the angle by which light is turned.
+static void test_score(void **state) {
+    (void)state;
+    for (double g = -0.9; g < 0.95; g += 0.3) {
+        PhaseCase c = case_of("hg", &g, 1);
+        for (double x = -0.95; x < 1; x += 0.19) {
+            PhaseQuery q = {.wi = {0, 0, 1}, .wo = {sqrt(1 - x * x), 0, -x}};
+            PhaseAdjoint a = {.df = 1};
+            double gradient[PHASE_THETA] = {0};
+            exact->adj(&c, 1, &q, &a, gradient, NULL);
+            double score = (g * g * g + g * g * x - 5 * g + 3 * x) / ((1 - g * g) * (1 + g * g - 2 * g * x));
+            assert_true(fabs(gradient[0] / value_at(&c, &q) - score) < 1e-9 * (1 + fabs(score)));
+        }
+    }
+}
+
 // Flakes see each other alike from both sides: sigma(wi) p(wi, wo) = sigma(wo) p(wo, wi).
 static void test_reciprocity(void **state) {
     (void)state;
@@ -411,6 +427,7 @@ static void test_reciprocity(void **state) {
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sampling), cmocka_unit_test(test_adjoint),
                                        cmocka_unit_test(test_widths), cmocka_unit_test(test_values),
+                                       cmocka_unit_test(test_score),
                                        cmocka_unit_test(test_reciprocity)};
     if (argc > 1) {
         cmocka_set_test_filter(argv[1]);
