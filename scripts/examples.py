@@ -3,6 +3,7 @@
 
 usage: examples.py [--reynolds PROGRAM] [EXAMPLE...]"""
 import argparse
+import glob
 import json
 import math
 import os
@@ -22,11 +23,15 @@ LIMITS = {
     "smoke": {},
     "milk": {"milk.sigma_a": 0.05, "milk.reduced_sigma_s": 0.08},
     "milk/dictionary": {},
+    "hidden": {},
+    "shadow_1": {},
 }
 LEAST_POINTS = {"shape": 5000}
 LEAST_PSNR = {"smoke": 30}  # of every view that is held out [dB]
 COSINES = (-0.3, 0, 0.3, 0.6, 0.9)  # of the functions in milk/dictionary.xml
 MOST_COSINE_ERROR, MOST_SHAPE_ERROR = 0.02, 0.05
+MOST_DENSITY_ERROR = 0.2  # of hidden: sum of errors over sum of densities
+MOST_SHIFT_ERROR = 0.05   # of shadow_1, along each axis
 
 
 def floats(path):
@@ -62,6 +67,31 @@ def judge_dictionary(reynolds, folder, result):
     if not off <= MOST_SHAPE_ERROR:
         wrong.append("milk/dictionary: another shape is off by %g, expected at most %g" % (off, MOST_SHAPE_ERROR))
     return wrong
+
+
+def voxels(path):
+    """The numbers of a .vol file of 32-bit floats."""
+    with open(path, "rb") as f:
+        data = f.read()
+    return struct.unpack("<%df" % ((len(data) - 48) // 4), data[48:])
+
+
+def judge_hidden(reynolds, folder, result):
+    found = voxels(glob.glob(os.path.join(folder, "hidden", "recovered_data", "*.vol"))[0])
+    truth = voxels(os.path.join(ROOT, "examples/hidden/truth.vol"))
+    off = sum(abs(a - b) for a, b in zip(found, truth)) / sum(truth)
+    print("  densities: sum of errors over sum %.3f" % off)
+    return [] if off <= MOST_DENSITY_ERROR else ["hidden: the densities are off by %g, expected at most %g" % (off, MOST_DENSITY_ERROR)]
+
+
+def judge_shadow(reynolds, folder, result):
+    row = result["parameters"][0]
+    off = [abs(row["found"][i] - row["truth"][i]) for i in (3, 7, 11)]
+    print("  found at %s, off by %s" % (" ".join("%.4f" % row["found"][i] for i in (3, 7, 11)), " ".join("%.4f" % x for x in off)))
+    return ["shadow_1: off by %g, expected at most %g" % (x, MOST_SHIFT_ERROR) for x in off if not x <= MOST_SHIFT_ERROR]
+
+
+JUDGES = {"milk/dictionary": judge_dictionary, "hidden": judge_hidden, "shadow_1": judge_shadow}
 
 
 def judge(name, result):
@@ -111,8 +141,8 @@ def main():
             result = json.loads(run.stdout)
             show(name, result)
             wrong += judge(name, result)
-            if name == "milk/dictionary":
-                wrong += judge_dictionary(options.reynolds, folder, result)
+            if name in JUDGES:
+                wrong += JUDGES[name](options.reynolds, folder, result)
     print("\n".join(wrong) if wrong else "examples: all found")
     return 1 if wrong else 0
 
