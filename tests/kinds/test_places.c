@@ -82,6 +82,60 @@ static void check_face(const World *w, const VolumeNode *v, Vec3 p, const Face *
     assert_near("place on the face", (x[face->axis] - corner) / size, face->upper ? 1 : 0, 1e-4);
 }
 
+static bool inside_box(const World *w, const VolumeNode *v, Vec3 p) {
+    Vec3 q = volume_to_local(&w->scene, v, p, 1);
+    const float own[3] = {q.x, q.y, q.z}, world[3] = {p.x, p.y, p.z};
+    bool inside = true;
+    for (int k = 0; k < 3; k++) {
+        float corner = 0, size = 1;
+        if (medium_fills_box(v)) {
+            medium_box(&w->scene, v, k, &corner, &size);
+        }
+        float x = medium_fills_box(v) ? world[k] : own[k];
+        inside = inside && x >= corner && x <= corner + size;
+    }
+    return inside;
+}
+
+// Which faces there are, seen from points along the ray.
+static void check_found(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, const Face face[2]) {
+    enum { STEPS = 1000 };
+    const float step = 0.02f;
+    int within = 0;
+    for (int i = 0; i < STEPS; i++) {
+        within += inside_box(w, v, v3_madd(o, step * (float)i, d));
+    }
+    bool starts = inside_box(w, v, o);
+    if (within > 3) {
+        assert_true((face[0].m != 0) == !starts && face[1].m);
+        assert_near("length within", face[1].at - (starts ? 0 : face[0].at), step * (float)within, 2.1 * step);
+    }
+}
+
+// Faces next to where the ray begins or ends are a surface's.
+static void check_apart(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, const Face *face, bool leaves) {
+    Vec3 p = v3_madd(o, face->at, d), n = v3(face->axis == 0, face->axis == 1, face->axis == 2);
+    if (!medium_fills_box(v)) {
+        n = v3_normalize(table_v3(&w->scene, TABLE + 4 * face->axis));
+    }
+    const float cosine = fabsf(v3_dot(n, d)), out = face->upper ? 1 : -1;
+    for (int far = 0; far < 2 && cosine > 0.1f; far++) {
+        float least = (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z))) * 1.5e-4f * (far ? 1.5f : 0.6f);
+        Face found[2];
+        if (leaves) { // the least distance goes by where the ray begins
+            Vec3 begin = v3_madd(p, -0.2f, d);
+            least *= (1 + fmaxf(fmaxf(fabsf(begin.x), fabsf(begin.y)), fabsf(begin.z))) / (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z)));
+            medium_faces(&w->scene, v, begin, d, 0.2f + least / cosine, m_set(true), found);
+        } else {
+            medium_faces(&w->scene, v, v3_madd(p, out * least, n), d, INFINITY, m_set(true), found);
+        }
+        assert_int_equal(found[leaves].m != 0, far);
+    }
+    Vec3 next = face_inside(p, d, leaves);
+    float step = (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z))) * 1e-5f;
+    assert_near("step", v3_dot(v3_sub(next, p), d), leaves ? -step : step, 0.1 * step);
+}
+
 static void test_faces(void **state) {
     (void)state;
     uint64_t random = 3;
@@ -101,10 +155,12 @@ static void test_faces(void **state) {
         Face face[2];
         medium_faces(&w.scene, &v, o, d, INFINITY, m_set(true), face);
         Vec3 turn = v3_zero(), way = random_vector(&random);
+        check_found(&w, &v, o, d, face);
         for (int k = 0; k < 2; k++) {
             if (face[k].m) {
                 Vec3 p = v3_madd(o, face[k].at, d);
                 check_face(&w, &v, p, face + k);
+                check_apart(&w, &v, o, d, face + k, k);
                 face_adj(&w.scene, &v, face + k, p, d, worth[k], &sink);
                 turn = v3_add(turn, face_turn(&w.scene, &v, face + k, d, worth[k]));
                 crossed++;
