@@ -7,7 +7,7 @@ one copy of the sources, for one SIMD width; the environment variable REY_MUTANT
 rebuilt between them. Finite differences, which no mutant changes, are kept from run to run.
 Usage: scripts/mutate.py [--file PART] [--sample N] [--seed N] [--tree DIR] [--quick] [--effort SHARE] [--again] [--list]
 The tree (default: build-mutate) keeps build, differences and verdicts: a run goes on where the last one ended; --again
-tries survivors once more. Exit status 1 when a mutant survives that is not listed as equivalent."""
+tries survivors once more. Exit status 1 when a mutant survives that scripts/equivalent_mutants.txt does not list."""
 import argparse
 import collections
 import fnmatch
@@ -73,15 +73,14 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/integrator/boundary/turning.h", [BOUNDARY + " turning_"]),
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/upstream.h", [BOUNDARY + " mirror_"]),
+         ("src/integrator/boundary/primary.h", ["test_edge_moves"] + EDGES),
+         ("src/integrator/boundary/indirect.h", ["test_segment_moves"] + EDGES),
          ("src/integrator/boundary/", EDGES),
          ("src/integrator/border.h", ["test_places"] + MEDIA),
          ("src/integrator/", MEDIA)]
 
 COARSE = {BOUNDARY, "test_chains", "test_fog"} # know --effort
 RENDERS = COARSE | {"test_differences", "test_particle_gradients"}
-
-# Mutants that change nothing: "file: function: text: kind", as they are printed, and why.
-EQUIVALENT = {}
 
 # One of several alike in a function has a number.
 Mutant = collections.namedtuple("Mutant", "file line function text kind number site")
@@ -221,6 +220,17 @@ class Runner:
         return None
 
 
+def equivalent():
+    """Mutants that change nothing, by name, and why."""
+    why, found = "", {}
+    for line in (ROOT / "scripts/equivalent_mutants.txt").read_text().splitlines():
+        if line.startswith("# "):
+            why = line[2:]
+        else:
+            found[line] = why
+    return found
+
+
 def name_of(mutant):
     which = f" ({mutant.number})" if mutant.number > 1 else ""
     return f"{mutant.file}: {mutant.function}: {mutant.text}{which}: {mutant.kind}"
@@ -228,19 +238,18 @@ def name_of(mutant):
 
 def judge(chosen, tree, runner, again):
     """Prints a verdict on each mutant; how many survive."""
-    path, survivors = tree / "verdicts.jsonl", 0
+    path, survivors, harmless = tree / "verdicts.jsonl", 0, equivalent()
     path.touch()
     verdicts = dict(json.loads(line) for line in path.read_text().splitlines())
     for mutant in chosen:
         key = name_of(mutant)
-        if key not in verdicts or (again and not verdicts[key]):
+        if key not in harmless and (key not in verdicts or (again and not verdicts[key])):
             killer = runner.killer(mutant)
             if killer or not runner.quick:
                 verdicts[key] = killer
                 with path.open("a") as f:
                     f.write(json.dumps([key, killer]) + "\n")
-        why = EQUIVALENT.get(key)
-        verdict = f"killed by {verdicts[key]}" if verdicts.get(key) else f"equivalent: {why}" if why else "SURVIVED"
+        verdict = f"killed by {verdicts[key]}" if verdicts.get(key) else f"equivalent: {harmless[key]}" if key in harmless else "SURVIVED"
         survivors += verdict == "SURVIVED"
         print(f"{mutant.line}: {key}: {verdict}", flush=True)
     return survivors

@@ -120,3 +120,19 @@ static inline Vec3 towards_eye(Vec3 eye, bool parallel, Vec3 p) {
 static inline Vec3 vertex(const World *w, int i) {
     return v3(w->theta[3 * i], w->theta[3 * i + 1], w->theta[3 * i + 2]);
 }
+
+// Before the point, looking at it.
+static inline void place_camera(World *w, bool parallel, Vec3 p, uint64_t *random) {
+    Vec3 z = v3_normalize(random_vector(random)), eye = v3_madd(p, -5, z);
+    Frame f = frame_from_normal(z);
+    const Vec3 columns[4] = {f.s, f.t, z, v3_madd(v3_madd(eye, 0.4f, f.s), -0.3f, f.t)};
+    for (int k = 0; k < 4; k++) {
+        w->theta[CAMERA + k] = columns[k].x;
+        w->theta[CAMERA + 4 + k] = columns[k].y;
+        w->theta[CAMERA + 8 + k] = columns[k].z;
+    }
+    w->theta[FOV] = 60;
+    w->theta[PRINCIPAL] = w->theta[PRINCIPAL + 1] = parallel ? 0 : 0.1f;
+    w->sensor = (SensorRecord){.kind = parallel ? SENSOR_ORTHOGRAPHIC : SENSOR_PERSPECTIVE, .to_world = CAMERA, .fov = FOV,
+                               .principal = PRINCIPAL, .lens = -1, .width = 30, .height = 20, .far_clip = 100};
+}
