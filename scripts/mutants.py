@@ -157,7 +157,7 @@ class Parser:
 
 def is_trivial(node):
     """Zeros change with no sign, and a factor 1 by nothing."""
-    if node.name == "f_set" and node.parts:
+    while node.kind == "cast" or (node.name == "f_set" and node.parts):
         node = node.parts[0]
     return re.match(r"\w*(zero|light_move_zero)$", node.name) or (node.kind == "number" and float(node.name.rstrip("fuUlL")) in (0, 1))
 
