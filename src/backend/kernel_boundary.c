@@ -1,5 +1,6 @@
 // kernel_boundary.c: the kernels of the boundary terms of one SIMD width, compiled once per width.
 #include "integrator/boundary/indirect.h"
+#include "integrator/boundary/mirrored.h"
 #include "integrator/boundary/primary.h"
 
 // Behind the workspace proper: the groups' offsets, and which samples of a chunk are kept.
@@ -18,6 +19,48 @@ static void run_indirect(Indirect *in, Sink *sink, int32_t *begin) {
     }
 }
 
+// Reverse: the film's adjoint at the film positions of `count` pairs of paths.
+static void pairs_adjoint(const Tracer *t, const BoundaryJob *b, const FilterTable *filter, int32_t count) {
+    for (int32_t i = 0; i < count && b->job.mode == MODE_REVERSE; i++) {
+        float delta[SPEC_N], x = (float)t->ws.film_x[i], y = (float)t->ws.film_y[i];
+        film_worth(t->sensor, filter, b->job.adjoint, x, y, (int32_t)floorf(x), (int32_t)floorf(y), delta);
+        for (int c = 0; c < SPEC_N; c++) {
+            t->ws.adjoint[c][i] = delta[c] * b->scale;
+        }
+    }
+}
+
+// Forward: what they bring there.
+static void pairs_splat(Tracer *t, const BoundaryJob *b, int32_t count) {
+    for (int32_t i = 0; i < count && b->job.mode == MODE_FORWARD; i++) {
+        double l[SPEC_N];
+        for (int c = 0; c < SPEC_N; c++) {
+            l[c] = (double)t->ws.radiance[c][i];
+        }
+        particle_splat(t, (double)t->ws.film_x[i], (double)t->ws.film_y[i], l);
+    }
+}
+
+static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *filter, Sink *sink, Segments *q, int32_t *kept,
+                         int32_t *begin) {
+    const int32_t most = t->ws.chunk / 2;
+    const Strips strips = strips_of(t);
+    for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
+        int64_t left = b->count - at;
+        int32_t count = strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept), half;
+        curves_find(t, b, &strips, b->first + at, kept, count, q);
+        if (q->count == 0) {
+            continue;
+        }
+        half = (q->count + LANES - 1) / LANES * LANES;
+        curves_start(t, q, b->first + at, half);
+        path_forward(t, begin);
+        pairs_adjoint(t, b, filter, q->count);
+        curves_finish(t, b, q, sink, half);
+        pairs_splat(t, b, q->count);
+    }
+}
+
 static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, const FilterTable *filter, Sink *sink,
                         int32_t *kept, int32_t *begin) {
     const int32_t most = t->ws.chunk / 2;
@@ -30,21 +73,9 @@ static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole,
         primary_look(t, b, pinhole, found, half);
         path_forward(t, begin);
         t->placed = false;
-        for (int32_t i = 0; i < found && b->job.mode == MODE_REVERSE; i++) {
-            float delta[SPEC_N], x = (float)t->ws.film_x[i], y = (float)t->ws.film_y[i];
-            film_worth(t->sensor, filter, b->job.adjoint, x, y, (int32_t)floorf(x), (int32_t)floorf(y), delta);
-            for (int c = 0; c < SPEC_N; c++) {
-                t->ws.adjoint[c][i] = delta[c] * b->scale;
-            }
-        }
+        pairs_adjoint(t, b, filter, found);
         primary_finish(t, b, pinhole, sink, found, half);
-        for (int32_t i = 0; i < found && b->job.mode == MODE_FORWARD; i++) {
-            double l[SPEC_N];
-            for (int c = 0; c < SPEC_N; c++) {
-                l[c] = (double)t->ws.radiance[c][i];
-            }
-            particle_splat(t, (double)t->ws.film_x[i], (double)t->ws.film_y[i], l);
-        }
+        pairs_splat(t, b, found);
     }
 }
 
@@ -66,11 +97,23 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Sink sink = sink_of(&b->job);
     in.pinhole = &pinhole;
     in.filter = &filter;
-    if (b->kind == BOUNDARY_PRIMARY) {
+    in.glimpses = in.upstream && b->mirrored;
+    in.sink = &sink;
+    double unused = 0;
+    PathJob still = b->job;
+    still.texture_at = still.to_uv_at = still.normals_at = still.attribute_at = still.place_at = b->none;
+    still.points_at = still.pose_at = still.instance_at = still.camera_at = still.volume_at = b->none;
+    still.gradient = &unused;
+    still.tangent = NULL;
+    b->still = &still;
+    if (b->kind == BOUNDARY_MIRRORED) {
+        run_mirrored(&t, b, &filter, &sink, &in.q, kept, begin);
+    } else if (b->kind == BOUNDARY_PRIMARY) {
         run_primary(&t, b, &pinhole, &filter, &sink, kept, begin);
     } else {
         run_indirect(&in, &sink, begin);
     }
+    b->still = NULL;
     b->job.paths = job.paths;
     b->job.rays = job.rays;
     b->job.nonfinite = job.nonfinite;

@@ -152,7 +152,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, &s, sink);
     }
-    if (job->any_motion && s.first && m_any(s.scattered & s.chained)) {
+    if ((job->any_motion || job->any_places) && s.first && m_any(s.scattered & s.chained)) {
         sink->faces |= CAMERA_MIRRORED;
     }
     if ((live & LIVE_SCATTERING) || live_passing) {

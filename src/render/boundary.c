@@ -33,6 +33,7 @@ int rey_boundary_term(int32_t kind) {
     case BOUNDARY_PRIMARY:
         return REY_TERM_PRIMARY;
     case BOUNDARY_CHAINED:
+    case BOUNDARY_MIRRORED:
         return REY_TERM_SPECULAR;
     default:
         return REY_TERM_INDIRECT;
@@ -165,7 +166,7 @@ static rey_result reserve_workspaces(Render *r) {
 static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
-                                                  [BOUNDARY_CHAINED] = 1};
+                                                  [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -178,7 +179,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     *plan = (BoundaryPlan){.film = r->plan};
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
-    if (result == REY_OK) {
+    if (result == REY_OK && kind != BOUNDARY_MIRRORED) { // it looks for edges where they are seen
         result = rey_boundary_edges(r, kind, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
@@ -187,10 +188,13 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     }
     // In media only silhouettes are known, and what else there is does not depend on lights.
     int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
+    if (kind == BOUNDARY_MIRRORED) {
+        edge_count = r->job.any_motion && rey_chains_known(&r->scene->view, r->plan.sensor);
+    }
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
-                              .edge_count = edge_count, .round = plan->job.round,
+                              .edge_count = edge_count, .round = plan->job.round, .none = r->none, .everywhere = r->turns_rays,
                               .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
@@ -262,7 +266,9 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
 }
 
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture) {
-    if (plan->job.edge_count == 0) {
+    // The interior's paths have found out whether the sensor sees mirrors and glass.
+    plan->job.mirrored = plan->job.chains && !r->particles && (!(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED));
+    if (plan->job.edge_count == 0 || (plan->job.kind == BOUNDARY_MIRRORED && !plan->job.mirrored)) {
         return;
     }
     BoundaryPass pass = {r, plan};

@@ -168,7 +168,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
     r->faces |= job->faces;
-    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH, mirrored = r->faces & CAMERA_MIRRORED;
+    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH, mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
     r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
     r->stats.trace_seconds += job->trace_seconds;
     r->stats.thread_seconds += seconds;
@@ -238,11 +238,12 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
     int64_t n = 2 * textures + 3 * shapes + view->instances_count + CAMERA_NUMBERS + view->attributes_count + places +
                 view->volumes_count + view->groups_count + view->media_count + PAD;
-    r->offsets = rey_alloc_array(r->scene->ctx, (size_t)n, sizeof *r->offsets);
+    r->offsets = rey_alloc_array(r->scene->ctx, 2 * (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
     }
-    memset(r->offsets, 0xff, (size_t)n * sizeof *r->offsets);
+    memset(r->offsets, 0xff, 2 * (size_t)n * sizeof *r->offsets);
+    r->none = r->offsets + n;
     int32_t *texture_at = r->offsets, *to_uv_at = r->offsets + textures, *normals_at = r->offsets + 2 * textures;
     int32_t *attribute_at = normals_at + shapes, *place_at = attribute_at + view->attributes_count;
     r->job.points_at = place_at + places;
@@ -272,7 +273,9 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_places |= p->emitter >= 0;
         r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
-        r->job.any_motion |= p->emitter < 0 && (p->terms & REY_TERM_SPECULAR);
+        bool behind = p->emitter < 0 && (p->terms & REY_TERM_SPECULAR);
+        r->job.any_motion |= behind;
+        r->turns_rays |= behind && p->geometry < 0 && p->instance < 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
         if (at > INT32_MAX / 2) {
@@ -282,10 +285,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->selection_size = at;
     rey_motion_add_normals(r, &at);
     r->gradient_size = at;
-    r->job.texture_at = texture_at;
-    r->job.to_uv_at = to_uv_at;
-    r->job.attribute_at = attribute_at;
-    r->job.place_at = place_at;
+    r->job.texture_at = texture_at, r->job.to_uv_at = to_uv_at;
+    r->job.attribute_at = attribute_at, r->job.place_at = place_at;
     rey_live_groups(view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + view->volumes_count);
     return REY_OK;
 }

@@ -39,6 +39,8 @@ typedef struct Render {
     double *normal_sums;   // of vertex normals that follow the selection (motion.c)
     double *columns, *rows;
     int32_t *offsets;      // texture_at, to_uv_at, normals_at, attribute_at, ..., live
+    const int32_t *none;   // the same of a selection of nothing
+    bool turns_rays;       // the selection turns rays everywhere: the camera's, or mirrored and refracted ones
     float *adjoint;
     int terms;             // REY_TERM_ bits that are computed
     TermRequest request;

@@ -40,7 +40,7 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, const 
     if (p->normals >= 0) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     }
-    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT : still | chains;
+    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT | chains : still | chains;
 }
 
 // Whether some medium's extinction jumps from voxel to voxel.
@@ -193,7 +193,7 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "the gradient of lights at a point that lie within a participating medium, and of cameras beside them, "
                         "does not exist yet: points next to a light, from which its light is scattered, must move as it does");
     }
-    int missing = r->stats.missing_terms & (REY_TERM_TERMINATOR | (r->terms & REY_TERM_SPECULAR)), bit = missing & -missing;
+    int missing = r->stats.missing_terms & REY_TERM_TERMINATOR, bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {
         return result;
     }
@@ -204,10 +204,9 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
     }
     static const char *const turned = "does not exist yet: paths met shading normals that face the viewer as the surface "
                                       "does and others that do not, and the picture jumps between them";
-    static const char *const mirrored = "does not know the edges that the camera sees in smooth mirrors and glass";
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                     "the gradient of %s needs the term '%s', which %s. --terms interior gives the part that does exist",
-                    p ? p->name : "", rey_term_name(bit), bit == REY_TERM_SPECULAR ? mirrored : turned);
+                    p ? p->name : "", rey_term_name(bit), turned);
 }
 
 void rey_terms_book(Render *r, int set, int term, const double *picture) {

@@ -7,7 +7,7 @@
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
-// along chains of smooth mirrors and glass (chained.h).
+// along chains of smooth mirrors and glass (chained.h); and those that the camera sees along such chains (mirrored.h).
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -15,6 +15,7 @@ enum {
     BOUNDARY_HORIZON,
     BOUNDARY_MEETING,
     BOUNDARY_CHAINED,
+    BOUNDARY_MIRRORED,
     BOUNDARY_KINDS
 };
 
@@ -31,6 +32,10 @@ typedef struct BoundaryJob {
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
     bool chains;              // the scene has chains of smooth mirrors and glass
+    bool mirrored;            // and the camera sees them
+    bool everywhere;          // what the camera sees of them moves also where it meets nothing that moves
+    const int32_t *none;      // the offsets of a selection of nothing
+    const PathJob *still;     // the job with that selection
 } BoundaryJob;
 
 // Samples of one number of a `pixel` of their random numbers.

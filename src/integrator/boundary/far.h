@@ -12,6 +12,8 @@ typedef struct Indirect {
     const FilterTable *filter;
     Segments q;
     bool upstream;  // near points may move with what lies further towards the sensor
+    bool glimpses;  // the sensor sees smooth mirrors or glass
+    Sink *sink;
 } Indirect;
 
 static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {

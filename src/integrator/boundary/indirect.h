@@ -4,10 +4,11 @@
 // gathers what the film's adjoint makes of it, at its first vertex and at the others: the first one slides over its
 // surface, because the film position is fixed.
 // Edges along chains of smooth mirrors and glass (chained.h) take the same way.
-// NOT differentiated: what the camera sees in mirrors and through glass, and edges of surfaces that let light pass.
+// What the camera sees of this in mirrors and through glass: glimpse.h.
+// NOT differentiated: edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/far.h"
+#include "integrator/boundary/glimpse.h"
 
 // ---- the near side -----------------------------------------------------------------------------------------------
 
@@ -131,6 +132,9 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     if (!scene->hide_emitters || group->emitter < 0) {
         near_connect(in, &at, bounce);
     }
+    if (in->glimpses && m_any(at.v.m)) {
+        glimpse_connect(in, &at, near_lens(in, at.v.slot), bounce);
+    }
     if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth && !scene->has_media) {
         return next_count;
     }
@@ -155,6 +159,7 @@ static void near_place(Tracer *t, const Segments *q, int32_t k) {
 }
 
 static void ways_advance(Indirect *in, int32_t bounce, Sink *sink);
+static void ways_carry(Indirect *in, int32_t bounce);
 
 static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     Tracer *t = in->t;
@@ -193,6 +198,9 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         if (in->upstream) {
             upstream_arrive(t, &in->q, bounce);
             ways_advance(in, bounce, sink);
+        }
+        if (in->glimpses && in->b->job.mode == MODE_REVERSE) {
+            ways_carry(in, bounce);
         }
         sort_stage(t, begin, groups);
         int32_t next_count = 0;
@@ -310,6 +318,15 @@ static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
 
 // ---- what moves upstream -----------------------------------------------------------------------------------------
 
+KFN void carried_store(const Segments *q, int32_t k, const Carried *c) {
+    f_store(q->dragx + k, c->drag.x);
+    f_store(q->dragy + k, c->drag.y);
+    f_store(q->dragz + k, c->drag.z);
+    f_store(q->turnx + k, c->turn.x);
+    f_store(q->turny + k, c->turn.y);
+    f_store(q->turnz + k, c->turn.z);
+}
+
 // Forward mode: the rates of the ways that end at the vertices of a bounce, where the particles have just arrived.
 static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
     const Segments *q = &in->q;
@@ -334,12 +351,23 @@ static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
         points_move_adj(in->t, &at.hit, c.drag, v3_zero(), sink, ray);
         f_store(q->up[bounce].unseen + k, f_zero_unless(ray, rate + sink_taken(sink)));
         f_store(q->rate + k, rate);
-        f_store(q->dragx + k, c.drag.x);
-        f_store(q->dragy + k, c.drag.y);
-        f_store(q->dragz + k, c.drag.z);
-        f_store(q->turnx + k, c.turn.x);
-        f_store(q->turny + k, c.turn.y);
-        f_store(q->turnz + k, c.turn.z);
+        carried_store(q, k, &c);
+    }
+}
+
+// Reverse mode: what is carried upstream to there, where chains lead on to the sensor.
+static void ways_carry(Indirect *in, int32_t bounce) {
+    const Segments *q = &in->q;
+    Sink still = sink_of(in->b->still);
+    for (int32_t k = 0; k < q->count && bounce < q->levels; k += LANES) {
+        Mask m = m_first_n(q->count - k);
+        Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+        Carried c = {v3_scale(n, f_load(q->along + k) - 1.0f), v3_zero()};
+        if (bounce > 0) {
+            c = (Carried){record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
+            upstream_turn_adj(in->t, q, bounce - 1, k, &c, &still, m);
+        }
+        carried_store(q, k, &c);
     }
 }
 
@@ -350,7 +378,9 @@ static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
     Float worth[MOST_UPSTREAM + 1], sum = f_set(0);
     for (int32_t j = q->levels; j >= 0; j--) { // of a level and all that follow
         Mask met = j < q->levels ? m & mi_lt(i_set(UPSTREAM_NONE), i_load(q->up[j].met + k)) : m_set(false);
-        sum = j < q->levels ? sum + f_zero_unless(met, f_load(q->up[j].seen + k) + f_load(q->up[j].unseen + k)) : sum;
+        Float own = j < q->levels ? f_load(q->up[j].seen + k) + f_load(q->up[j].unseen + k) + f_load(q->up[j].passed + k)
+                                  : f_set(0);
+        sum = sum + f_zero_unless(met, own);
         worth[j] = sum;
     }
     m = m & m_finite(sum);

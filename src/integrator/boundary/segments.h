@@ -35,8 +35,8 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 #define SEGMENT_SPECS(S) S(light) S(flown)
 
 // Near vertices of one level (upstream.h): where they lie, where the particle came from and went on, and what the motion of a
-// vertex is worth where it is seen by the sensor, and elsewhere.
-#define UPSTREAM_FLOATS(F) F(u) F(v) F(x) F(y) F(z) F(dx) F(dy) F(dz) F(seen) F(unseen)
+// vertex is worth where it is seen by the sensor, and elsewhere; and that of all before it where it is seen along a chain.
+#define UPSTREAM_FLOATS(F) F(u) F(v) F(x) F(y) F(z) F(dx) F(dy) F(dz) F(seen) F(unseen) F(passed)
 #define UPSTREAM_INTS(I) I(shape) I(prim) I(instance) I(met) I(lobe)
 
 typedef struct Upstream {

@@ -74,6 +74,7 @@ static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce) {
         f_scatter(u->dz, slot, f_load(p->dz + k), m);
         f_scatter(u->seen, slot, f_set(0), m);
         f_scatter(u->unseen, slot, f_set(0), m);
+        f_scatter(u->passed, slot, f_set(0), m);
         q->levels = bounce + 1;
     }
 }

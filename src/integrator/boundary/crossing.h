@@ -1,0 +1,199 @@
+// crossing.h: which edge lies between two lines of sight that part: what they meet says it, and how it moves. With r a point
+// of the line there, both sides part where F = n . e - n' . e' - (n - n') . r = 0. Of an edge, e is its point, n the normal of
+// the plane of edge and line, and n' = 0. Where two surfaces pass through each other, their points e and e' are at the same
+// distance on the line, n = N / (N . d) and n' = N' / (N' . d).
+#pragma once
+
+#include "integrator/boundary/sightline.h"
+
+typedef struct Crossing {
+    Hit hit, other;      // e and e', as attached points
+    Vec3 p;              // on the line
+    Vec3 n, n_other, across; // across: n - n'
+    Mask m, meeting;
+} Crossing;
+
+// The edge of the surface of `own` that a ray passes outside of it.
+typedef struct Miss {
+    Hit edge;
+    Vec3 n;
+    Mask m;
+} Miss;
+
+static void triangle_load(const SceneView *scene, int32_t flags, const Hit *hit, Vec3 p[3]) {
+    Corners c = mesh_corners(scene, hit->shape, hit->prim);
+    Int positions = SHAPE_FIELD(scene, hit->shape, positions);
+    for (int k = 0; k < 3; k++) {
+        p[k] = theta_v3(scene, positions + c.i[k] * 3);
+        p[k] = flags & SHAPE_INSTANCED ? pose_to_world(scene, instance_table(scene, hit), p[k]) : p[k];
+    }
+}
+
+static Miss miss_triangle(const SceneView *scene, int32_t flags, const Hit *own, Vec3 o, Vec3 d) {
+    Vec3 p[3];
+    triangle_load(scene, flags, own, p);
+    Vec3 e1 = v3_sub(p[1], p[0]), e2 = v3_sub(p[2], p[0]), g = v3_cross(e1, e2);
+    Float s = v3_dot(v3_sub(p[0], o), g) * f_safe_rcp(v3_dot(d, g)), rcp = f_safe_rcp(v3_dot(g, g));
+    Vec3 q = v3_sub(v3_madd(o, s, d), p[0]);
+    Float u = v3_dot(v3_cross(q, e2), g) * rcp, v = v3_dot(v3_cross(e1, q), g) * rcp;
+    Float there[3] = {1.0f - u - v, u, v}, here[3] = {1.0f - own->u - own->v, own->u, own->v};
+    Mask first = m_lt(there[0], there[1]) & m_lt(there[0], there[2]), second = ~first & m_lt(there[1], there[2]);
+    Float b = f_select(first, there[0], f_select(second, there[1], there[2]));
+    Float a = f_max(f_select(first, here[0], f_select(second, here[1], here[2])), f_set(0));
+    Float part = a * f_safe_rcp(a - b);
+    Miss out = {.edge = *own, .m = m_lt(b, f_set(0)) & m_gt(s, f_set(0))};
+    out.edge.u = own->u + part * (u - own->u);
+    out.edge.v = own->v + part * (v - own->v);
+    out.edge.p = v3_madd(v3_madd(p[0], out.edge.u, e1), out.edge.v, e2);
+    Vec3 tangent = v3_select(first, v3_sub(p[2], p[1]), v3_select(second, e2, e1));
+    out.n = v3_normalize(v3_cross(d, tangent));
+    return out;
+}
+
+static Miss miss_sphere(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
+    Int at = SHAPE_FIELD(scene, own->shape, table);
+    Vec3 centre = table_v3(scene, at), q = v3_sub(o, centre);
+    Float radius = table_at(scene, at + 3);
+    q = v3_madd(q, -v3_dot(q, d), d);
+    Float distance = v3_length(q);
+    Miss out = {.edge = *own, .m = m_gt(distance, radius)};
+    out.n = v3_scale(q, f_safe_rcp(distance));
+    out.edge.p = v3_madd(centre, radius, out.n);
+    return out;
+}
+
+KFN Vec3 pose_direction_to_local(const SceneView *scene, Int at, Vec3 d) {
+    return v3(v3_dot(table_v3(scene, at + 12), d), v3_dot(table_v3(scene, at + 16), d), v3_dot(table_v3(scene, at + 20), d));
+}
+
+// The unit circle at a height, next to a point.
+static void miss_rim(const SceneView *scene, Int at, Vec3 q, Float height, Vec3 d, Miss *out, Mask m) {
+    Float r = f_safe_rcp(f_sqrt(q.x * q.x + q.y * q.y)), x = q.x * r, y = q.y * r;
+    Vec3 tangent = v3_madd(v3_scale(pose_column(scene, at, 0), -y), x, pose_column(scene, at, 1));
+    out->edge.p = v3_select(m, pose_to_world(scene, at, v3(x, y, height)), out->edge.p);
+    out->n = v3_select(m, v3_normalize(v3_cross(d, tangent)), out->n);
+    out->m = out->m | m;
+}
+
+static Miss miss_disk(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
+    Int at = SHAPE_FIELD(scene, own->shape, table);
+    Vec3 lo = pose_to_local(scene, at, o), ld = pose_direction_to_local(scene, at, d);
+    Vec3 q = v3_madd(lo, -lo.z * f_safe_rcp(ld.z), ld);
+    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
+    miss_rim(scene, at, q, f_set(0), d, &out, m_gt(q.x * q.x + q.y * q.y, f_set(1)));
+    return out;
+}
+
+static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
+    Int at = SHAPE_FIELD(scene, own->shape, table);
+    Vec3 lo = pose_to_local(scene, at, o), ld = pose_direction_to_local(scene, at, d);
+    Float a = ld.x * ld.x + ld.y * ld.y, b = lo.x * ld.x + lo.y * ld.y, c = lo.x * lo.x + lo.y * lo.y - 1.0f;
+    Float root = b * b - a * c, rcp = f_safe_rcp(a), width = f_safe_sqrt(root) * rcp;
+    Float middle = -b * rcp, here = v3_dot(v3_sub(own->p, o), d);
+    Mask behind = m_gt(here, middle);
+    Vec3 q = v3_madd(lo, middle + f_select(behind, width, -width), ld);
+    Mask aside = m_lt(root, f_set(0)), low = ~aside & m_lt(q.z, f_set(0)), high = ~aside & m_gt(q.z, f_set(1));
+    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
+    miss_rim(scene, at, q, f_set(0), d, &out, low);
+    miss_rim(scene, at, q, f_set(1), d, &out, high);
+    miss_rim(scene, at, q, q.z, d, &out, aside);
+    out.n = v3_select(aside, v3_normalize(v3_cross(d, pose_column(scene, at, 2))), out.n);
+    return out;
+}
+
+// Lanes of m whose ray passes outside of the surface's part that another ray meets at `own`; unit normals there.
+static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m, Vec3 *normal) {
+    const SceneView *scene = t->scene;
+    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
+    *normal = v3_zero();
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t first = i_lane(own->shape, m_first(left)), id = scene->shapes[first].group;
+        const Group *group = scene->groups + id;
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(own->shape, i_set(0)), group), i_set(id));
+        Hit h = hit_of_lanes(own, first, mine);
+        Miss one = {.edge = h, .n = v3_zero(), .m = m_set(false)};
+        switch (group->shape_kind) {
+        case SHAPE_MESH:
+            one = miss_triangle(scene, group->shape_flags, &h, o, d);
+            break;
+        case SHAPE_SPHERE:
+            one = miss_sphere(scene, &h, o, d);
+            break;
+        case SHAPE_DISK:
+            one = miss_disk(scene, &h, o, d);
+            break;
+        case SHAPE_CYLINDER:
+            one = miss_cylinder(scene, &h, o, d);
+            break;
+        default:
+            break;
+        }
+        Vec3 ng = shape_interaction(scene, group->shape_kind, group->shape_flags, &h).ng;
+        *normal = v3_select(mine, ng, *normal);
+        out.edge = hit_select(mine, &one.edge, &out.edge);
+        out.n = v3_select(mine, one.n, out.n);
+        out.m = out.m | (mine & one.m);
+    }
+    return out;
+}
+
+// What two lines meet at the levels where they part.
+typedef struct Ends {
+    Hit hit[2];
+    Vec3 o[2], d[2], normal[2];
+    Float reach[2];
+} Ends;
+
+static void ends_load(const Sightline *line, Int level, int k, Ends *e) {
+    e->hit[k] = line->hit[0];
+    e->o[k] = line->o[0];
+    e->d[k] = line->d[0];
+    for (int32_t i = 1; i < line->last; i++) {
+        Mask here = mi_eq(level, i_set(i));
+        e->hit[k] = hit_select(here, line->hit + i, e->hit + k);
+        e->o[k] = v3_select(here, line->o[i], e->o[k]);
+        e->d[k] = v3_select(here, line->d[i], e->d[k]);
+    }
+    Mask found = mi_lt(i_set(-1), e->hit[k].shape);
+    e->reach[k] = f_select(found, v3_dot(v3_sub(e->hit[k].p, e->o[k]), e->d[k]), f_set(INFINITY));
+}
+
+static NOINLINE Crossing crossing_find(const Tracer *t, const Sightline lines[2], Int level, Mask m) {
+    Ends e;
+    Miss miss[2];
+    for (int k = 0; k < 2; k++) {
+        ends_load(lines + k, level, k, &e);
+    }
+    for (int k = 0; k < 2; k++) {
+        Mask met = m & mi_lt(i_set(-1), e.hit[k].shape);
+        miss[k] = surfaces_miss(t, e.hit + k, e.o[1 - k], e.d[1 - k], met, e.normal + k);
+        miss[k].m = miss[k].m & met;
+    }
+    // Edges of what is nearer hide what lies behind.
+    Mask second = miss[1].m & (~miss[0].m | m_lt(e.reach[1], e.reach[0]));
+    Crossing c = {.hit = hit_select(second, &miss[1].edge, &miss[0].edge), .other = e.hit[1]};
+    c.n = v3_select(second, miss[1].n, miss[0].n);
+    c.p = c.hit.p;
+    Mask edge = m & (miss[0].m | miss[1].m);
+    c.meeting = m & ~edge & mi_lt(i_set(-1), e.hit[0].shape) & mi_lt(i_set(-1), e.hit[1].shape);
+    Float slant[2] = {v3_dot(e.normal[0], e.d[0]), v3_dot(e.normal[1], e.d[1])};
+    c.n = v3_select(c.meeting, v3_scale(e.normal[0], f_safe_rcp(slant[0])), c.n);
+    c.n_other = v3_select(c.meeting, v3_scale(e.normal[1], f_safe_rcp(slant[1])), v3_zero());
+    c.hit = hit_select(c.meeting, e.hit, &c.hit);
+    c.p = v3_select(c.meeting, e.hit[0].p, c.p);
+    c.across = v3_sub(c.n, c.n_other);
+    c.m = edge | c.meeting;
+    return c;
+}
+
+// Adds the motion of what the lines meet there, and of the way of the line to it, worth `worth`. Returns what that asks of
+// the ray that the sensor sends to the line's first vertex.
+static Carried crossing_move_adj(const Tracer *t, const Crossing *c, const Sightline *line, Int level, Float worth,
+                                 Sink *sink) {
+    Float own = f_zero_unless(c->m, worth);
+    points_move_adj(t, &c->hit, v3_scale(c->n, own), v3_zero(), sink, c->m);
+    if (m_any(c->meeting)) {
+        points_move_adj(t, &c->other, v3_scale(c->n_other, -own), v3_zero(), sink, c->meeting);
+    }
+    return sightline_back(t, line, level, c->p, v3_scale(c->across, -own), sink, c->m);
+}

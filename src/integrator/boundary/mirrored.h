@@ -1,0 +1,304 @@
+// mirrored.h: the boundary term of what the sensor sees in smooth mirrors and through smooth glass. As for what it sees
+// itself, the picture jumps along curves of the film that move, but they are not known beforehand: an edge may be seen along
+// many chains, or none. They are looked for on the film: short strips of random length, place and direction, at whose ends
+// the lines of sight (sightline.h) part behind their first vertices, are halved until the place where they do is known.
+// Strips of length r cross a curve dl times with the probability 2 r dl / (pi area). A strip may cross several curves, or one
+// twice, and finds one at most: the probability that a strip across a place finds it is estimated by repeating that, which is
+// one over it on average. How fast the curve moves follows from what the lines meet there (crossing.h).
+// What lies behind the first vertex that scatters is for other terms (reach.h).
+#pragma once
+
+#include "integrator/boundary/crossing.h"
+#include "integrator/film.h"
+
+#define DIMENSION_STRIP_PLACE 0x80000010u
+#define DIMENSION_STRIP_TURN 0x80000011u
+#define DIMENSION_STRIP_AGAIN 0x80001000u
+
+// Lengths of strips: LONGEST_STRIP pixels, and halves of that.
+enum { STRIP_LENGTHS = 7, LONGEST_STRIP = 8, MOST_AGAIN = 512 };
+
+typedef struct Strips {
+    real x, y, width, height; // the part of the film that counts
+    real end;                 // length at which halving ends [pixels]
+    real length[STRIP_LENGTHS], reached[STRIP_LENGTHS]; // cumulative probabilities of those that cross a place
+    real density;             // strips that cross a curve, per pixel of it
+} Strips;
+
+static Strips strips_of(const Tracer *t) {
+    const PathJob *job = t->job;
+    Strips s = {.x = (real)job->x, .y = (real)job->y, .width = (real)job->width, .height = (real)job->height};
+    // Rounding of directions is some hundred times smaller.
+    s.end = t->sensor->width > 25 ? (real)4e-6 * (real)t->sensor->width : (real)1e-4;
+    double sum = 0;
+    for (int k = 0; k < STRIP_LENGTHS; k++) {
+        s.length[k] = (real)ldexp(LONGEST_STRIP, -k);
+        sum += (double)(s.length[k] / ((s.width + s.length[k]) * (s.height + s.length[k])));
+        s.reached[k] = (real)sum;
+    }
+    for (int k = 0; k < STRIP_LENGTHS; k++) {
+        s.reached[k] = s.reached[k] / (real)sum;
+    }
+    s.density = (real)(sum / STRIP_LENGTHS * 2 / 3.14159265358979323846);
+    return s;
+}
+
+// A strip per lane, from its first end to the second one.
+typedef struct Strip {
+    Float x[2], y[2], length;
+} Strip;
+
+static Strip strip_around(Float x, Float y, Float dx, Float dy, Float length, Float before) {
+    Strip s = {{x - before * dx, x + (length - before) * dx}, {y - before * dy, y + (length - before) * dy}, length};
+    return s;
+}
+
+static Strip strip_sample(const Strips *all, const SampleKey *key) {
+    Vec2 place = rng_2d(key, DIMENSION_STRIP_PLACE), turn = rng_2d(key, DIMENSION_STRIP_TURN);
+    Float which = f_min(f_floor(turn.y * (real)STRIP_LENGTHS), f_set(STRIP_LENGTHS - 1)), sine, cosine, length = f_set(0);
+    for (int k = 0; k < STRIP_LENGTHS; k++) {
+        length = f_select(m_eq(which, f_set((real)k)), f_set(all->length[k]), length);
+    }
+    f_sincos(TWO_PI * turn.x, &sine, &cosine);
+    Float x = all->x - 0.5f * length + place.x * (all->width + length);
+    Float y = all->y - 0.5f * length + place.y * (all->height + length);
+    return strip_around(x, y, cosine, sine, length, 0.5f * length);
+}
+
+// A strip that crosses a place where the curve's normal is known, as they do.
+static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again, Float x, Float y, Float nx, Float ny) {
+    uint32_t first = DIMENSION_STRIP_AGAIN + 2 * (uint32_t)again;
+    Vec2 u = rng_2d(key, first), v = rng_2d(key, first + 1);
+    Float length = f_set(all->length[0]), sine = 2.0f * v.x - 1.0f, cosine = f_safe_sqrt(1.0f - sine * sine);
+    for (int k = 1; k < STRIP_LENGTHS; k++) {
+        length = f_select(m_ge(u.x, f_set(all->reached[k - 1])), f_set(all->length[k]), length);
+    }
+    Float way = f_select(m_lt(u.y, f_set((real)0.5)), f_set(1), f_set(-1));
+    return strip_around(x, y, way * (cosine * nx - sine * ny), way * (cosine * ny + sine * nx), length, v.y * length);
+}
+
+// The first vertex at which two lines of sight part because they meet different surfaces there. 0: none, or what the sensor
+// sees itself, or they are mirrored or refracted differently.
+static Int lines_part(const Sightline *a, const Sightline *b, Mask m) {
+    Int level = i_set(0);
+    for (int32_t i = 0; i < a->last && i < b->last; i++) {
+        Mask same = mi_eq(a->hit[i].shape, b->hit[i].shape) & mi_eq(a->hit[i].prim, b->hit[i].prim) &
+                    mi_eq(a->hit[i].instance, b->hit[i].instance) & mi_eq(a->behind[i], b->behind[i]);
+        level = i_select(m & ~same, i_set(i), level);
+        m = m & same & mi_eq(a->lobe[i], b->lobe[i]) & lobe_turns(a->lobe[i]);
+    }
+    return level;
+}
+
+// Lanes of m whose lines meet something that moves up to where they part.
+static Mask lines_move(const Tracer *t, const BoundaryJob *b, const Sightline lines[2], Int level, Mask m) {
+    if (b->everywhere) {
+        return m;
+    }
+    Mask moves = m_set(false);
+    for (int32_t i = 0; i < 2 * (MOST_SIGHT + 1); i++) {
+        const Sightline *line = lines + i / (MOST_SIGHT + 1);
+        int32_t k = i % (MOST_SIGHT + 1);
+        Mask on = k < line->last ? m & ~mi_lt(level, i_set(k)) & mi_lt(i_set(-1), line->hit[k].shape) : m_set(false);
+        if (m_any(on)) {
+            Int group = SHAPE_FIELD(t->scene, i_select(on, line->hit[k].shape, i_set(0)), group);
+            moves = moves | (on & mi_eq(i_gather(t->job->live, group) & LIVE_MOTION, i_set(LIVE_MOTION)));
+        }
+    }
+    return moves;
+}
+
+static void strip_look(Tracer *t, const SampleKey *key, Vec2 lens, const Strip *s, int end, Mask m, Sightline *line) {
+    sightline_trace(t, key, lens, s->x[end], s->y[end], m, line);
+}
+
+// Halves strips until their ends lie next to where the lines part; returns the levels, 0 where they never do.
+static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 lens, real end, Strip *s,
+                                 Mask m) {
+    Sightline line[2], middle;
+    strip_look(t, key, lens, s, 0, m, line);
+    m = m & mi_lt(i_set(0), line[0].turns);
+    strip_look(t, key, lens, s, 1, m, line + 1);
+    Int level = lines_part(line, line + 1, m);
+    m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
+    for (;;) {
+        Mask open = m & mi_lt(i_set(0), level) & m_gt(s->length, f_set(end));
+        if (!m_any(open)) {
+            return i_select(lines_move(t, b, line, level, m), level, i_set(0));
+        }
+        Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]);
+        sightline_trace(t, key, lens, x, y, open, &middle);
+        Int before = lines_part(line, &middle, open), behind = lines_part(&middle, line + 1, open);
+        Mask first = open & mi_lt(i_set(0), before), second = open & ~first;
+        sightline_take(line + 1, &middle, first);
+        sightline_take(line, &middle, second);
+        s->x[1] = f_select(first, x, s->x[1]);
+        s->y[1] = f_select(first, y, s->y[1]);
+        s->x[0] = f_select(second, x, s->x[0]);
+        s->y[0] = f_select(second, y, s->y[0]);
+        s->length = f_select(open, 0.5f * s->length, s->length);
+        level = i_select(first, before, i_select(second, behind, level));
+    }
+}
+
+// ---- the jump of a strip's ends ----------------------------------------------------------------------------------
+
+// The curve between the ends of a strip.
+typedef struct Curve {
+    Sightline line[2];
+    Crossing crossing;
+    Int level;
+    Vec2 lens;
+    Float x, y, nx, ny, slope; // its place and normal on the film, towards where F grows, and how fast it does
+    Mask m;
+} Curve;
+
+static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const Strip *s, Mask m, Curve *c) {
+    SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
+    Sink still = sink_of(b->still);
+    c->lens = sightline_lens(t, &own);
+    strip_look(t, &key, c->lens, s, 0, m, c->line);
+    strip_look(t, &key, c->lens, s, 1, m, c->line + 1);
+    c->level = lines_part(c->line, c->line + 1, m);
+    m = m & mi_lt(i_set(0), c->level);
+    c->crossing = crossing_find(t, c->line, c->level, m);
+    Carried carried = crossing_move_adj(t, &c->crossing, c->line, c->level, f_set(1), &still);
+    c->x = 0.5f * (s->x[0] + s->x[1]);
+    c->y = 0.5f * (s->y[0] + s->y[1]);
+    Vec2 g = film_adj(t, c->x, c->y, c->lens, c->line[0].hit[0].p, &carried);
+    c->slope = f_sqrt(g.x * g.x + g.y * g.y);
+    Float rcp = f_safe_rcp(c->slope);
+    c->nx = g.x * rcp;
+    c->ny = g.y * rcp;
+    c->m = c->crossing.m & m_gt(c->slope, f_set(0)) & m_finite(c->slope);
+}
+
+// How many strips across a curve it takes until one finds it, 0 where none does: of few that are found, one in many is lost.
+static Float curve_again(Tracer *t, const BoundaryJob *b, const Strips *all, Int slot, const Curve *c) {
+    SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
+    Float count = f_set(0);
+    Mask left = c->m;
+    for (int32_t n = 0; n < MOST_AGAIN && m_any(left); n++) {
+        Strip s = strip_across(all, &own, n, c->x, c->y, c->nx, c->ny);
+        Int level = strip_narrow(t, b, &key, c->lens, all->end, &s, left);
+        Float dx = 0.5f * (s.x[0] + s.x[1]) - c->x, dy = 0.5f * (s.y[0] + s.y[1]) - c->y;
+        Mask again = left & mi_eq(level, c->level) & m_lt(dx * dx + dy * dy, f_set(400 * all->end * all->end));
+        count = f_select(again, f_set((real)(n + 1)), count);
+        left = left & ~again;
+    }
+    return count;
+}
+
+// ---- samples -----------------------------------------------------------------------------------------------------
+
+// Writes the numbers of those of `count` samples from number `first` on whose strips find something behind `kept`.
+static int32_t strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, int32_t count, int32_t *kept) {
+    int32_t kept_count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        Mask m = m_first_n(count - i);
+        Int slot = i_iota() + i;
+        batch_numbers(t, i, first);
+        SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
+        Vec2 lens = sightline_lens(t, &own);
+        Strip s = strip_sample(all, &own);
+        Sightline line[2];
+        strip_look(t, &key, lens, &s, 0, m, line);
+        m = m & mi_lt(i_set(0), line[0].turns);
+        if (m_any(m)) {
+            strip_look(t, &key, lens, &s, 1, m, line + 1);
+            Int level = lines_part(line, line + 1, m);
+            m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
+        }
+        i_compress(kept + kept_count, slot, m);
+        kept_count += m_count(m);
+    }
+    return kept_count;
+}
+
+// Finds the curves of those strips: leaves in q their ends (o, d) and what they are worth (behind).
+static void curves_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, const int32_t *kept, int32_t count,
+                        Segments *q) {
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        Mask m = m_first_n(count - i);
+        for (int32_t k = i; k < i + LANES; k++) {
+            slot_number(t, k, first + kept[k < count ? k : i]);
+        }
+        Int slot = i_iota() + i;
+        SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
+        Strip s = strip_sample(all, &own);
+        m = m & mi_lt(i_set(0), strip_narrow(t, b, &key, sightline_lens(t, &own), all->end, &s, m));
+        Curve c;
+        curve_find(t, b, slot, &s, m, &c);
+        c.m = c.m & m & m_ge(c.x, f_set(all->x)) & m_lt(c.x, f_set(all->x + all->width)) & m_ge(c.y, f_set(all->y)) &
+              m_lt(c.y, f_set(all->y + all->height));
+        Float weight = m_any(c.m) ? curve_again(t, b, all, slot, &c) * f_set(1 / all->density) : f_set(0);
+        c.m = c.m & m_gt(weight, f_set(0));
+        f_compress(q->ox + q->count, s.x[0], c.m);
+        f_compress(q->oy + q->count, s.y[0], c.m);
+        f_compress(q->dx + q->count, s.x[1], c.m);
+        f_compress(q->dy + q->count, s.y[1], c.m);
+        f_compress(q->behind + q->count, weight, c.m);
+        i_compress(q->number + q->count, i_load(kept + i), c.m);
+        q->count += m_count(c.m);
+    }
+}
+
+KFN Strip strip_load(const Segments *q, int32_t k) {
+    Strip s = {{f_load(q->ox + k), f_load(q->dx + k)}, {f_load(q->oy + k), f_load(q->dy + k)}, f_set(0)};
+    return s;
+}
+
+// Starts the two paths of every strip: slots k and half + k.
+static void curves_start(Tracer *t, const Segments *q, int64_t first, int32_t half) {
+    for (int32_t k = 0; k < half; k++) {
+        int64_t number = first + q->number[k < q->count ? k : 0];
+        slot_number(t, k, number);
+        slot_number(t, half + k, number);
+    }
+    for (int32_t k = 0; k < half; k += LANES) {
+        Strip s = strip_load(q, k);
+        Int slot = i_iota() + k;
+        SampleKey own = slot_key(t, slot);
+        f_store(t->ws.film_x + k, 0.5f * (s.x[0] + s.x[1]));
+        f_store(t->ws.film_y + k, 0.5f * (s.y[0] + s.y[1]));
+        for (int end = 0; end < 2; end++) {
+            SensorRay r = sensor_ray(t->scene, t->sensor, s.x[end], s.y[end], sightline_lens(t, &own));
+            r.ray.tmax = f_zero_unless(m_first_n(q->count - k), r.ray.tmax);
+            path_begin(t, end * half + k, slot + end * half, &r.ray, r.weight);
+        }
+    }
+    t->active = 2 * half;
+    t->current = 0;
+    t->record_count = t->batch_count = 0;
+    t->overflow = false;
+    t->job->paths += 2 * q->count;
+}
+
+// Books what the paths found. Reverse: the film's adjoint lies in ws.adjoint.
+static void curves_finish(Tracer *t, const BoundaryJob *b, const Segments *q, Sink *sink, int32_t half) {
+    for (int32_t k = 0; k < q->count; k += LANES) {
+        Mask m = m_first_n(q->count - k);
+        Strip s = strip_load(q, k);
+        Curve c;
+        curve_find(t, b, i_iota() + k, &s, m, &c);
+        // Where F < 0 grows as F falls.
+        Mask up = m_gt((s.x[1] - s.x[0]) * c.nx + (s.y[1] - s.y[0]) * c.ny, f_set(0));
+        Spec jump = spec_sub(spec_load(t->ws.radiance, k), spec_load(t->ws.radiance, half + k));
+        Float worth = f_select(up, f_set(-1), f_set(1)) * f_load(q->behind + k) * f_safe_rcp(c.slope);
+        if (b->job.mode == MODE_REVERSE) {
+            worth = worth * spec_dot(jump, spec_load(t->ws.adjoint, k));
+        }
+        c.crossing.m = c.m & m_finite(worth) & m_finite(spec_sum(jump));
+        c.crossing.meeting = c.crossing.meeting & c.crossing.m;
+        Carried carried = crossing_move_adj(t, &c.crossing, c.line, c.level, worth, sink);
+        if (sink->any_camera) {
+            RayAdj ray = {c.line[0].hit[0].p, carried.drag, carried.turn};
+            sensor_ray_adj(t->scene, t->sensor, c.x, c.y, c.lens, &ray, sink, c.crossing.m);
+        }
+        if (b->job.mode == MODE_FORWARD) {
+            spec_store(t->ws.radiance, k, spec_zero_unless(c.crossing.m, spec_scale(jump, sink->derivative)));
+            sink->derivative = f_set(0);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+// sightline.h: lines of sight: from a film position through smooth mirrors and glass up to the first vertex that scatters.
+// The random numbers are those of the path that path.h traces from there, which therefore takes the same way.
+#pragma once
+
+#include "integrator/boundary/upstream.h"
+
+// Vertices that mirror or refract; lines with more of them end.
+enum { MOST_SIGHT = 12 };
+
+typedef struct Sightline {
+    Hit hit[MOST_SIGHT + 1]; // shape -1: nothing
+    Vec3 d[MOST_SIGHT + 1];  // directions in which the line comes to them
+    Vec3 o[MOST_SIGHT + 1];  // and where it begins behind the vertex before
+    Int lobe[MOST_SIGHT + 1], behind[MOST_SIGHT + 1]; // LOBE_SMOOTH at its end; whether a surface is met from behind
+    Int turns;               // how many of them mirror or refract
+    Spec through[MOST_SIGHT + 1]; // what the vertices before let through, over the probability of their lobes
+    int32_t last;            // levels that are filled
+} Sightline;
+
+// Where vertices of level i lie on surfaces that mirror or refract, turns the ray; returns these lanes.
+static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, Mask m, Sightline *s, Ray *ray) {
+    const SceneView *scene = t->scene;
+    const Hit *hit = s->hit + i;
+    Float u = rng_1d(key, dimension(i, PURPOSE_LOBE));
+    Vec2 at = rng_2d(key, dimension(i, PURPOSE_DIRECTION));
+    bool ends = scene->max_depth >= 0 && i + 1 >= scene->max_depth;
+    Mask turned = m_set(false);
+    s->through[i + 1] = spec_zero();
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+        const Group *group = scene->groups + id;
+        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
+        Hit h = hit_of_lanes(hit, first, mine);
+        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
+        Vec3 wi = frame_to_local(&si.sh, v3_neg(s->d[i])), dp_dv;
+        BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &h), t->floor, NULL, NULL};
+        BsdfSurface surface;
+        if (scene->bsdfs[group->bsdf].surface) {
+            find_surface(scene, group, &h, &surface, &dp_dv);
+            call.surface = &surface;
+        }
+        s->behind[i] = i_select(mine & m_lt(wi.z, f_set(0)), i_set(1), s->behind[i]);
+        BsdfSample b = bsdf_sample(&call, wi, u, at);
+        Float pdf;
+        Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
+        Mask turns = mine & lobe_turns(b.lobe) & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0)) & m_set(!ends);
+        Vec3 wo = frame_to_world(&si.sh, b.wo);
+        s->lobe[i] = i_select(turns, b.lobe, s->lobe[i]);
+        s->through[i + 1] = spec_select(turns, spec_scale(spec_mul(s->through[i], f), f_safe_rcp(pdf)), s->through[i + 1]);
+        ray->o = v3_select(turns, interaction_offset(&si, wo), ray->o);
+        ray->d = v3_select(turns, wo, ray->d);
+        turned = turned | turns;
+    }
+    ray->tmax = f_set(INFINITY);
+    return turned;
+}
+
+// The random numbers of a path's lobes.
+KFN SampleKey sightline_key(const Tracer *t, Int slot) {
+    SampleKey key = slot_key(t, slot);
+    key.sample = t->scene->split ? split_of(t->scene, key.sample).scatter_sample : key.sample;
+    return key;
+}
+
+// Where on its lens the sensor looks from.
+KFN Vec2 sightline_lens(const Tracer *t, const SampleKey *key) {
+    Vec2 centre = {f_set(0), f_set(0)};
+    return sensor_has_lens(t->sensor) ? rng_2d(key, DIMENSION_LENS) : centre;
+}
+
+static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens, Float x, Float y, Mask m, Sightline *s) {
+    SensorRay start = sensor_ray(t->scene, t->sensor, x, y, lens);
+    Ray ray = start.ray;
+    s->turns = i_set(0);
+    s->through[0] = spec_set(start.weight);
+    s->last = 0;
+    for (int32_t i = 0; i <= MOST_SIGHT && m_any(m); i++) {
+        Hit hit = trace_closest(t->scene, &ray, m, i == 0);
+        t->job->rays += m_count(m);
+        if (i == 0 && t->scene->hide_emitters) {
+            hit = trace_past_emitters(t, ray, m, hit);
+        }
+        s->hit[i] = hit;
+        s->d[i] = ray.d;
+        s->o[i] = ray.o;
+        s->lobe[i] = i_set(LOBE_SMOOTH);
+        s->behind[i] = i_set(0);
+        s->last = i + 1;
+        m = m & mi_lt(i_set(-1), hit.shape);
+        m = i < MOST_SIGHT && m_any(m) ? sightline_turn(t, key, i, m, s, &ray) : m_set(false);
+        s->turns = s->turns + i_select(m, i_set(1), i_set(0));
+    }
+}
+
+KFN Hit hit_select(Mask m, const Hit *a, const Hit *b) {
+    return (Hit){i_select(m, a->shape, b->shape), i_select(m, a->prim, b->prim), f_select(m, a->u, b->u),
+                 f_select(m, a->v, b->v), v3_select(m, a->p, b->p), i_select(m, a->instance, b->instance)};
+}
+
+// Takes the lanes of m of another line.
+static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
+    for (int32_t i = 0; i < from->last; i++) {
+        if (i >= to->last) {
+            to->hit[i] = from->hit[i];
+            to->d[i] = from->d[i];
+            to->o[i] = from->o[i];
+            to->lobe[i] = from->lobe[i];
+            to->behind[i] = from->behind[i];
+            to->through[i] = from->through[i];
+            continue;
+        }
+        to->hit[i] = hit_select(m, from->hit + i, to->hit + i);
+        to->d[i] = v3_select(m, from->d[i], to->d[i]);
+        to->o[i] = v3_select(m, from->o[i], to->o[i]);
+        to->lobe[i] = i_select(m, from->lobe[i], to->lobe[i]);
+        to->behind[i] = i_select(m, from->behind[i], to->behind[i]);
+        to->through[i] = spec_select(m, from->through[i], to->through[i]);
+    }
+    to->turns = i_select(m, from->turns, to->turns);
+    to->last = from->last > to->last ? from->last : to->last;
+}
+
+// Carries the adjoint of the position of the ray that comes to vertex `level`, at p, back to the sensor.
+static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Vec3 p, Vec3 drag, Sink *sink, Mask m) {
+    Carried c = {v3_select(m, drag, v3_zero()), v3_zero()};
+    for (int32_t i = s->last - 2; i >= 0; i--) {
+        Mask on = m & mi_lt(i_set(i), level);
+        if (!m_any(on)) {
+            continue;
+        }
+        Vec3 next = v3_select(mi_eq(level, i_set(i + 1)), p, s->hit[i + 1].p);
+        Carried back = rays_turn_adj(t, s->hit + i, s->d[i], v3_select(on, s->d[i + 1], v3_neg(s->d[i])), s->lobe[i],
+                                     v3_length(v3_sub(next, s->hit[i].p)), &c, sink, on);
+        c.drag = v3_select(on, back.drag, c.drag);
+        c.turn = v3_select(on, back.turn, c.turn);
+    }
+    return c;
+}
+
+// What the film position is worth to the ray that the sensor sends to p.
+static Vec2 film_adj(const Tracer *t, Float x, Float y, Vec2 lens, Vec3 p, const Carried *c) {
+    const real step = (real)0.5;
+    Float out[2];
+    for (int k = 0; k < 2; k++) {
+        real sx = k ? 0 : step, sy = k ? step : 0;
+        Ray a = sensor_ray(t->scene, t->sensor, x + sx, y + sy, lens).ray;
+        Ray b = sensor_ray(t->scene, t->sensor, x - sx, y - sy, lens).ray;
+        Vec3 turn = v3_scale(v3_sub(a.d, b.d), f_set(1 / (2 * step)));
+        Vec3 move = v3_scale(v3_sub(a.o, b.o), f_set(1 / (2 * step)));
+        Float reach = v3_length(v3_sub(p, v3_scale(v3_add(a.o, b.o), f_set((real)0.5))));
+        out[k] = v3_dot(c->drag, v3_madd(move, reach, turn)) + v3_dot(c->turn, turn);
+    }
+    return (Vec2){out[0], out[1]};
+}
