@@ -30,10 +30,11 @@
     "<emitter type=\"point\" id=\"bulb\"><point name=\"position\" " place "/><rgb name=\"intensity\" value=\"" intensity           \
     "\"/></emitter>"
 #define SKY "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3\"/></emitter>"
-#define BLOCK_VIEW HEAD("48", "40", "origin=\"0.5, -5, 4\" target=\"0, 0, 0\" up=\"0, 0, 1\"") \
-    "<default name=\"lx\" value=\"1\"/><default name=\"ly\" value=\"-1\"/><default name=\"lz\" value=\"4\"/><default name=\"px\" "  \
-    "value=\"0\"/><default name=\"py\" value=\"0\"/><default name=\"pz\" value=\"0\"/>"                                \
-    PLANE("<scale value=\"3\"/><translate z=\"-1.2\"/>")
+#define BLOCK_VIEW                                                                                                                 \
+    HEAD("48", "40", "origin=\"0.5, -5, 4\" target=\"0, 0, 0\" up=\"0, 0, 1\"")                                                    \
+    "<default name=\"lx\" value=\"1\"/><default name=\"ly\" value=\"-1\"/><default name=\"lz\" value=\"4\"/><default name=\"px\" " \
+    "value=\"0\"/><default name=\"py\" value=\"0\"/><default name=\"pz\" value=\"0\"/>" PLANE(                                     \
+        "<scale value=\"3\"/><translate z=\"-1.2\"/>")
 
 enum { MOST_SIZE = 64 };
 
@@ -283,7 +284,8 @@ static void test_tree(void **state) {
     tree.random = 3;
     grow(&tree, root, up, 0.5, 0.06, LEVELS - 1);
     double start = 0.3;
-    write_mesh(*state, "start.obj", (const double (*)[3])tree.points, tree.point_count, (const int (*)[3])tree.faces, tree.face_count);
+    write_mesh(*state, "start.obj", (const double(*)[3])tree.points, tree.point_count, (const int(*)[3])tree.faces,
+               tree.face_count);
     const Classic c = {HEAD("64", "40", "origin=\"0, -0.2, 5.5\" target=\"0, 0, 0\" up=\"0, 1, 0\"")
                            "<default name=\"turn\" value=\"0\"/>" PLANE("<scale value=\"1.8\"/>")
                            PLACED("<rotate z=\"1\" angle=\"$turn\"/><rotate x=\"1\" angle=\"70\"/><translate y=\"-6\" z=\"3.5\"/>")

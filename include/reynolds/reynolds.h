@@ -2,7 +2,8 @@
  *
  * Compiles alone as C99, C11 and C++17. Every function that can fail returns a rey_result; the message
  * (file, line, value, allowed range) stays in the context until its next call. Null where something must be given is
- * REY_ERROR_ARGUMENT, and 0, -1 or null from functions that return a value. The library never prints, aborts or exits. A context may be used by one thread at a time; different contexts are independent.
+ * REY_ERROR_ARGUMENT, and 0, -1 or null from functions that return a value. The library never prints, aborts or exits. A
+ * context may be used by one thread at a time; different contexts are independent.
  *
  * Images are float32, linear sRGB, row major from the top left: image[(y * width + x) * 3 + channel]. */
 #ifndef REYNOLDS_H

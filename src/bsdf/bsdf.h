@@ -61,7 +61,7 @@ enum {
     record.field = FETCH_##type(call->scene, node->slot[slot++], call->uv);
 #define FETCH_CONFIG(field, value, choices, text) record.field = node->config[config++];
 #define SCATTER_FIELD(type, field, value, low, high, text, option)                                                     \
-    if (duv || texture_wanted(call->scene, sink, node->slot[slot])) {                                                                     \
+    if (duv || texture_wanted(call->scene, sink, node->slot[slot])) {                                                  \
         SCATTER_##type(call->scene, node->slot[slot], call->uv, adjoint.field, duv, sink, m);                          \
     }                                                                                                                  \
     slot++;

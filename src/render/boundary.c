@@ -136,8 +136,10 @@ static rey_result boundary_check(const Render *r, int term) {
         }
         if (directional || (moves && rey_light_is_abrupt(view, view->emitters + i))) {
             rey_name_emitter(scene, (int32_t)i, name);
-            return refuse(scene, term, directional ? "emitters of the kind 'directionalarea'"
-                                                   : "the border of the light of spots whose beam_width is their cutoff_angle", name);
+            return refuse(scene, term,
+                          directional ? "emitters of the kind 'directionalarea'"
+                                      : "the border of the light of spots whose beam_width is their cutoff_angle",
+                          name);
         }
     }
     return term == REY_TERM_SPECULAR ? check_meetings(scene) : REY_OK;

@@ -259,7 +259,8 @@ static double meeting_weight(const Render *r, const EdgeRecord *e) {
     for (int k = 0; k < 3; k++) {
         length2 += (double)(m->ends[3 + k] - m->ends[k]) * (double)(m->ends[3 + k] - m->ends[k]);
     }
-    return shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]) ? sqrt(length2) : 0;
+    bool moves = shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]);
+    return moves ? sqrt(length2) : 0;
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {

@@ -230,7 +230,8 @@ static int64_t picture_floats(const Render *r) {
 
 // ---- derivatives -------------------------------------------------------------------------------------------------
 
-// Where the values of each texture, to_uv, shape's normals, mesh attribute and emitter's place begin in the compact vectors of the selection.
+// Where the values of each texture, to_uv, shape's normals, mesh attribute and emitter's place begin in the compact vectors of the
+// selection.
 static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
     int64_t textures = view->textures_count, shapes = view->shapes_count;

@@ -17,8 +17,8 @@ static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int 
     char object[OBJECT_NAME], obstacle[OBJECT_NAME];
     if (bit == REY_TERM_SPECULAR && rey_name_bender(scene, object)) {
         rey_name_obstacle(scene, sensor, obstacle);
-        snprintf(reason, REASON, "'%.190s' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the "
-                                 "edges that are seen in or through it are not found because of %s", object, obstacle);
+        snprintf(reason, REASON, "'%.190s' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and "
+                                 "the edges that are seen in or through it are not found because of %s", object, obstacle);
     } else if (bit == REY_TERM_TERMINATOR) {
         snprintf(reason, REASON, "the picture jumps where the normals of maps turn away from the viewer");
     } else if ((p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) && !rey_motion_known(scene, sensor, p)) {
@@ -77,13 +77,14 @@ static bool phases_read_volumes(const SceneView *view) {
 static const char *gap_of_cameras(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         if (view->shapes[i].emitter >= 0 || !rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind)) {
-            return "in scenes with participating media, cameras move past the edges of what they and collisions see. Known are cameras "
-                   "in scenes whose surfaces are all of the kind 'null'";
+            return "in scenes with participating media, cameras move past the edges of what they and collisions see. Known are "
+                   "cameras in scenes whose surfaces are all of the kind 'null'";
         }
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
         if (view->emitters[i].kind == EMITTER_PROJECTOR) {
-            return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
+            return "in scenes with participating media, collisions that move with the camera pass the border of a projector's "
+                   "light";
         }
     }
     if (phases_read_volumes(view)) {

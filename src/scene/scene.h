@@ -241,7 +241,9 @@ typedef struct Param {
     uint32_t version;         // counts changes of the values
     uint32_t built;           // the version that derived data was built from
 } Param;
-#define PARAM_DEFAULTS .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .camera = -1, .emitter = -1, .volume = -1, .low = -INFINITY, .high = INFINITY
+#define PARAM_DEFAULTS                                                                                              \
+    .texture = -1, .to_uv = -1, .normals = -1, .attribute = -1, .geometry = -1, .instance = -1, .camera = -1,       \
+    .emitter = -1, .volume = -1, .low = -INFINITY, .high = INFINITY
 
 typedef struct Alias {
     char *name;
@@ -266,7 +268,8 @@ struct rey_scene {
     struct Surface *embree_surfaces; // per shape: what the ray tracer's callbacks see (shape/pose.h)
     void *embree_device, **embree_groups; // RTCDevice; one RTCScene per shapegroup
     void (*accel_free)(rey_scene *scene); // set by accel, which owns view.embree and embree_device
-    uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters, *dirty_volumes, *dirty_media, *dirty_phases; // derived data to rebuild before the next kernel runs
+    // Derived data to rebuild before the next kernel runs.
+    uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters, *dirty_volumes, *dirty_media, *dirty_phases;
     bool dirty;
     char *integrator;
     void *document;           // io's source document, owned; freed through document_free

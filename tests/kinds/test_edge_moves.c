@@ -7,7 +7,8 @@
 #include <stdlib.h>
 
 static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1}, normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1};
-static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {INSTANCE}, live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
+static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {INSTANCE},
+                     live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
 static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
 
 // A sample of an edge, as the camera of a world sees it.
@@ -55,8 +56,14 @@ static void gradient_of(const World *w, const Sample *x, float worth, bool paral
     t->job = &job;
     t->scene = &w->scene;
     t->sensor = &w->sensor;
-    Sink sink = {.gradient = gradient, .points_at = points_at, .normals_at = normals_at, .pose_at = pose_at, .instance_at = instance_at,
-                 .camera_at = camera_at, .any_motion = true, .any_camera = true};
+    Sink sink = {.gradient = gradient,
+                 .points_at = points_at,
+                 .normals_at = normals_at,
+                 .pose_at = pose_at,
+                 .instance_at = instance_at,
+                 .camera_at = camera_at,
+                 .any_motion = true,
+                 .any_camera = true};
     primary_move_adj(t, &x->s, worth, parallel, &sink);
     free(t);
 }

@@ -185,6 +185,8 @@ static void test_views(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_mesh_edges), cmocka_unit_test(test_rims), cmocka_unit_test(test_outlines), cmocka_unit_test(test_choice), cmocka_unit_test(test_views)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_mesh_edges), cmocka_unit_test(test_rims),
+                                       cmocka_unit_test(test_outlines), cmocka_unit_test(test_choice),
+                                       cmocka_unit_test(test_views)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -181,7 +181,8 @@ static int check_adjoint(KindCase *c, const LightDraw *d, Random *r, Coverage *c
         }
         covered->compared++;
         if (fabs(quotient - gradient[i]) > 1e-6 * fabs(quotient) + 1e-7 + truncation) {
-            print_error("%s entry %d: adjoint %.12g, difference %.12g\n", rey_emitter_kinds[c->emitter.kind].name, i, gradient[i], quotient);
+            print_error("%s entry %d: adjoint %.12g, difference %.12g\n", rey_emitter_kinds[c->emitter.kind].name, i, gradient[i],
+                        quotient);
             failures++;
         }
         double *largest = place ? &covered->place : &covered->largest[c->owner[i]];

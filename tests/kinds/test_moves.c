@@ -133,7 +133,8 @@ static void world_make(World *w, const Case *c, uint64_t *random) {
     w->triangles[1] = 1;
     w->triangles[2] = 2;
     w->shape = (ShapeRecord){.kind = c->kind, .flags = c->flags, .triangle_count = 1, .vertex_count = 3,
-                             .positions = c->kind == SHAPE_BSPLINE ? CONTROL_POINTS : POSITIONS, .segment_count = 2, .normals = NORMALS, .uvs = UVS, .to_world = POSE};
+                             .positions = c->kind == SHAPE_BSPLINE ? CONTROL_POINTS : POSITIONS, .segment_count = 2,
+                             .normals = NORMALS, .uvs = UVS, .to_world = POSE};
     w->instance = (InstanceRecord){.to_world = INSTANCE, .table = INSTANCE_AT};
     w->a[0] = 0.3 + 0.1 * uniform(random);
     w->a[1] = 0.4 + 0.1 * uniform(random);

@@ -45,7 +45,8 @@ static void test_point_hit(void **state) {
         assert_near("v", hit.v, v, 1e-4);
         assert_near_v3("normal", n, si.ng, 1e-5);
         point_hit(&w.scene, DISK, 0, 0, disk, &n);
-        assert_near("normal of a disk", fabs(v3_dot(n, pose_column(&w.scene, 0, 0))) + fabs(v3_dot(n, pose_column(&w.scene, 0, 1))), 0, 1e-5);
+        assert_near("normal of a disk", fabs(v3_dot(n, pose_column(&w.scene, 0, 0))) + fabs(v3_dot(n, pose_column(&w.scene, 0, 1))),
+                    0, 1e-5);
     }
 }
 
@@ -124,7 +125,8 @@ static void check_apart(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, con
         Face found[2];
         if (leaves) { // the least distance goes by where the ray begins
             Vec3 begin = v3_madd(p, -0.2f, d);
-            least *= (1 + fmaxf(fmaxf(fabsf(begin.x), fabsf(begin.y)), fabsf(begin.z))) / (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z)));
+            least *= (1 + fmaxf(fmaxf(fabsf(begin.x), fabsf(begin.y)), fabsf(begin.z))) /
+                     (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z)));
             medium_faces(&w->scene, v, begin, d, 0.2f + least / cosine, m_set(true), found);
         } else {
             medium_faces(&w->scene, v, v3_madd(p, out * least, n), d, INFINITY, m_set(true), found);

@@ -10,7 +10,8 @@
 enum { EDGE_SHAPE = MESH, NEAR_SHAPE = INSTANCED, FAR_SHAPE = DISK };
 
 static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1}, normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1};
-static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {-1}, live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
+static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {-1},
+                     live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
 static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
 
 typedef struct Sample {
@@ -34,7 +35,8 @@ static Interaction look(const World *w, const Hit *hit) {
     return shape_interaction(&w->scene, shape->kind, shape->flags, &own);
 }
 
-static void keep(real *u, real *v, real *x, real *y, real *z, int32_t *shape, int32_t *prim, int32_t *instance, const World *w, const Hit *hit) {
+static void keep(real *u, real *v, real *x, real *y, real *z, int32_t *shape, int32_t *prim, int32_t *instance, const World *w,
+                 const Hit *hit) {
     Hit own = *hit;
     own.p = look(w, hit).p;
     hit_compress(u, v, x, y, z, shape, prim, instance, &own, own.p, m_set(true));
@@ -95,8 +97,14 @@ static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) 
 
 static void gradient_of(Sample *s, double *gradient) {
     Indirect in = {.t = &s->t, .b = &s->job, .pinhole = &s->pinhole, .q = s->q};
-    Sink sink = {.gradient = gradient, .points_at = points_at, .normals_at = normals_at, .pose_at = pose_at, .instance_at = instance_at,
-                 .camera_at = camera_at, .any_motion = true, .any_camera = true};
+    Sink sink = {.gradient = gradient,
+                 .points_at = points_at,
+                 .normals_at = normals_at,
+                 .pose_at = pose_at,
+                 .instance_at = instance_at,
+                 .camera_at = camera_at,
+                 .any_motion = true,
+                 .any_camera = true};
     moves_adj(&in, 0, &sink);
 }
 

@@ -1,5 +1,5 @@
-// Multiple scattering against what is known of it: a half-space that scatters evenly [chandrasekhar1960], in values and derivatives,
-// and the score of paths, which an independent walk in double finds.
+// Multiple scattering against what is known of it: a half-space that scatters evenly [chandrasekhar1960], in values and
+// derivatives, and the score of paths, which an independent walk in double finds.
 #include "slab.h"
 
 enum { ALBEDOS = 5 };
@@ -9,8 +9,8 @@ static const double half_albedo[ALBEDOS] = {0.5, 0.8, 0.9, 0.95, 0.99};
 static const double half_plane[ALBEDOS] = {0.115226, 0.285255, 0.414947, 0.535541, 0.752721};
 static const double half_slope[ALBEDOS] = {0.35472, 0.94797, 1.82418, 3.28121, 10.48765};
 
-// What comes straight back: albedo H(1)^2 / (8 pi) for light of one direction, where the plane's albedo is 1 - sqrt(1 - albedo) H(1);
-// and its derivative.
+// What comes straight back: albedo H(1)^2 / (8 pi) for light of one direction, where the plane's albedo is 1 - sqrt(1 - albedo)
+// H(1); and its derivative.
 static double back_value(int k, double *slope) {
     const double a = half_albedo[k], root = sqrt(1 - a), h = (1 - half_plane[k]) / root;
     double dh = (h / (2 * root) - half_slope[k]) / root;
@@ -24,12 +24,13 @@ static void close_to(const char *what, double albedo, double mean, double error,
     assert_true(fabs(mean - expected) <= 4 * error + 1e-4 * expected && error <= most * expected);
 }
 
-// Albedos from..from + 2 in the three channels; dense enough that neither the other side nor the edges are felt. The border is that of
-// a box, since rays that pass surfaces begin a little behind them.
+// Albedos from..from + 2 in the three channels; dense enough that neither the other side nor the edges are felt. The border is that
+// of a box, since rays that pass surfaces begin a little behind them.
 static void judge_half_space(int from, bool sun, int spp, int slope_spp) {
     static char albedos[64];
     snprintf(albedos, sizeof albedos, "%g, %g, %g", half_albedo[from], half_albedo[from + 1], half_albedo[from + 2]);
-    const rey_define defines[MOST_DEFINES] = {{"albedo", albedos}, {sun ? "sun" : "sky", "1"}, {"g", "0"}, {"roulette", "24"}, {"kind", "heterogeneous"}, {"wide", "2"},
+    const rey_define defines[MOST_DEFINES] = {{"albedo", albedos},         {sun ? "sun" : "sky", "1"}, {"g", "0"},
+                                              {"roulette", "24"},          {"kind", "heterogeneous"},  {"wide", "2"},
                                               {"sigma_t", "200, 200, 200"}};
     Room room = slab_open(defines, 2);
     int param = rey_param_find(room.scene, "fog.albedo.value.value");
@@ -44,7 +45,8 @@ static void judge_half_space(int from, bool sun, int spp, int slope_spp) {
         const bool long_paths = half_albedo[from + c] > 0.98;
         close_to(sun ? "straight back" : "plane", half_albedo[from + c], mean[c], error[c], value, long_paths ? 0.01 : 4e-3);
         const double most = long_paths ? 0.1 : 5e-3;
-        close_to(sun ? "straight back, derivative" : "plane, derivative", half_albedo[from + c], slope[c], slope_error[c], expected, most);
+        close_to(sun ? "straight back, derivative" : "plane, derivative", half_albedo[from + c], slope[c], slope_error[c], expected,
+                 most);
     }
     room_close(room);
 }
@@ -103,8 +105,8 @@ static double scatter(uint64_t *random, double g, double *d) {
     return c;
 }
 
-// One path into the cube from above, lit from above after each of its collisions: every contribution times the sum of the derivatives
-// of the logarithms of all its densities.
+// One path into the cube from above, lit from above after each of its collisions: every contribution times the sum of the
+// derivatives of the logarithms of all its densities.
 static Score walk(uint64_t *random, double sigma, double albedo, double g) {
     Score sum = {0}, score = {0};
     double p[3] = {uniform(random) - 0.5, uniform(random) - 0.5, 1}, d[3] = {0, 0, -1}, weight = 1;
@@ -132,7 +134,8 @@ static Score walk(uint64_t *random, double sigma, double albedo, double g) {
 static void test_score(void **state) {
     UNUSED(state);
     const double sigma[3] = {0.4, 0.8, 1.6}, albedo[3] = {0.9, 0.7, 0.5}, g = 0.3, light = 5;
-    const rey_define defines[MOST_DEFINES] = {{"sigma_t", "0.4, 0.8, 1.6"}, {"albedo", "0.9, 0.7, 0.5"}, {"sun", "5"}, {"depth", "4"}};
+    const rey_define defines[MOST_DEFINES] = {
+        {"sigma_t", "0.4, 0.8, 1.6"}, {"albedo", "0.9, 0.7, 0.5"}, {"sun", "5"}, {"depth", "4"}};
     static const char *const params[4] = {NULL, "fog.sigma_t.value.value", "fog.albedo.value.value", "fog.phase_function.g.value"};
     Room room = slab_open(defines, 2);
     double expected[4][3], noise[4][3];
@@ -158,8 +161,8 @@ static void test_score(void **state) {
         mean_of(room, k ? rey_param_find(room.scene, params[k]) : -1, k ? all : NULL, 2048, mean, error);
         for (int c = 0; c < 3; c++) {
             double off = fabs(mean[c] - expected[k][c]), deviation = sqrt(error[c] * error[c] + noise[k][c]);
-            print_message("%-28s %.6g +- %.2g, by its score %.6g +- %.2g\n", k ? params[k] : "radiance", mean[c], error[c], expected[k][c],
-                          sqrt(noise[k][c]));
+            print_message("%-28s %.6g +- %.2g, by its score %.6g +- %.2g\n", k ? params[k] : "radiance", mean[c], error[c],
+                          expected[k][c], sqrt(noise[k][c]));
             assert_true(off <= 4.5 * deviation && deviation <= 0.02 * fmax(expected[k][c], expected[0][c]));
         }
     }

@@ -54,7 +54,8 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
     }
     if (m_any(border)) { // beside the curve
         Vec3 normal, beside = v3_madd(e.p, step * f_safe_rcp(v3_length(half)), half);
-        Hit moved = point_hit(t->scene, i_select(border, hits[0].shape, i_set(-1)), hits[0].prim, hits[0].instance, beside, &normal);
+        Hit moved = point_hit(t->scene, i_select(border, hits[0].shape, i_set(-1)), hits[0].prim, hits[0].instance, beside,
+                              &normal);
         hits[0].u = f_select(border, moved.u, hits[0].u);
         hits[0].v = f_select(border, moved.v, hits[0].v);
         e.p = v3_select(border, beside, e.p);

@@ -26,8 +26,8 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 #define SEGMENT_HIT(I, x) I(x##_shape) I(x##_prim) I(x##_instance)
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
 // ends; what the
-// near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting: what its
-// motion is worth. In media: what the near point is in (airborne.h), and what the flight to it weighs.
+// near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
+// what its motion is worth. In media: what the near point is in (airborne.h), and what the flight to it weighs.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
