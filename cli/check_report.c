@@ -12,7 +12,7 @@ static int count_verdicts(const Check *checks, int count, Verdict verdict) {
 }
 
 static void print_titles(FILE *file) {
-    fprintf(file, "%-36s %13s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "difference", "step",
+    fprintf(file, "%-36s %13s %9s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "+-", "difference", "step",
             "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
 }
 
@@ -20,9 +20,9 @@ static void print_row(FILE *file, const Check *check, const char *verdict) {
     const CheckResult *r = &check->result;
     char block[32];
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    fprintf(file, "%-36s %13.6g %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative,
-            r->difference, check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z, check->fresh_z,
-            check->reverse_error, verdict);
+    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative,
+            r->gradient_standard_error, r->difference, check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z,
+            check->fresh_z, check->reverse_error, verdict);
 }
 
 // "refused [2]"; *number is the reason's.
@@ -115,9 +115,11 @@ void check_print_json(const Session *session, const rey_stats *stats, const Chec
             json_string(&json, "why", checks[i].refusal);
         }
         json_number(&json, "derivative", r->derivative);
+        json_number(&json, "gradient_standard_error", r->gradient_standard_error);
         json_number(&json, "difference", r->difference);
         json_number(&json, "standard_error", r->standard_error);
         json_number(&json, "relative_error", r->relative_error);
+        json_number(&json, "gradient_relative_error", r->gradient_relative_error);
         json_number(&json, "worst_z", r->worst_z);
         json_array(&json, "worst_block");
         json_integer(&json, NULL, r->worst_x);

@@ -110,6 +110,30 @@ double check_gap(const Blocks *b, const double *derivative, const double *differ
     return gap_at(derivative, difference, stride, at);
 }
 
+// How well the derivative itself is known, whatever noise the difference shares with it: of its mean over the sets' means,
+// and of its blocks as relative_error tells it.
+static void gradient_noise(const double *derivative, size_t stride, double rounding, CheckResult *r) {
+    double deviations[CHECK_SETS] = {0}, variance = 0, signal = 0, noise = 0; // of the sets' means
+    for (size_t at = 0; at < stride; at++) {
+        double block = 0, squares = 0;
+        for (size_t k = 0; k < CHECK_SETS; k++) {
+            block += derivative[k * stride + at] / CHECK_SETS;
+        }
+        for (size_t k = 0; k < CHECK_SETS; k++) {
+            double d = derivative[k * stride + at] - block;
+            squares += d * d / (CHECK_SETS - 1) / CHECK_SETS;
+            deviations[k] += at % CHECK_SERIES == 3 ? d * CHECK_SERIES / (double)stride : 0;
+        }
+        signal += at % CHECK_SERIES == 3 ? 0 : fmax(block * block, rounding * rounding);
+        noise += at % CHECK_SERIES == 3 ? 0 : squares;
+    }
+    for (size_t k = 0; k < CHECK_SETS; k++) {
+        variance += deviations[k] * deviations[k] / (CHECK_SETS - 1) / CHECK_SETS;
+    }
+    r->gradient_standard_error = sqrt(variance);
+    r->gradient_relative_error = signal > 0 ? sqrt(noise / signal) : 0;
+}
+
 CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, const double *rough,
                           double rounding) {
     size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
@@ -153,6 +177,7 @@ CheckResult check_compare(const Blocks *b, const double *derivative, const doubl
     double spread = sqrt(noise + systematic * systematic);
     r.sum_z = spread > 0 ? sum / spread : sum;
     r.standard_error = sqrt(variance);
+    gradient_noise(derivative, stride, rounding, &r);
     return r;
 }
 

@@ -19,6 +19,8 @@ typedef struct CheckResult {
     double derivative, difference; // means over pixels and channels
     double standard_error;         // of derivative - difference
     double relative_error;         // root mean square standard error of the blocks over that of their derivative
+    double gradient_standard_error; // of derivative by itself: what it shares with difference is not in standard_error
+    double gradient_relative_error; // relative_error of the derivative by itself
     double worst_z;                // of the block and channel with the largest |z|
     int worst_x, worst_y, worst_channel;
     double sum_z; // sum of the blocks' z of the mean channel over its standard deviation

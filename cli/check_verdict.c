@@ -17,6 +17,8 @@ void check_judge(Check *check, double threshold, bool partial) {
     bool plain = !(fabs(r->worst_z) <= plainly * threshold && fabs(r->sum_z) < plainly * CHECK_SUM_Z);
     bool same = check->reverse_error <= CHECK_REVERSE_TOLERANCE && fabs(check->fresh_z) <= CHECK_FRESH_Z;
     bool weak = !(r->relative_error <= CHECK_WEAK) && !plain;
+    // Noise that both columns share does not hide errors, but the derivative is not known any better than that.
+    bool unknown = !(r->gradient_relative_error <= CHECK_WEAK);
     if (check->verdict == VERDICT_REFUSED) {
         return;
     }
@@ -24,6 +26,7 @@ void check_judge(Check *check, double threshold, bool partial) {
     check->verdict = !same                  ? VERDICT_WRONG
                      : r->tests == 0        ? VERDICT_NO_EFFECT
                      : weak                 ? VERDICT_WEAK
+                     : right && unknown     ? VERDICT_WEAK
                      : right && check->kink ? VERDICT_KINK
                      : right                ? VERDICT_OK
                      : partial              ? VERDICT_PARTIAL

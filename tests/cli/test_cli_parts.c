@@ -129,6 +129,34 @@ static void long_steps_are_seen(void **state) {
     }
 }
 
+// A derivative of some size in each block whose noise the difference shares.
+static CheckResult shared_noise(double size, double sign, double noise, uint32_t seed) {
+    static double derivative[CHECK_SETS * ROW];
+    Blocks blocks = check_blocks(SIZE, SIZE);
+    for (int i = 0; i < CHECK_SETS * ROW; i++) {
+        derivative[i] = (i / CHECK_SERIES % 2 ? size : sign * size) + noise * normal(&seed);
+    }
+    return check_compare(&blocks, derivative, derivative, derivative, 0);
+}
+
+// The standard error of a mean over 16 sets of 64 blocks is 1/32 of a block's noise.
+static void noise_that_is_shared_is_told(void **state) {
+    (void)state;
+    for (uint32_t seed = 1; seed <= 20; seed++) {
+        CheckResult noisy = shared_noise(1, 1, 32, seed), fair = shared_noise(1, 1, 0.2, seed);
+        CheckResult apart = shared_noise(1, -1, 0.2, seed);
+        assert_true(noisy.relative_error == 0 && noisy.standard_error == 0);
+        assert_true(noisy.gradient_standard_error > 0.4 && noisy.gradient_standard_error < 1.8);
+        assert_true(fabs(fair.gradient_relative_error - 0.05) < 0.01);
+        assert_true(fabs(apart.gradient_relative_error - 0.05) < 0.01); // the mean is 0, the blocks are not
+        Check checks[] = {{.result = noisy}, {.result = fair}, {.result = apart}};
+        for (int i = 0; i < 3; i++) {
+            check_judge(&checks[i], 4, false);
+            assert_int_equal(checks[i].verdict, i == 0 ? VERDICT_WEAK : VERDICT_OK);
+        }
+    }
+}
+
 static bool accepted(CheckResult r) {
     return fabs(r.worst_z) <= check_z_threshold(r.tests) && fabs(r.sum_z) < 3;
 }
@@ -334,7 +362,8 @@ int main(void) {
         cmocka_unit_test(json_is_escaped_and_exact),
         cmocka_unit_test(json_reader_refuses_broken_text),
         cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
-        cmocka_unit_test(blocks_are_means), cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
+        cmocka_unit_test(blocks_are_means), cmocka_unit_test(noise_that_is_shared_is_told),
+        cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(malformed_directions_are_refused, open_scene, close_scene),
