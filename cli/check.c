@@ -105,8 +105,8 @@ static rey_result compare_reverse(Work *w, Check *check) {
     }
     rey_free(w->session.ctx, gradient);
     cli_add_stats(&w->stats, &stats);
-    double scale = fmax(absolute, parts);
-    check->reverse_error = scale > 0 ? fabs(reverse - forward) / scale : 0;
+    check->reverse_gap = fabs(reverse - forward);
+    check->reverse_scale = fmax(absolute, parts);
     return result;
 }
 
@@ -148,6 +148,7 @@ static rey_result differences(Work *w, Check *check, const Step *step) {
     double rounding = 3e-7 * mean_brightness(w) / step->h; // of float pictures, times the sum of |weights|
     check->result = check_compare(&w->blocks, w->derivative, w->difference, w->rough, rounding);
     check->fresh_z = check->replays ? check_mean_z(&w->blocks, w->fresh, rounding) : 0;
+    check->reverse_error = check_reverse_error(check, rounding);
     return result;
 }
 

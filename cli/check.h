@@ -32,7 +32,8 @@ typedef struct Check { // one direction
     CheckResult result;
     bool kink;            // the difference is that of one side
     double fresh_z;       // of that against the plain quotient of fresh paths; 0 where nothing is replayed
-    double reverse_error; // |reverse - forward| over what is summed up
+    double reverse_gap, reverse_scale; // |reverse - forward| on the first set, and what is summed up
+    double reverse_error;              // the one over the other, see check_reverse_error
     Verdict verdict;
     bool undecided;       // weak, and beyond the limits all the same
     char *refusal;        // why there is no complete derivative; owned
@@ -51,6 +52,10 @@ Step check_choose_step(const rey_scene *scene, const float *original, const Chec
 #define CHECK_FRESH_Z 5
 // Limit of the sum of the blocks' z over its standard deviation.
 #define CHECK_SUM_Z 3
+
+// The gap between the modes over what is summed up, or over the rounding of a derivative where that is more: the shares of
+// one that vanishes cancel within a sample, and what is left of them has no digits to agree in.
+double check_reverse_error(const Check *check, double rounding);
 
 const char *check_verdict_name(Verdict verdict);
 // Sets the verdict, unless it is a refusal. threshold: of |z|; partial: terms are left out on request.

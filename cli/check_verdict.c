@@ -8,6 +8,11 @@ const char *check_verdict_name(Verdict verdict) {
     return names[verdict];
 }
 
+double check_reverse_error(const Check *check, double rounding) {
+    double scale = fmax(check->reverse_scale, rounding);
+    return scale > 0 ? check->reverse_gap / scale : 0;
+}
+
 // Where noise is a large part, rare bright samples decide: agreement says little, and difference must be plain.
 static const double plainly = 1.5;
 

@@ -202,6 +202,17 @@ static void verdicts_know_noise(void **state) {
     assert_int_equal(refused.verdict, VERDICT_REFUSED);
 }
 
+// Of a derivative of 0 up to rounding the modes' digits need not agree; of a small one they must.
+static void vanishing_derivatives_have_no_digits(void **state) {
+    (void)state;
+    const double rounding = 3e-7 * 0.5 / 0.02;
+    Check none = {.reverse_gap = 1.3e-3 * 1.7e-9, .reverse_scale = 1.7e-9}, small = {.reverse_gap = 1e-8, .reverse_scale = 1e-5};
+    assert_true(check_reverse_error(&none, 0) > CHECK_REVERSE_TOLERANCE);
+    assert_true(check_reverse_error(&none, rounding) < CHECK_REVERSE_TOLERANCE);
+    assert_true(check_reverse_error(&small, rounding) > CHECK_REVERSE_TOLERANCE);
+    assert_true(check_reverse_error(&(Check){0}, 0) == 0);
+}
+
 static void blocks_are_means(void **state) {
     (void)state;
     Blocks blocks = check_blocks(21, 5);
@@ -362,7 +373,8 @@ int main(void) {
         cmocka_unit_test(json_is_escaped_and_exact),
         cmocka_unit_test(json_reader_refuses_broken_text),
         cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
-        cmocka_unit_test(blocks_are_means), cmocka_unit_test(noise_that_is_shared_is_told),
+        cmocka_unit_test(blocks_are_means), cmocka_unit_test(vanishing_derivatives_have_no_digits),
+        cmocka_unit_test(noise_that_is_shared_is_told),
         cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),
