@@ -255,18 +255,33 @@ static rey_result try_again(Work *w, Check *check) {
     return result;
 }
 
+static rey_result choose_step(Work *w, Check *check) {
+    rey_context *ctx = w->session.ctx;
+    double asked = w->session.options->step, least = check_least_step(w->original, &check->direction);
+    if (isinf(least)) {
+        return rey_fail(ctx, REY_ERROR_PARAM, "%s: the direction is zero, expected one that moves the parameter", check->spec);
+    }
+    check->step = check_choose_step(w->session.scene, w->original, check, asked);
+    if (!(check->step.h > 0)) {
+        return rey_fail(ctx, REY_ERROR_PARAM, "%s: the bounds leave no room to move along this direction", check->spec);
+    }
+    if (asked > 0 && asked < least) {
+        return rey_fail(ctx, REY_ERROR_PARAM, "%s: a step of %g is lost in the rounding of the parameter's values, expected %.1g "
+                        "or more", check->spec, asked, least);
+    }
+    return REY_OK;
+}
+
 static rey_result check_direction(Work *w, Check *check) {
     const Direction *d = &check->direction;
     for (int k = 0; k < d->count; k++) {
         const float *values = rey_param_values(w->session.scene, d->params[k]);
         memcpy(w->original + d->offsets[k], values, (size_t)(d->offsets[k + 1] - d->offsets[k]) * sizeof(float));
     }
-    check->step = check_choose_step(w->session.scene, w->original, check, w->session.options->step);
-    if (!(check->step.h > 0)) {
-        return rey_fail(w->session.ctx, REY_ERROR_PARAM, "%s: the bounds leave no room to move along this direction",
-                        check->spec);
+    rey_result result = choose_step(w, check);
+    if (!result) {
+        result = attempt(w, check);
     }
-    rey_result result = attempt(w, check);
     return result ? result : try_again(w, check);
 }
 

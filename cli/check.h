@@ -44,6 +44,9 @@ Step check_one_sided_step(double h, double sign);
 // The step to begin with; original: the values of the direction's parameters; asked: 0 = found by itself.
 Step check_choose_step(const rey_scene *scene, const float *original, const Check *check, double asked);
 
+// Below it the values' rounding to floats is more than 1 % of how far they move; infinite for a direction of zeros.
+double check_least_step(const float *original, const Direction *d);
+
 // Largest difference between forward and reverse mode, which sum the same samples in float in another order.
 #define CHECK_REVERSE_TOLERANCE 1e-4
 // A direction whose noise is a larger part of its signal than this is weak.

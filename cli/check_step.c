@@ -87,3 +87,15 @@ Step check_choose_step(const rey_scene *scene, const float *original, const Chec
     return central >= 0.1 * h ? check_central_step(central)
                               : check_one_sided_step(fmin(h, fmax(forward, backward) / 3), forward >= backward ? 1 : -1);
 }
+
+double check_least_step(const float *original, const Direction *d) {
+    double spacings = 0, moves = 0;
+    for (int64_t i = 0; i < d->offsets[d->count]; i++) {
+        double t = (double)d->tangent[i], v = fabs((double)original[i]);
+        double spacing = t != 0 ? (double)nextafterf((float)v, INFINITY) - v : 0;
+        spacings += spacing * spacing;
+        moves += t * t;
+    }
+    // The nearest points lie half a step away, and rounding moves them by half of the spacing at most.
+    return moves > 0 ? 100 * sqrt(spacings / moves) : INFINITY;
+}

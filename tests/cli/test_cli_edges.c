@@ -177,6 +177,16 @@ static void unequal_pictures(void **state) {
     json_free(node);
 }
 
+// What would compare rounding with rounding is no check.
+static void steps_that_floats_lose_are_refused(void **state) {
+    Fixture *f = *state;
+    expect_words(f, 1, "check %s --param white.reflectance.value --spp 16 --step 1e-8",
+                 "a step of 1e-08 is lost in the rounding of the parameter's values, expected 6e-06 or more");
+    expect(f, 0, "check %s --param white.reflectance.value --spp 16 --step 1e-4");
+    expect_words(f, 1, "check %s --param white.reflectance.value:add=0 --spp 16",
+                 "white.reflectance.value:add=0: the direction is zero, expected one that moves the parameter");
+}
+
 // All texels of a bump together move nothing: forward and reverse differ by the rounding of what cancels.
 static void cancelling_texels_are_no_error(void **state) {
     Fixture *f = *state;
@@ -223,7 +233,7 @@ int main(void) {
         cmocka_unit_test(files_are_files),
         cmocka_unit_test(tables_are_aligned),
         cmocka_unit_test(unequal_pictures),
-        cmocka_unit_test(cancelling_texels_are_no_error),
+        cmocka_unit_test(steps_that_floats_lose_are_refused), cmocka_unit_test(cancelling_texels_are_no_error),
         cmocka_unit_test(dropped_samples_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
