@@ -255,6 +255,17 @@ static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spe
                     nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
 }
 
+// What a float cannot hold would be infinite, or be answered by 0.
+static rey_result check_range(rey_context *ctx, const char *spec, const float *tangent, int64_t count) {
+    for (int64_t i = 0; i < count; i++) {
+        if (!isfinite(tangent[i])) {
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: number %lld of the direction is %g, expected numbers up to 3.4e38", spec,
+                            (long long)i, (double)tangent[i]);
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec, int param, float *tangent) {
     rey_param_info info;
     rey_result result = rey_param_get_info(scene, param, &info);
@@ -271,12 +282,16 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
     }
     switch (op.id) {
     case OP_ADD:
-        return add_constant(ctx, spec, &op, &info, tangent);
+        result = add_constant(ctx, spec, &op, &info, tangent);
+        break;
     case OP_FILE:
-        return add_file(ctx, &op, &info, tangent);
+        result = add_file(ctx, &op, &info, tangent);
+        break;
     default:
-        return add_motion(ctx, spec, &op, &info, rey_param_values(scene, param), tangent);
+        result = add_motion(ctx, spec, &op, &info, rey_param_values(scene, param), tangent);
+        break;
     }
+    return result ? result : check_range(ctx, spec, tangent, info.count);
 }
 
 // Puts the parameter of one spec into the direction, unless it is there already; *slot is where it is.

@@ -355,11 +355,14 @@ static void malformed_directions_are_refused(void **state) {
                                             "camera.to_world:translate=1,2",
                                             "camera.to_world:translate=1,2,3@0,0,0",
                                             "camera.to_world:scale=1@0,0",
-                                            "red.reflectance.value:add=1,2,inf"};
+                                            "red.reflectance.value:add=1,2,inf",
+                                            "red.reflectance.value:add=1e39",
+                                            "camera.to_world:translate=0,-1e39,0"};
     for (size_t i = 0; i < sizeof malformed / sizeof malformed[0]; i++) {
         Direction d;
         assert_int_equal(cli_direction_build(f->ctx, f->scene, &malformed[i], 1, &d), REY_ERROR_ARGUMENT);
     }
+    assert_non_null(strstr(rey_error(f->ctx), "number 7 of the direction is -inf, expected numbers up to 3.4e38"));
     const char *unknown = "rad.reflectance.value", *missing = "red.reflectance.value:file=/nonexistent.npy";
     Direction d;
     assert_int_equal(cli_direction_build(f->ctx, f->scene, &unknown, 1, &d), REY_ERROR_ARGUMENT);
