@@ -449,6 +449,8 @@ static void test_fit_errors(void **state) {
         {"parameters.0.start=1", "entry 0 starts at 1, expected a number between 0 and 1: 'parameterisation: logit'"},
         {"parameters.2.start=1.5", "entry 0 starts at 1.5, outside of its bounds"},
         {"parameters.0.bounds=[0, 0.01]", "outside of its bounds 0 to 0.01"},
+        {"terms=primary", "--set terms=primary: terms primary: the gradient of red.reflectance.value has no such term, "
+                          "expected some of interior"},
         {"views.0.weight=0", "weight = 0, expected 1e-09 to"},
         {"views.0.sensor=3", "sensor 3 does not exist"},
         {"views.0.mask=nowhere.png", "nowhere.png"},

@@ -99,7 +99,7 @@ typedef struct Job {
     const char *folder; // that paths are relative to
     const char *scene, *truth_scene, *output;
     const char *load; // scene file whose values the scene gets, or null
-    JobPlace scene_at, truth_at, load_at;
+    JobPlace scene_at, truth_at, load_at, terms_at;
     JobDefines defines, truth_defines; // the truth gets those of the job where it has none of its own
     uint32_t seed;
     int iterations, views_per_iteration; // 0 = all views
@@ -147,6 +147,9 @@ rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *de
 const char *rey_job_path(Job *job, const char *name);
 // Memory that lives as long as the job.
 void *rey_job_alloc(Job *job, size_t count, size_t item_bytes);
+
+// Names of the terms, separated by commas.
+void rey_job_terms_text(int terms, char *text, size_t size);
 
 int rey_job_spp_at(const Job *job, int iteration);
 int rey_job_level_at(const Job *job, int iteration);

@@ -121,14 +121,19 @@ static void flat_views(Text *t, const Job *job) {
     line_integer(t, "views_per_iteration", job->views_per_iteration ? job->views_per_iteration : job->fitted_count);
 }
 
-static void flat_terms(Text *t, int terms) {
-    char names[128] = "";
+void rey_job_terms_text(int terms, char *text, size_t size) {
+    text[0] = 0;
     for (int bit = 1; bit <= terms; bit <<= 1) {
-        size_t used = strlen(names);
+        size_t used = strlen(text);
         if (terms & bit) {
-            snprintf(names + used, sizeof names - used, "%s%s", used ? "," : "", rey_term_name(bit));
+            snprintf(text + used, size - used, "%s%s", used ? "," : "", rey_term_name(bit));
         }
     }
+}
+
+static void flat_terms(Text *t, int terms) {
+    char names[128];
+    rey_job_terms_text(terms, names, sizeof names);
     line_text(t, "terms", names);
 }
 

@@ -154,6 +154,19 @@ static GridSize grid_size(const rey_scene *scene, int param) {
     return (GridSize){v->nx, v->ny, v->nz, v->channels};
 }
 
+// Terms that the gradient of a parameter does not have would fit nothing.
+static rey_result check_terms(Job *job, const rey_param_info *info) {
+    int terms = info->terms | (info->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0); // shadows of what chains turn
+    if (!job->terms || (job->terms & terms)) {
+        return REY_OK;
+    }
+    char asked[128], expected[128];
+    rey_job_terms_text(job->terms, asked, sizeof asked);
+    rey_job_terms_text(terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR), expected, sizeof expected);
+    return rey_job_fail_at(job, job->terms_at, REY_ERROR_PARAM,
+                           "terms %s: the gradient of %s has no such term, expected some of %s", asked, info->name, expected);
+}
+
 static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index,
                               Array *owners, Unknowns *u) {
     rey_param_info info;
@@ -166,6 +179,10 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     bool enough = job->terms ? (info.terms & REY_TERM_INTERIOR) != 0 : !(info.terms & ~REY_TERM_TERMINATOR & ~known);
     if (!info.terms || !enough) {
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
+    }
+    result = check_terms(job, &info);
+    if (result) {
+        return result;
     }
     if (p->parameterisation == PARAMETERISATION_SIMPLEX && info.count < 2) {
         return fail_at(job, p, info.name, "parameterisation simplex is for two or more shares");
