@@ -97,6 +97,7 @@ typedef struct Fit {
     void *metrics;        // FILE *
     double start_seconds; // clock at which this run started, less the time of earlier runs
     int lock;             // descriptor of the locked folder + 1, 0 = none
+    int saved;            // iteration of the last checkpoint of this run, -1 = none yet
     bool stop;            // the user asked to stop
     int64_t nonfinite;    // samples of the iterations that were left out because they were not finite
 } Fit;

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 // 32 well mixed bits of two words: the finaliser of MurmurHash3, twice.
@@ -159,6 +160,41 @@ static rey_result begin_iteration(Fit *fit) {
     return result;
 }
 
+// The first parameter with a number that is not finite; its value after the step, or its gradient.
+static const Unknown *find_infinite(const Unknowns *u, bool gradient, double *number) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count; i++) {
+            *number = gradient ? u->gradient[i] : (double)u->value[i];
+            if (!isfinite(*number)) {
+                return p;
+            }
+        }
+    }
+    return NULL;
+}
+
+// The scene and the last checkpoint keep what was found before.
+static rey_result check_finite(Fit *fit, double loss, double norm) {
+    double number;
+    bool gradient = !isfinite(loss) || !isfinite(norm);
+    const Unknown *p = find_infinite(&fit->unknowns, gradient, &number);
+    if (!p && !gradient) {
+        return REY_OK;
+    }
+    number = p ? number : loss;
+    double rate = p && p->learning_rate > 0 ? p->learning_rate : fit->job.optimizer.learning_rate;
+    char what[256] = "the loss", kept[64] = "";
+    if (p) {
+        snprintf(what, sizeof what, "%s'%.150s'", gradient ? "the gradient of " : "", p->name);
+    }
+    if (fit->saved > 0) {
+        snprintf(kept, sizeof kept, "; checkpoint.bin keeps iteration %d", fit->saved);
+    }
+    return rey_fail(fit->ctx, REY_ERROR_PARAM, "%s: the fit diverges at iteration %d: %s becomes %g, expected a finite number; "
+                    "lower the learning rate, which is %g%s", fit->job.path, fit->state.iteration, what, number, rate, kept);
+}
+
 static rey_result iterate(Fit *fit, int *order) {
     int count = choose_batch(fit, fit->state.iteration, order);
     rey_result begun = begin_iteration(fit);
@@ -189,11 +225,10 @@ static rey_result iterate(Fit *fit, int *order) {
     }
     loss += rey_unknowns_regularise(&fit->unknowns);
     double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration, loss);
-    if (!isfinite(loss) || !isfinite(norm)) {
-        return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "the loss or its gradient is not finite at iteration %d",
-                        fit->state.iteration);
+    rey_result result = check_finite(fit, loss, norm);
+    if (!result) {
+        result = add_history(fit, loss, norm);
     }
-    rey_result result = add_history(fit, loss, norm);
     if (!result) {
         result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
     }
@@ -257,7 +292,8 @@ rey_result rey_fit_optimise(Fit *fit) {
     rey_result result = order ? REY_OK : REY_ERROR_MEMORY;
     double run_start = rey_seconds();
     double saved_at = run_start;
-    int first = fit->state.iteration, saved = -1;
+    int first = fit->state.iteration;
+    fit->saved = -1;
     while (!result && !fit->stop && !fit->state.converged && fit->state.iteration < fit->job.iterations) {
         result = iterate(fit, order);
         if (!result) {
@@ -265,13 +301,13 @@ rey_result rey_fit_optimise(Fit *fit) {
             fit->stop = !report_progress(fit, run_start, first);
             if (checkpoint_due(fit, saved_at)) {
                 result = save(fit);
-                saved = fit->state.iteration;
+                fit->saved = fit->state.iteration;
                 saved_at = rey_seconds();
             }
         }
     }
     rey_free(fit->ctx, order);
-    if (!result && saved != fit->state.iteration) {
+    if (!result && fit->saved != fit->state.iteration) {
         result = save(fit);
     }
     if (!result && fit->stop && fit->state.iteration < fit->job.iterations) {

@@ -173,11 +173,33 @@ static void frames_are_kept(void **state) {
     rey_context_destroy(ctx);
 }
 
+// A step to infinity ends the fit with the parameter, the iteration and what to do; a checkpoint from before stays.
+static void divergence_is_explained(void **state) {
+    Fixture *f = *state;
+    const char *fit = "fit far.yaml --set iterations=9 --set spp=4 --set checkpoint_every=1 --set image_every=0 --set "
+                      "optimizer.beta1=0 --set 'parameters=[{name: lamp.emitter.radiance.value, parameterisation: log, "
+                      "start: %s, learning_rate: 1e12}]' -o far_%s";
+    char arguments[512];
+    shell("cp '" TEST_JOBS "'/*.xml . && cp '" TEST_JOBS "/job.yaml' far.yaml");
+    expect(f, 0, "render truth.xml -o target.exr --spp 16");
+    snprintf(arguments, sizeof arguments, fit, "1", "up"); // the first step leads up
+    expect(f, 1, arguments);
+    assert_non_null(strstr(f->words, "far.yaml: the fit diverges at iteration 0: 'lamp.emitter.radiance.value' becomes inf, "
+                                     "expected a finite number; lower the learning rate, which is 1e+12\n"));
+    assert_int_not_equal(access("far_up/checkpoint.bin", F_OK), 0);
+    snprintf(arguments, sizeof arguments, fit, "99", "down"); // and here down to the bound, and up from there
+    expect(f, 1, arguments);
+    assert_non_null(strstr(f->words, "diverges at iteration 1: "));
+    assert_non_null(strstr(f->words, "; checkpoint.bin keeps iteration 1\n"));
+    assert_int_equal(access("far_down/checkpoint.bin", F_OK), 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_recovered_demo_renders_the_same_bits),
         cmocka_unit_test(a_killed_fit_loses_the_interval),
         cmocka_unit_test(frames_are_kept),
+        cmocka_unit_test(divergence_is_explained),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
