@@ -106,6 +106,12 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD "seed: -1\n", NULL, "job.yaml:4: seed = -1, expected 0 to");
     expect_error(f, HEAD "terms: interior,primery\n", NULL,
                  "job.yaml:4: 'primery' is no term; expected some of interior,primary,indirect");
+    expect_error(f, HEAD "optimizer:\n  type: adam\n  momentum: 0.9\n", NULL, "job.yaml:6: 'momentum' is a key of sgd; adam has "
+                 "learning_rate, beta1, beta2, epsilon, average and schedule");
+    expect_error(f, HEAD "optimizer: {memory: 3}\n", NULL, "job.yaml:4: 'memory' is a key of lbfgs; adam has");
+    expect_error(f, HEAD "optimizer: {beta1: 0.5, type: sgd}\n", NULL, "'beta1' is a key of adam; sgd has learning_rate, m");
+    expect_error(f, HEAD "optimizer: {type: lbfgs}\n", "optimizer.momentum=0", "--set optimizer.momentum=0: 'momentum' is a key of "
+                 "sgd; lbfgs has learning_rate and memory");
     expect_error(f, HEAD "iterations: 2.5\n", NULL, "job.yaml:4: iterations = 2.5, expected a whole number");
     expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: expected a number");
     expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: unknown value 'l3', did you mean");

@@ -160,6 +160,26 @@ static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
                                      : rey_job_read_map(job, node, "schedule", fields, target);
 }
 
+// Keys that the optimizer of this kind would pass over. What lbfgs has none of is told where its reason is (check_lbfgs).
+static rey_result check_optimizer_keys(Job *job, const YamlNode *node, OptimizerKind kind) {
+    static const struct {
+        const char *key;
+        OptimizerKind owner;
+    } owned[] = {{"beta1", OPTIMIZER_ADAM}, {"beta2", OPTIMIZER_ADAM}, {"epsilon", OPTIMIZER_ADAM},
+                 {"momentum", OPTIMIZER_SGD}, {"memory", OPTIMIZER_LBFGS}};
+    static const char *const keys[] = {"learning_rate, beta1, beta2, epsilon, average and schedule",
+                                       "learning_rate, momentum, average and schedule", "learning_rate and memory"};
+    for (const YamlNode *entry = node->child; entry; entry = entry->next) {
+        for (int i = 0; i < COUNT_OF(owned); i++) {
+            if (!strcmp(entry->key, owned[i].key) && kind != owned[i].owner) {
+                return rey_job_fail(job, entry, "'%s' is a key of %s; %s has %s", entry->key,
+                                    rey_optimizer_name((int)owned[i].owner), rey_optimizer_name((int)kind), keys[kind]);
+            }
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(JobOptimizer, kind), .names = rey_optimizer_name_list},
@@ -177,8 +197,11 @@ static rey_result read_optimizer(Job *job, const YamlNode *node, void *target) {
         {.key = "schedule", .type = FIELD_READER, .offset = offsetof(JobOptimizer, schedule), .read = read_schedule},
         {0},
     };
-    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, target)
-                                     : rey_job_read_map(job, node, "optimizer", fields, target);
+    if (node->kind == YAML_SCALAR) {
+        return rey_job_read_field(job, fields, node, target);
+    }
+    rey_result result = rey_job_read_map(job, node, "optimizer", fields, target);
+    return result ? result : check_optimizer_keys(job, node, ((const JobOptimizer *)target)->kind);
 }
 
 static rey_result read_stop(Job *job, const YamlNode *node, void *target) {
