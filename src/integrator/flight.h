@@ -44,8 +44,8 @@ KFN Flights flights_load(const Tracer *t, int32_t medium, const int32_t *order, 
     Flights f = {.medium = medium, .m = m_first_n(count)};
     f.at = i_select(f.m, i_load(order), i_set(order[0]));
     f.slot = i_gather(p->slot, f.at);
-    f.o = LOAD_V3(*p, ox, oy, oz, f.at);
     f.d = LOAD_V3(*p, dx, dy, dz, f.at);
+    f.o = v3_madd(LOAD_V3(*p, ox, oy, oz, f.at), -real_gather(p->skip, f.at), f.d);
     Mask found = mi_lt(i_set(-1), i_gather(ws->hit_shape, f.at));
     Float distance = v3_dot(v3_sub(LOAD_V3(*ws, hit_x, hit_y, hit_z, f.at), f.o), f.d);
     f.tmax = f_select(found, f_max(distance, f_set(0)), real_gather(p->tmax, f.at));
@@ -97,6 +97,13 @@ KFN void record_flight(Tracer *t, const Flights *f, int32_t count, int32_t bounc
     spec_store(r->weight, at, f->flight.weight);
 }
 
+// A collision, off both ends of its flight: the next ray must not begin on the wrong side of a border.
+KFN Float flight_inside(const Flights *f) {
+    Float largest = f_max(f_max(f_abs(f->o.x), f_abs(f->o.y)), f_abs(f->o.z));
+    Float step = f_min((1.0f + largest) * 3e-6f, 0.5f * f->tmax);
+    return f_select(f->flight.real, f_min(f_max(f->flight.t, step), f->tmax - step), f->flight.t);
+}
+
 // Flies one batch: paths that collide go to the medium's group, all carry their weight.
 static void fly(Tracer *t, int32_t id, const int32_t *order, int32_t count, int32_t bounce) {
     const SceneView *scene = t->scene;
@@ -106,6 +113,7 @@ static void fly(Tracer *t, int32_t id, const int32_t *order, int32_t count, int3
     Flights f = flights_load(t, id, order, count, bounce);
     Track track = track_of(t, id);
     f.flight = track_flight(&track, f.o, f.d, f.tmax, f.shares, f.m, &f.key, 0);
+    f.flight.t = flight_inside(&f);
     Spec emission = spec_zero();
     if (medium->emission >= 0) {
         emission = flight_emission(t, &f, bounce);

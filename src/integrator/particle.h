@@ -206,6 +206,7 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
         Mask passed = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
         o = v3_select(passed, interaction_behind(&at->si, w.d), o);
         i_compress(next->medium + next_count, medium_behind(at->group, at->si.ng, w.d, at->v.medium), m);
+        f_compress(next->skip + next_count, v3_dot(v3_sub(o, at->si.p), w.d), m);
         i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
     }
     return particle_append(next, next_count, o, w.d, w.beta, w.eta2, w.roulette, at->v.slot, m);

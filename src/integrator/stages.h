@@ -94,6 +94,7 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     f_store(p->py + i, ray->o.y);
     f_store(p->pz + i, ray->o.z);
     f_store(p->tmax + i, ray->tmax);
+    f_store(p->skip + i, f_set(0));
     spec_store(p->beta, i, spec_set(weight));
     f_store(p->eta2 + i, f_set(1));
     f_store(p->roulette + i, f_set(1));

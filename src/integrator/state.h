@@ -13,9 +13,9 @@ enum {
 };
 
 // A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot, and depth
-// where that is not the bounce (scene->through).
+// where that is not the bounce (scene->through). skip: in media, how far before its origin the ray left its surface.
 #define PATH_FLOATS(F)                                                                                                 \
-    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz)
+    F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz) F(skip)
 #define PATH_SPECS(S) S(beta)
 #define PATH_INTS(I) I(slot) I(medium) I(depth)
 

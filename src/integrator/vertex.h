@@ -207,6 +207,7 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
     i_compress(next->slot + at, v->slot, w->m);
     if (t->scene->has_media) {
         i_compress(next->medium + at, medium, w->m);
+        f_compress(next->skip + at, v3_dot(v3_sub(o, p), w->d), w->m);
     }
 }
 

@@ -67,6 +67,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
 static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Mask *blocked, Walk *walk) {
     Spec transmittance = spec_set(f_zero_unless(m, f_set(1)));
     const Float beyond = ray.tmax * (SHADOW_SHORT / (1.0f - SHADOW_SHORT));
+    Float skip = f_set(0); // of the medium, by the step off the surface before
     Mask left = m;
     *blocked = m_set(false);
     for (int32_t i = 0; m_any(left); i++) {
@@ -88,11 +89,13 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Ma
         }
         if (fog) {
             Mask open = left & (may | ~found);
-            Float length = f_select(found, v3_dot(v3_sub(hit.p, ray.o), ray.d), ray.tmax + beyond);
-            Spec clear = fog_transmittance(t, fog, medium, &ray, length, i, open);
+            Ray piece = {v3_madd(ray.o, -skip, ray.d), ray.d, ray.tmax};
+            Float length = f_select(found, v3_dot(v3_sub(hit.p, ray.o), ray.d), ray.tmax + beyond) + skip;
+            Spec clear = fog_transmittance(t, fog, medium, &piece, length, i, open);
+            skip = f_zero_unless(found, v3_dot(v3_sub(o, hit.p), ray.d));
             transmittance = spec_select(open, spec_mul(transmittance, clear), transmittance);
             if (walk && i <= MOST_SURFACES_IN_A_ROW) {
-                walk->o[i] = ray.o;
+                walk->o[i] = piece.o;
                 walk->length[i] = length;
                 walk->medium[i] = i_select(open, medium, i_set(-1));
                 walk->clear = spec_select(open, spec_mul(walk->clear, clear), walk->clear);

@@ -25,12 +25,12 @@ static void close_to(const char *what, double albedo, double mean, double error,
 }
 
 // Albedos from..from + 2 in the three channels; dense enough that neither the other side nor the edges are felt. The border is that
-// of a box, since rays that pass surfaces begin a little behind them.
+// of the medium's own box, or under the sun a surface, behind which light begins to be lost at once.
 static void judge_half_space(int from, bool sun, int spp, int slope_spp) {
     static char albedos[64];
     snprintf(albedos, sizeof albedos, "%g, %g, %g", half_albedo[from], half_albedo[from + 1], half_albedo[from + 2]);
     const rey_define defines[MOST_DEFINES] = {{"albedo", albedos},         {sun ? "sun" : "sky", "1"}, {"g", "0"},
-                                              {"roulette", "24"},          {"kind", "heterogeneous"},  {"wide", "2"},
+                                              {"roulette", "24"},          {"kind", sun ? "homogeneous" : "heterogeneous"},  {"wide", sun ? "1" : "2"},
                                               {"sigma_t", "200, 200, 200"}};
     Room room = slab_open(defines, 2);
     int param = rey_param_find(room.scene, "fog.albedo.value.value");
