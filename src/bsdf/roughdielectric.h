@@ -14,19 +14,25 @@
     P(ALPHA_V, alpha_v, 0.1f, 0, 1, "roughness across the tangent", "")
 KIND_RECORD(RoughDielectric, ROUGHDIELECTRIC_PARAMS, MICROFACET_CONFIG)
 
+// An index of 1 refracts nothing: every half vector but one belongs to no direction. A value close to it stands in for it.
+KFN Float roughdielectric_eta(const RoughDielectric *p) {
+    return f_select(m_eq(p->eta, f_set(1)), f_set(1.001f), p->eta);
+}
+
 // What eval, pdf and the adjoint share.
 typedef struct RoughDielectricTerms {
     Mask counts, reflects;
     Vec3 h, m;   // unnormalised and final half vector
     Float turn;  // the sign that turned m up
-    Float e;     // index ratio along the path
+    Float eta, e; // the index; its ratio along the path
     Float a, b, q, fresnel;
 } RoughDielectricTerms;
 
 KFN RoughDielectricTerms roughdielectric_terms(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe) {
     RoughDielectricTerms t;
     t.reflects = m_gt(wi.z * wo.z, f_set(0));
-    t.e = f_select(m_gt(wi.z, f_set(0)), p->eta, 1.0f / p->eta);
+    t.eta = roughdielectric_eta(p);
+    t.e = f_select(m_gt(wi.z, f_set(0)), t.eta, 1.0f / t.eta);
     t.h = v3_madd(wi, f_select(t.reflects, f_set(1), t.e), wo);
     Vec3 m = v3_normalize(t.h);
     t.turn = f_sign(m.z);
@@ -35,7 +41,7 @@ KFN RoughDielectricTerms roughdielectric_terms(const RoughDielectric *p, Vec3 wi
     t.b = v3_dot(wo, t.m);
     t.q = t.a + t.e * t.b;
     Float cos_t, eta_it, eta_ti;
-    t.fresnel = fresnel_dielectric(t.a, p->eta, &cos_t, &eta_it, &eta_ti);
+    t.fresnel = fresnel_dielectric(t.a, t.eta, &cos_t, &eta_it, &eta_ti);
     t.counts = m_ne(wi.z * wo.z, f_set(0)) & mi_eq(lobe, i_set(LOBE_SMOOTH));
     return t;
 }
@@ -79,9 +85,9 @@ KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lo
 
 KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u1, Vec2 u2) {
     Microfacet mf = roughdielectric_facets(p);
-    Float e = f_select(m_gt(wi.z, f_set(0)), p->eta, 1.0f / p->eta);
+    Float eta = roughdielectric_eta(p), e = f_select(m_gt(wi.z, f_set(0)), eta, 1.0f / eta);
     Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), e, p->floor, &u1, u2);
-    Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), p->eta, &cos_t, &eta_it, &eta_ti);
+    Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);
     Mask reflects = m_lt(u1, roughdielectric_probability(p, f));
     Vec3 wo = v3_select(reflects, reflect(wi, m), refract(wi, m, cos_t, eta_ti));
     // A reflected direction below the surface, or a refracted one above it, has no density there; nor has a facet seen
@@ -121,7 +127,7 @@ KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lob
     da = gt * (f_safe_rcp(t.a) - 2.0f * rcp_q);
     db = gt * (f_safe_rcp(t.b) - 2.0f * t.e * rcp_q);
     de = -2.0f * gt * t.b * rcp_q;
-    fresnel_dielectric_adj(t.a, p->eta, f_zero_unless(t.counts, dfresnel), f_set(0), &da, &dp->eta);
+    fresnel_dielectric_adj(t.a, t.eta, f_zero_unless(t.counts, dfresnel), f_set(0), &da, &dp->eta);
     // a = wi . m, b = wo . m
     v3_acc(dwi, v3_scale(t.m, da));
     v3_acc(dwo, v3_scale(t.m, db));
