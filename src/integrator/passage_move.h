@@ -100,7 +100,9 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
             if (m_any(ends)) {
                 Filling f = medium_filling(t, id, v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d));
                 turn->distance = turn->distance - f_zero_unless(ends, spec_dot(dt, f.extinction));
-                sink->faces |= m_any(ends & turn->points & m_gt(spec_max(f.extinction), f_set(0))) ? LIGHT_WITHIN : 0;
+                // One lane alone may have slipped through the edge of a border.
+                Mask within = ends & turn->points & m_gt(spec_max(f.extinction), f_set(0));
+                sink->faces |= m_count(within) > (LANES > 1 ? 1 : 0) ? LIGHT_WITHIN : 0;
             }
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);
