@@ -28,7 +28,7 @@ typedef struct BoundaryJob {
     const MarkRecord *marks;
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;
-    bool round;               // there are outlines of round surfaces among them
+    bool round;               // there are outlines of round surfaces, or marks, among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
     bool chains;              // the scene has chains of smooth mirrors and glass

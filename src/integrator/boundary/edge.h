@@ -25,6 +25,8 @@ typedef struct EdgePoint {
                         // shape is -1; across: the normals of both
     Hit met;
     Vec3 across[2];
+    Mask mark;          // a line of its surface's texture; beside: the points on both sides of it, the first one at side[0]
+    Hit beside[2];
 } EdgePoint;
 
 // Which sample of its random numbers a slot stands for.
@@ -262,13 +264,18 @@ static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e,
 
 // The line along which a texture jumps, on both sides of which the same surface is seen.
 static void edge_of_mark(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
-    Vec3 tangent;
+    Int number = EDGE_FIELD(b, e, corner);
+    Vec3 tangent, across, unused[2];
     out->hit.prim = i_select(m, EDGE_FIELD(b, e, prim), out->hit.prim);
-    MarkPoint at = mark_at(scene, b, EDGE_FIELD(b, e, corner), t, &out->hit, m, &tangent);
-    out->p = v3_select(m, at.p, out->p);
+    for (int k = 0; k < 2; k++) {
+        out->beside[k] = out->hit;
+        out->beside[k].p = mark_at(scene, b, number, t, f_set(k ? -MARK_STEP : MARK_STEP), &out->beside[k], m, unused, unused + 1);
+    }
+    Vec3 p = mark_at(scene, b, number, t, f_set(0), &out->hit, m, &tangent, &across);
+    out->p = v3_select(m, p, out->p);
     out->tangent = v3_select(m, tangent, out->tangent);
-    out->side[0] = v3_select(m, v3_cross(tangent, v3_cross(at.du, at.dv)), out->side[0]);
-    out->side[1] = v3_select(m, v3_neg(out->side[0]), out->side[1]);
+    out->side[0] = v3_select(m, across, out->side[0]);
+    out->side[1] = v3_select(m, v3_neg(across), out->side[1]);
     out->open = out->open & ~m;
 }
 
@@ -311,9 +318,10 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     if (m_any(out.meeting)) {
         edge_of_meeting(scene, b, e, t, out.meeting, &out);
     }
-    Mask mark = mi_eq(kind, i_set(EDGE_MARK));
-    if (m_any(mark)) {
-        edge_of_mark(scene, b, e, t, mark, &out);
+    out.mark = mi_eq(kind, i_set(EDGE_MARK));
+    out.beside[0] = out.beside[1] = out.hit;
+    if (m_any(out.mark)) {
+        edge_of_mark(scene, b, e, t, out.mark, &out);
     }
     out.round = outline | side;
     out.hit.p = out.p;

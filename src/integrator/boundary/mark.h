@@ -54,14 +54,19 @@ static MarkPoint mark_on_turned(const SceneView *scene, Int table, Mask disk, Fl
     return at;
 }
 
-// Point t of the mark `number` on the surface of *hit, which gets its coordinates: its tangent, and what points across it.
-static MarkPoint mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Float t, Hit *hit, Mask m, Vec3 *tangent) {
+// Of a mark's uv: how far beside it a path starts.
+#define MARK_STEP 2e-5f
+
+// Point t of the mark `number` on the surface of *hit, moved by `off` across it: *hit gets its coordinates; *tangent is that of
+// the mark, *across where positive steps lead.
+static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Float t, Float off, Hit *hit, Mask m, Vec3 *tangent,
+                    Vec3 *across) {
     const float *marks = b->marks->ends;
     Int at = i_select(m, number, i_set(0)) * 4;
     Float u = f_gather(marks, at), v = f_gather(marks, at + 1);
-    Float du = f_gather(marks, at + 2) - u, dv = f_gather(marks, at + 3) - v;
-    u = u + t * du;
-    v = v + t * dv;
+    Float du = f_gather(marks, at + 2) - u, dv = f_gather(marks, at + 3) - v, rcp = f_safe_rcp(f_sqrt(du * du + dv * dv));
+    u = u + t * du - off * rcp * dv;
+    v = v + t * dv + off * rcp * du;
     Int shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m)))), kind = SHAPE_FIELD(scene, shape, kind);
     Int table = SHAPE_FIELD(scene, shape, table);
     Mask mesh = m & mi_eq(kind, i_set(SHAPE_MESH)), sphere = m & mi_eq(kind, i_set(SHAPE_SPHERE));
@@ -69,8 +74,12 @@ static MarkPoint mark_at(const SceneView *scene, const BoundaryJob *b, Int numbe
     MarkPoint p = {v3_zero(), v3_zero(), v3_zero()}, other;
     if (m_any(mesh)) {
         // lanes of other shapes stand in for triangles of this one
-        Hit own = {i_select(mesh, shape, i_set(i_lane(shape, m_first(mesh)))), i_select(mesh, hit->prim, i_set(0)), u, v,
-                   hit->p, hit->instance};
+        Hit own = {i_select(mesh, shape, i_set(i_lane(shape, m_first(mesh)))),
+                   i_select(mesh, hit->prim, i_set(0)),
+                   u,
+                   v,
+                   hit->p,
+                   hit->instance};
         p = mark_on_mesh(scene, &own);
     }
     if (m_any(sphere)) {
@@ -78,12 +87,12 @@ static MarkPoint mark_at(const SceneView *scene, const BoundaryJob *b, Int numbe
         p = (MarkPoint){v3_select(sphere, other.p, p.p), v3_select(sphere, other.du, p.du), v3_select(sphere, other.dv, p.dv)};
     }
     if (m_any(turned)) {
-        other = mark_on_turned(scene, i_select(turned, table, i_set(i_lane(table, m_first(turned)))),
-                               mi_eq(kind, i_set(SHAPE_DISK)), u, v);
+        other = mark_on_turned(scene, i_select(turned, table, i_set(i_lane(table, m_first(turned)))), mi_eq(kind, i_set(SHAPE_DISK)), u, v);
         p = (MarkPoint){v3_select(turned, other.p, p.p), v3_select(turned, other.du, p.du), v3_select(turned, other.dv, p.dv)};
     }
     hit->u = f_select(mesh, u, hit->u);
     hit->v = f_select(mesh, v, hit->v);
     *tangent = v3_madd(v3_scale(p.du, du), dv, p.dv);
-    return p;
+    *across = v3_madd(v3_scale(p.du, -dv), du, p.dv);
+    return p.p;
 }

@@ -63,7 +63,17 @@ KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real step) {
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
 static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     const Ray rays[2] = {primary_ray(t, s, -PRIMARY_STEP).ray, primary_ray(t, s, PRIMARY_STEP).ray};
-    return edge_between(t, &s->edge, s->silhouette, s->n, rays, m);
+    Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~s->edge.mark), mark = m & s->edge.mark;
+    if (m_any(mark)) {
+        // Paths beside it start on its surface, also where the outline is nearer than their step.
+        Ray ray = primary_ray(t, s, 0).ray;
+        Hit hit = trace_closest(t->scene, &ray, mark, false);
+        Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
+        Mask own = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
+        visible = visible | (mark & own & m_le(f_abs(found - reach), 2e-5f * reach));
+        t->job->rays += m_count(mark);
+    }
+    return visible;
 }
 
 // Finds which of `count` samples from number `first` on can contribute; writes their numbers behind `kept`.
@@ -111,14 +121,14 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
 }
 
 // Finds the first vertices of those paths. Beside the outline of a round surface its normal turns with the root of the distance,
-// which no step would resolve: there the vertex is the point that is all but on the outline.
+// which no step would resolve: there the vertex is the point that is all but on the outline. Beside marks it is on their surface.
 static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int32_t count, int32_t half) {
     trace_stage(t, 0);
     for (int32_t k = 0; k < count && b->round; k += LANES) {
         PrimarySample s;
         primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
-        Mask above = m_gt(v3_dot(s.edge.side[0], s.n), f_set(0)), round = s.edge.round & m_first_n(count - k);
-        for (int side = 0; side < 2 && m_any(round); side++) {
+        Mask above = m_gt(v3_dot(s.edge.side[0], s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
+        for (int side = 0; side < 2 && m_any(round | s.edge.mark); side++) {
             int32_t at = side * half + k;
             Mask inside = round & (side ? above : ~above);
             const Workspace *ws = &t->ws;
@@ -128,6 +138,8 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
                        f_zero_unless(~inside, f_load(ws->hit_v + at)),
                        v3_select(inside, s.edge.inner, record_v3(ws->hit_x, ws->hit_y, ws->hit_z, at)),
                        i_select(inside, s.edge.hit.instance, i_load(ws->hit_instance + at))};
+            Hit beside = hit_select(side ? above : ~above, s.edge.beside, s.edge.beside + 1);
+            hit = hit_select(m & s.edge.mark, &beside, &hit);
             hit_store(t, at, &hit);
         }
     }
