@@ -29,8 +29,12 @@ static void close_to(const char *what, double albedo, double mean, double error,
 static void judge_half_space(int from, bool sun, int spp, int slope_spp) {
     static char albedos[64];
     snprintf(albedos, sizeof albedos, "%g, %g, %g", half_albedo[from], half_albedo[from + 1], half_albedo[from + 2]);
-    const rey_define defines[MOST_DEFINES] = {{"albedo", albedos},         {sun ? "sun" : "sky", "1"}, {"g", "0"},
-                                              {"roulette", "24"},          {"kind", sun ? "homogeneous" : "heterogeneous"},  {"wide", sun ? "1" : "2"},
+    const rey_define defines[MOST_DEFINES] = {{"albedo", albedos},
+                                              {sun ? "sun" : "sky", "1"},
+                                              {"g", "0"},
+                                              {"roulette", "24"},
+                                              {"kind", sun ? "homogeneous" : "heterogeneous"},
+                                              {"wide", sun ? "1" : "2"},
                                               {"sigma_t", "200, 200, 200"}};
     Room room = slab_open(defines, 2);
     int param = rey_param_find(room.scene, "fog.albedo.value.value");
