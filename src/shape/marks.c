@@ -34,7 +34,8 @@ static bool known_before(const Array *steps, size_t first, size_t i, double leve
     double size = hypot(s->u, s->v);
     for (size_t k = first; k < i; k++) {
         const TextureStep *t = &ARRAY_AT(*steps, TextureStep, k);
-        if (t->sort != STEP_LINES || !(hypot(t->u, t->v) > 0) || fabs(t->u * s->v - t->v * s->u) > 1e-6 * size * hypot(t->u, t->v)) {
+        double other = hypot(t->u, t->v), turn = fabs(t->u * s->v - t->v * s->u);
+        if (t->sort != STEP_LINES || !(other > 0) || turn > 1e-6 * size * other) {
             continue;
         }
         double ratio = (t->u * s->u + t->v * s->v) / (size * size), at = t->offset + ratio * (level - s->offset);
