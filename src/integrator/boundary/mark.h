@@ -87,7 +87,8 @@ static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Fl
         p = (MarkPoint){v3_select(sphere, other.p, p.p), v3_select(sphere, other.du, p.du), v3_select(sphere, other.dv, p.dv)};
     }
     if (m_any(turned)) {
-        other = mark_on_turned(scene, i_select(turned, table, i_set(i_lane(table, m_first(turned)))), mi_eq(kind, i_set(SHAPE_DISK)), u, v);
+        Int own = i_select(turned, table, i_set(i_lane(table, m_first(turned))));
+        other = mark_on_turned(scene, own, mi_eq(kind, i_set(SHAPE_DISK)), u, v);
         p = (MarkPoint){v3_select(turned, other.p, p.p), v3_select(turned, other.du, p.du), v3_select(turned, other.dv, p.dv)};
     }
     hit->u = f_select(mesh, u, hit->u);
