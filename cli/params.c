@@ -3,6 +3,7 @@
 #include "reasons.h"
 
 #include "render/term_request.h"
+#include "render/update.h"
 #include "render/used.h"
 
 #include <math.h>
@@ -28,13 +29,46 @@ static Range value_range(const float *values, int64_t count) {
 typedef struct Listing {
     Session *session;
     bool *shown, *used; // per parameter of the scene
+    bool *complete;     // has a gradient, per parameter that is shown
     Reasons reasons;    // of what is refused
 } Listing;
 
 // Why `grad` refuses a parameter, by the words that it uses; null where it does not.
-static const char *refusal(const Session *s, int param) {
+static const char *refusal(const Listing *l, int param) {
     rey_render_def def = rey_default_render_def();
-    return rey_derivative_check(s->scene, &def, (rey_selection){&param, 1}) ? rey_error(s->ctx) : NULL;
+    if (l->complete[param]) {
+        return NULL;
+    }
+    return rey_derivative_check(l->session->scene, &def, (rey_selection){&param, 1}) ? rey_error(l->session->ctx) : NULL;
+}
+
+// A question costs a walk through the scene, and what is complete together is so alone: one for all of a scene in which nothing is
+// refused, and halves of those that are not complete together.
+static void find_complete(Listing *l, const int *params, int count) {
+    rey_render_def def = rey_default_render_def();
+    bool complete = rey_derivative_check(l->session->scene, &def, (rey_selection){params, count}) == REY_OK;
+    for (int i = 0; i < count && complete; i++) {
+        l->complete[params[i]] = true;
+    }
+    if (!complete && count > 1) {
+        find_complete(l, params, count / 2);
+        find_complete(l, params + count / 2, count - count / 2);
+    }
+}
+
+static rey_result find_all_complete(Listing *l) {
+    rey_scene *scene = l->session->scene;
+    int *params = rey_alloc_array(l->session->ctx, (size_t)rey_param_count(scene), sizeof *params), count = 0;
+    for (int i = 0; i < rey_param_count(scene) && params; i++) {
+        if (l->shown[i]) {
+            params[count++] = i;
+        }
+    }
+    if (count > 0) {
+        find_complete(l, params, count);
+    }
+    rey_free(l->session->ctx, params);
+    return params ? REY_OK : REY_ERROR_MEMORY;
 }
 
 static void json_param(Json *json, const Listing *l, int param) {
@@ -72,7 +106,7 @@ static void json_param(Json *json, const Listing *l, int param) {
     cli_json_terms(json, "terms_if_met", info->terms & REY_TERM_TERMINATOR);
     json_string(json, "why", info->why);
     json_bool(json, "used", l->used[param]);
-    json_string(json, "refused", refusal(l->session, param));
+    json_string(json, "refused", refusal(l, param));
     json_object_end(json);
 }
 
@@ -103,7 +137,7 @@ enum { PARAM_CELLS = 7, CELL_BYTES = 512 };
 static void gradient_text(Listing *l, int param, char text[CELL_BYTES]) {
     rey_param_info info = {.name = ""};
     rey_param_get_info(l->session->scene, param, &info);
-    const char *refused = refusal(l->session, param);
+    const char *refused = refusal(l, param);
     if (refused) {
         snprintf(text, CELL_BYTES, "refused [%d]%s", reasons_add(l->session->ctx, &l->reasons, refused, info.name),
                  l->used[param] ? "" : ", unused");
@@ -232,8 +266,15 @@ static int list(Session *session) {
     Listing l = {.session = session};
     l.shown = rey_alloc_array(session->ctx, count, sizeof *l.shown);
     l.used = rey_alloc_array(session->ctx, count, sizeof *l.used);
-    rey_result result = l.shown && l.used ? rey_params_used(session->scene, l.used) : REY_ERROR_MEMORY;
+    l.complete = rey_alloc_array(session->ctx, count, sizeof *l.complete);
+    rey_result result = l.shown && l.used && l.complete ? rey_params_used(session->scene, l.used) : REY_ERROR_MEMORY;
     int status = result ? EXIT_OK : choose(&l);
+    if (!result && !status) {
+        result = rey_scene_update(session->scene);
+    }
+    if (!result && !status) {
+        result = find_all_complete(&l);
+    }
     if (!result && !status) {
         result = (session->options->json ? print_json : print_table)(&l);
     }
@@ -241,6 +282,7 @@ static int list(Session *session) {
     reasons_free(session->ctx, &l.reasons);
     rey_free(session->ctx, l.shown);
     rey_free(session->ctx, l.used);
+    rey_free(session->ctx, l.complete);
     return status ? status : cli_finish_output();
 }
 

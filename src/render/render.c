@@ -82,11 +82,34 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
     return REY_OK;
 }
 
-// Checks, brings the scene up to date and prepares what every mode needs.
-rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels) {
+// Checks, and plans the film: all that a question about a derivative needs.
+static rey_result render_plan(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels) {
     *r = (Render){.scene = scene, .parts = 1};
     pthread_mutex_init(&r->lock, NULL);
     rey_result result = check_def(scene, def);
+    if (result != REY_OK) {
+        return result;
+    }
+    const SensorRecord *sensor = scene->view.sensors + def->sensor;
+    r->def = *def;
+    r->def.spp = def->spp ? def->spp : sensor->spp;
+    if (scene->view.split) {
+        if ((int64_t)r->def.spp * scene->view.split > 1 << 24) {
+            return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "%d samples per pixel of %d each, expected up to %d together",
+                            r->def.spp, scene->view.split, 1 << 24);
+        }
+        r->def.spp *= scene->view.split;
+    }
+    r->plan = rey_film_plan(sensor, channels);
+    r->tiles = r->plan.columns * r->plan.rows;
+    r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
+    r->job.sobol = def->sampler != REY_SAMPLER_INDEPENDENT;
+    return REY_OK;
+}
+
+// Brings the scene up to date and prepares what every mode needs.
+rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels) {
+    rey_result result = render_plan(r, scene, def, mode, channels);
     if (result == REY_OK) {
         result = rey_scene_update(scene);
     }
@@ -94,21 +117,8 @@ rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *d
         return result;
     }
     rey_context *ctx = scene->ctx;
-    const SensorRecord *sensor = scene->view.sensors + def->sensor;
-    r->def = *def;
-    r->def.spp = def->spp ? def->spp : sensor->spp;
-    if (scene->view.split) {
-        if ((int64_t)r->def.spp * scene->view.split > 1 << 24) {
-            return rey_fail(ctx, REY_ERROR_ARGUMENT, "%d samples per pixel of %d each, expected up to %d together",
-                            r->def.spp, scene->view.split, 1 << 24);
-        }
-        r->def.spp *= scene->view.split;
-    }
+    const SensorRecord *sensor = r->plan.sensor;
     r->backend = rey_backend_cpu(ctx->def.lanes);
-    r->plan = rey_film_plan(sensor, channels);
-    r->tiles = r->plan.columns * r->plan.rows;
-    r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
-    r->job.sobol = def->sampler != REY_SAMPLER_INDEPENDENT;
     r->columns = rey_alloc_array(ctx, (size_t)sensor->crop_width, sizeof(double));
     r->rows = rey_alloc_array(ctx, (size_t)sensor->crop_height, sizeof(double));
     r->workspaces = rey_alloc_array(ctx, (size_t)ctx->def.threads, sizeof(void *));
@@ -288,7 +298,6 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->gradient_size = at;
     r->job.texture_at = texture_at, r->job.to_uv_at = to_uv_at;
     r->job.attribute_at = attribute_at, r->job.place_at = place_at;
-    rey_live_groups(view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + view->volumes_count);
     return REY_OK;
 }
 
@@ -309,7 +318,7 @@ static bool selection_given(rey_selection selection) {
 
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, TermRequest request,
                                    rey_selection selection, int32_t mode) {
-    rey_result result = rey_render_begin(r, scene, def, mode, 3);
+    rey_result result = (request.asked ? render_plan : rey_render_begin)(r, scene, def, mode, 3);
     r->request = request;
     if (result == REY_OK && scene->view.colour_is_depth) {
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
@@ -327,6 +336,9 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     }
     if (result != REY_OK) {
         return result;
+    }
+    if (!request.asked) {
+        rey_live_groups(&scene->view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + scene->view.volumes_count);
     }
     r->job.spp = set_spp(r);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;

@@ -19,5 +19,5 @@ rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermReques
                          const float *adjoint, double *gradient, double *set_gradients, rey_stats *stats);
 
 // Whether the derivative of a selection would be computed at all: what rey_vjp and rey_jvp refuse before they render, with
-// the same message.
+// the same message. The scene is up to date (rey_scene_update).
 rey_result rey_derivative_check(rey_scene *scene, const rey_render_def *def, rey_selection selection);

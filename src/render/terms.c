@@ -29,10 +29,9 @@ static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int 
     }
 }
 
-// The terms of a parameter's derivative that exist.
-static int terms_known(const rey_scene *scene, const rey_render_def *def, const Param *p) {
+// The terms of a parameter's derivative that exist. chains: REY_TERM_SPECULAR where it does, else 0.
+static int terms_known(const rey_scene *scene, const rey_render_def *def, int chains, const Param *p) {
     const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
-    const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
     if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) {
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
@@ -122,7 +121,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
 
 // Whether points of surfaces look up volumes: where points move, so does what they find.
 static bool surfaces_read_volumes(const SceneView *view) {
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+    for (int64_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
         for (int k = 0; k < MAX_SLOTS; k++) {
             if (is_volume(view, view->bsdfs[i].slot[k])) {
                 return true;
@@ -139,6 +138,8 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
                         "with hide_emitters, 'path' drops light of a surface that lets a part of it pass, and what it "
                         "drops has no derivative: 'volpath' drops none");
     }
+    const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
+    const bool volumes = surfaces_read_volumes(&scene->view);
     for (int i = 0; i < selection.count; i++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(scene, selection.params[i], &info);
@@ -156,12 +157,12 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                       (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
         points = points && !rey_moves_border(&scene->view, p);
-        if (points && surfaces_read_volumes(&scene->view)) {
+        if (points && volumes) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
                             "move look them up elsewhere", info.name);
         }
-        int known = terms_known(scene, def, p);
+        int known = terms_known(scene, def, chains, p);
         int missing = info.terms & ~known;
         bool interior = known & REY_TERM_INTERIOR;
         if (missing && !def->terms) {
@@ -179,8 +180,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         // What chains turn moves shadows of what lies behind them.
         *needed |= info.terms | (info.terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0);
     }
-    const int exist = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT |
-                      (rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0);
+    const int exist = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     if (def->terms & ~exist) {
         int bit = def->terms & ~exist;
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));

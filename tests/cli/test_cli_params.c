@@ -65,6 +65,24 @@ static void reasons_are_said_once(void **state) {
     assert_int_equal(count_words(f->out, "the term 'specular' does not know"), 1);
 }
 
+// Whether there are gradients is asked for many parameters at once, and the answers are those of each alone.
+static void answers_are_those_of_one(void **state) {
+    Fixture *f = *state;
+    JsonNode *all = run_json(f, 0, "params %s -D ball=glass --json");
+    int refused = 0, complete = 0;
+    for (const JsonNode *p = json_get(all, "parameters")->first; p; p = p->next) {
+        char arguments[512];
+        const char *name = json_text(p, "name", "");
+        snprintf(arguments, sizeof arguments, "params %%s -D ball=glass --param %s --json", name);
+        JsonNode *alone = run_json(f, 0, arguments);
+        assert_string_equal(json_text(p, "refused", ""), json_text(find_param(alone, name), "refused", ""));
+        *(json_text(p, "refused", "")[0] ? &refused : &complete) += 1;
+        json_free(alone);
+    }
+    assert_true(refused > 0 && complete > 0);
+    json_free(all);
+}
+
 // A refusal names the object that causes it.
 static void refusals_name_objects(void **state) {
     Fixture *f = *state;
@@ -188,6 +206,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unused_objects_are_told),
         cmocka_unit_test(reasons_are_said_once),
+        cmocka_unit_test(answers_are_those_of_one),
         cmocka_unit_test(refusals_name_objects),
         cmocka_unit_test(patterns_choose),
         cmocka_unit_test(suggestions_are_listed),
