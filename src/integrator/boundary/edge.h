@@ -6,6 +6,11 @@
 #include "integrator/boundary/mark.h"
 #include "integrator/path_move.h"
 
+KFN Hit hit_select(Mask m, const Hit *a, const Hit *b) {
+    return (Hit){i_select(m, a->shape, b->shape), i_select(m, a->prim, b->prim), f_select(m, a->u, b->u),
+                 f_select(m, a->v, b->v), v3_select(m, a->p, b->p), i_select(m, a->instance, b->instance)};
+}
+
 // A point x(t) of an edge, attached to its surface.
 typedef struct EdgePoint {
     Hit hit;

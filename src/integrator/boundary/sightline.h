@@ -92,11 +92,6 @@ static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens,
     }
 }
 
-KFN Hit hit_select(Mask m, const Hit *a, const Hit *b) {
-    return (Hit){i_select(m, a->shape, b->shape), i_select(m, a->prim, b->prim), f_select(m, a->u, b->u),
-                 f_select(m, a->v, b->v), v3_select(m, a->p, b->p), i_select(m, a->instance, b->instance)};
-}
-
 // Takes the lanes of m of another line.
 static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
     for (int32_t i = 0; i < from->last; i++) {
