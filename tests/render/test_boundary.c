@@ -100,7 +100,7 @@ static const Motion motions[] = {
     {"seen_glow.xml", "ball.to_world", GROW, {0.7f, 0.3f, 0.9f}, 0.02, 1},
     {"seen_glow.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
     {"seen_glow.xml", "coin.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
-    {"seen_glow.xml", "mirror.to_world", SHIFT, {0.3f, 0.2f, 1}, 0.02, 1},
+    {"seen_glow.xml", "mirror.to_world", TURN, {1, 0.7f, 0.2f}, 1, 2},
     {"seen_glow.xml", "camera.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
     {"seen_room.xml", "crate.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
     {"seen_room.xml", "mirror.to_world", TURN, {1, 0.3f, 0.2f}, 1, 2},
