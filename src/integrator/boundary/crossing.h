@@ -13,12 +13,16 @@ typedef struct Crossing {
     Mask m, meeting;
 } Crossing;
 
-// The edge of the surface of `own` that a ray passes outside of it.
+// The edge of the surface of `own` that is next to another ray. inside: how far that passes on the surface's side of it, as a
+// share of the surface's size; less than 0, it misses the surface.
 typedef struct Miss {
     Hit edge;
     Vec3 n;
-    Mask m;
+    Float inside;
 } Miss;
+
+// Where rounding could have brought a ray from one side of an edge to the other.
+#define MISS_NEAR 1e-4f
 
 static void triangle_load(const SceneView *scene, int32_t flags, const Hit *hit, Vec3 p[3]) {
     Corners c = mesh_corners(scene, hit->shape, hit->prim);
@@ -40,8 +44,8 @@ static Miss miss_triangle(const SceneView *scene, int32_t flags, const Hit *own,
     Mask first = m_lt(there[0], there[1]) & m_lt(there[0], there[2]), second = ~first & m_lt(there[1], there[2]);
     Float b = f_select(first, there[0], f_select(second, there[1], there[2]));
     Float a = f_max(f_select(first, here[0], f_select(second, here[1], here[2])), f_set(0));
-    Float part = a * f_safe_rcp(a - b);
-    Miss out = {.edge = *own, .m = m_lt(b, f_set(0)) & m_gt(s, f_set(0))};
+    Float part = f_select(m_lt(b, f_set(0)), a * f_safe_rcp(a - b), f_set(1));
+    Miss out = {.edge = *own, .inside = f_select(m_gt(s, f_set(0)), b, f_set(-1))};
     out.edge.u = own->u + part * (u - own->u);
     out.edge.v = own->v + part * (v - own->v);
     out.edge.p = v3_madd(v3_madd(p[0], out.edge.u, e1), out.edge.v, e2);
@@ -56,7 +60,7 @@ static Miss miss_sphere(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) 
     Float radius = table_at(scene, at + 3);
     q = v3_madd(q, -v3_dot(q, d), d);
     Float distance = v3_length(q);
-    Miss out = {.edge = *own, .m = m_gt(distance, radius)};
+    Miss out = {.edge = *own, .inside = 1.0f - distance * f_safe_rcp(radius)};
     out.n = v3_scale(q, f_safe_rcp(distance));
     out.edge.p = v3_madd(centre, radius, out.n);
     return out;
@@ -67,20 +71,20 @@ KFN Vec3 pose_direction_to_local(const SceneView *scene, Int at, Vec3 d) {
 }
 
 // The unit circle at a height, next to a point.
-static void miss_rim(const SceneView *scene, Int at, Vec3 q, Float height, Vec3 d, Miss *out, Mask m) {
+static void miss_rim(const SceneView *scene, Int at, Vec3 q, Float height, Vec3 d, Float inside, Miss *out, Mask m) {
     Float r = f_safe_rcp(f_sqrt(q.x * q.x + q.y * q.y)), x = q.x * r, y = q.y * r;
     Vec3 tangent = v3_madd(v3_scale(pose_column(scene, at, 0), -y), x, pose_column(scene, at, 1));
     out->edge.p = v3_select(m, pose_to_world(scene, at, v3(x, y, height)), out->edge.p);
     out->n = v3_select(m, v3_normalize(v3_cross(d, tangent)), out->n);
-    out->m = out->m | m;
+    out->inside = f_select(m, inside, out->inside);
 }
 
 static Miss miss_disk(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
     Int at = SHAPE_FIELD(scene, own->shape, table);
     Vec3 lo = pose_to_local(scene, at, o), ld = pose_direction_to_local(scene, at, d);
     Vec3 q = v3_madd(lo, -lo.z * f_safe_rcp(ld.z), ld);
-    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
-    miss_rim(scene, at, q, f_set(0), d, &out, m_gt(q.x * q.x + q.y * q.y, f_set(1)));
+    Miss out = {.edge = *own, .n = v3_zero()};
+    miss_rim(scene, at, q, f_set(0), d, 1.0f - f_sqrt(q.x * q.x + q.y * q.y), &out, m_set(true));
     return out;
 }
 
@@ -92,26 +96,28 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
     Float middle = -b * rcp, here = v3_dot(v3_sub(own->p, o), d);
     Mask behind = m_gt(here, middle);
     Vec3 q = v3_madd(lo, middle + f_select(behind, width, -width), ld);
-    Mask aside = m_lt(root, f_set(0)), low = ~aside & m_lt(q.z, f_set(0)), high = ~aside & m_gt(q.z, f_set(1));
-    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
-    miss_rim(scene, at, q, f_set(0), d, &out, low);
-    miss_rim(scene, at, q, f_set(1), d, &out, high);
-    miss_rim(scene, at, q, q.z, d, &out, aside);
+    // The ray's distance from the axis, and its place along it.
+    Float across = 1.0f - f_sqrt(f_max(1.0f - root * rcp, f_set(0))), along = f_min(q.z, 1.0f - q.z);
+    Mask aside = m_lt(across, f_set(0)) | m_lt(across, along), low = m_lt(q.z, f_set((real)0.5));
+    Miss out = {.edge = *own, .n = v3_zero()};
+    miss_rim(scene, at, q, f_set(0), d, along, &out, ~aside & low);
+    miss_rim(scene, at, q, f_set(1), d, along, &out, ~aside & ~low);
+    miss_rim(scene, at, q, q.z, d, across, &out, aside);
     out.n = v3_select(aside, v3_normalize(v3_cross(d, pose_column(scene, at, 2))), out.n);
     return out;
 }
 
-// Lanes of m whose ray passes outside of the surface's part that another ray meets at `own`; unit normals there.
+// The edges of the surfaces that other rays meet at `own`, next to rays; and unit normals there.
 static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m, Vec3 *normal) {
     const SceneView *scene = t->scene;
-    Miss out = {.edge = *own, .n = v3_zero(), .m = m_set(false)};
+    Miss out = {.edge = *own, .n = v3_zero(), .inside = f_set(1)};
     *normal = v3_zero();
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t first = i_lane(own->shape, m_first(left)), id = scene->shapes[first].group;
         const Group *group = scene->groups + id;
         mine = left & mi_eq(SHAPE_FIELD(scene, i_max(own->shape, i_set(0)), group), i_set(id));
         Hit h = hit_of_lanes(own, first, mine);
-        Miss one = {.edge = h, .n = v3_zero(), .m = m_set(false)};
+        Miss one = {.edge = h, .n = v3_zero(), .inside = f_set(1)};
         switch (group->shape_kind) {
         case SHAPE_MESH:
             one = miss_triangle(scene, group->shape_flags, &h, o, d);
@@ -132,7 +138,7 @@ static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3
         *normal = v3_select(mine, ng, *normal);
         out.edge = hit_select(mine, &one.edge, &out.edge);
         out.n = v3_select(mine, one.n, out.n);
-        out.m = out.m | (mine & one.m);
+        out.inside = f_select(mine, one.inside, out.inside);
     }
     return out;
 }
@@ -164,25 +170,31 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const Sightline lines[2]
     for (int k = 0; k < 2; k++) {
         ends_load(lines + k, level, k, &e);
     }
+    Mask met[2], edge[2];
     for (int k = 0; k < 2; k++) {
-        Mask met = m & mi_lt(i_set(-1), e.hit[k].shape);
-        miss[k] = surfaces_miss(t, e.hit + k, e.o[1 - k], e.d[1 - k], met, e.normal + k);
-        miss[k].m = miss[k].m & met;
+        met[k] = m & mi_lt(i_set(-1), e.hit[k].shape);
+        miss[k] = surfaces_miss(t, e.hit + k, e.o[1 - k], e.d[1 - k], met[k], e.normal + k);
+        edge[k] = met[k] & m_lt(miss[k].inside, f_set(0));
+    }
+    // Rounding may leave the other ray inside, too: there it is the edge of what is nearer, or of what ends next to it.
+    Mask open = m & ~edge[0] & ~edge[1];
+    for (int k = 0; k < 2; k++) {
+        Mask nearer = m_lt(e.reach[k], e.reach[1 - k] * 0.999f), close = m_lt(miss[k].inside, f_set(MISS_NEAR));
+        edge[k] = edge[k] | (open & met[k] & (~met[1 - k] | nearer | close));
     }
     // Edges of what is nearer hide what lies behind.
-    Mask second = miss[1].m & (~miss[0].m | m_lt(e.reach[1], e.reach[0]));
+    Mask second = edge[1] & (~edge[0] | m_lt(e.reach[1], e.reach[0]));
     Crossing c = {.hit = hit_select(second, &miss[1].edge, &miss[0].edge), .other = e.hit[1]};
     c.n = v3_select(second, miss[1].n, miss[0].n);
     c.p = c.hit.p;
-    Mask edge = m & (miss[0].m | miss[1].m);
-    c.meeting = m & ~edge & mi_lt(i_set(-1), e.hit[0].shape) & mi_lt(i_set(-1), e.hit[1].shape);
+    c.meeting = met[0] & met[1] & ~edge[0] & ~edge[1];
     Float slant[2] = {v3_dot(e.normal[0], e.d[0]), v3_dot(e.normal[1], e.d[1])};
     c.n = v3_select(c.meeting, v3_scale(e.normal[0], f_safe_rcp(slant[0])), c.n);
     c.n_other = v3_select(c.meeting, v3_scale(e.normal[1], f_safe_rcp(slant[1])), v3_zero());
     c.hit = hit_select(c.meeting, e.hit, &c.hit);
     c.p = v3_select(c.meeting, e.hit[0].p, c.p);
     c.across = v3_sub(c.n, c.n_other);
-    c.m = edge | c.meeting;
+    c.m = edge[0] | edge[1] | c.meeting;
     return c;
 }
 

@@ -249,15 +249,22 @@ KFN Strip strip_load(const Segments *q, int32_t k) {
     return s;
 }
 
+// The strip, with its ends so far apart that paths whose directions are rounded in another order pass the curve there, too.
+static Strip strip_widen(const Strips *all, const Strip *s) {
+    Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]), dx = s->x[1] - s->x[0], dy = s->y[1] - s->y[0];
+    Float r = f_safe_rcp(f_sqrt(dx * dx + dy * dy)), length = f_set(4 * all->end);
+    return strip_around(x, y, dx * r, dy * r, length, 0.5f * length);
+}
+
 // Starts the two paths of every strip: slots k and half + k.
-static void curves_start(Tracer *t, const Segments *q, int64_t first, int32_t half) {
+static void curves_start(Tracer *t, const Strips *all, const Segments *q, int64_t first, int32_t half) {
     for (int32_t k = 0; k < half; k++) {
         int64_t number = first + q->number[k < q->count ? k : 0];
         slot_number(t, k, number);
         slot_number(t, half + k, number);
     }
     for (int32_t k = 0; k < half; k += LANES) {
-        Strip s = strip_load(q, k);
+        Strip near = strip_load(q, k), s = strip_widen(all, &near);
         Int slot = i_iota() + k;
         SampleKey own = slot_key(t, slot);
         f_store(t->ws.film_x + k, 0.5f * (s.x[0] + s.x[1]));
