@@ -382,7 +382,9 @@ static void test_truncated(void **state) {
         size_t needed = sort == 2 ? file.count - 2 : file.count; // all but the end mark of a JPEG
         for (size_t count = 0; count < needed; count++) {
             char words[64] = ""; // with its first bytes it is an EXR file
-            snprintf(words, sizeof words, sort == 0 && count >= 16 ? "cut off after %zu bytes: " : "", count);
+            if (sort == 0 && count >= 16) {
+                snprintf(words, sizeof words, "cut off after %zu bytes: ", count);
+            }
             expect_failure(ctx, "short.picture", &file, count, words);
         }
     }
