@@ -52,6 +52,9 @@ bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 
+// Of TURNED_CONFIG the second switch.
+bool rey_bsdf_cuts(const BsdfNode *node) { return rey_bsdf_turns(node->kind) && !node->config[1]; }
+
 int32_t rey_bsdf_table_size(int kind) {
     return kind == BSDF_ROUGHPLASTIC ? COAT_TABLE_SIZE : 0;
 }

@@ -31,6 +31,8 @@ bool rey_bsdf_opens(int kind);
 bool rey_bsdf_passes(int kind);
 // Whether a kind turns the shading normal of the function inside it.
 bool rey_bsdf_turns(int kind);
+// Whether it drops light abruptly at the plane of the normal that it turns: without use_shadowing_function.
+bool rey_bsdf_cuts(const BsdfNode *node);
 
 // Numbers in `tables` that a function of this kind derives, 0 for most.
 int32_t rey_bsdf_table_size(int kind);

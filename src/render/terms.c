@@ -4,6 +4,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "render/boundary.h"
+#include "render/cuts.h"
 #include "render/motion.h"
 #include "scene/sink.h"
 
@@ -131,6 +132,16 @@ static bool surfaces_read_volumes(const SceneView *view) {
     return false;
 }
 
+static rey_result check_cuts(rey_scene *scene, const Param *p) {
+    char object[OBJECT_NAME];
+    const char *gap = rey_cuts_gap(scene, p, object);
+    return gap ? rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                          "the gradient of %s needs a part of the term 'indirect' that does not exist yet: normal and bump maps "
+                          "whose use_shadowing_function is off ('%s') %s. --terms interior gives the part that does", p->name,
+                          object, gap)
+               : REY_OK;
+}
+
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
     if (scene->view.drops) {
@@ -161,6 +172,10 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
                             "move look them up elsewhere", info.name);
+        }
+        result = def->terms ? REY_OK : check_cuts(scene, p);
+        if (result != REY_OK) {
+            return result;
         }
         int known = terms_known(scene, def, chains, p);
         int missing = info.terms & ~known;

@@ -47,10 +47,10 @@ static void stage_load(const Stage *s, const char *origin, const char *normal, c
     write_text(s, "plane.ply", ply);
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>"
-             "<sensor type='perspective'><float name='fov' value='10'/><transform name='to_world'>"
+             "<sensor type='perspective' id='camera'><float name='fov' value='10'/><transform name='to_world'>"
              "<lookat origin='%s' target='0,0,0' up='0,1,0.1'/></transform><film type='hdrfilm'>"
              "<integer name='width' value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film></sensor>"
-             "<emitter type='constant'/><emitter type='point'><point name='position' x='0.3' y='0.2' z='4'/></emitter>"
+             "<emitter type='constant'/><emitter type='point' id='bulb'><point name='position' x='0.3' y='0.2' z='4'/></emitter>"
              "<shape type='ply' id='plane'><string name='filename' value='plane.ply'/>%s</shape></scene>",
              origin, SIZE, SIZE, bsdf);
     write_text(s, "scene.xml", xml);
@@ -197,6 +197,43 @@ static void test_other_parameters(void **state) {
     rey_scene_destroy(scene);
 }
 
+// Maps without shadowing cut light off at the plane of the surface: what is not known of that is refused by name.
+static void test_cut_off(void **state) {
+    const Stage *s = *state;
+    static const char cut[] = "<bsdf type='normalmap' id='map'><boolean name='use_shadowing_function' value='%s'/>"
+                              "<rgb name='normalmap' value='0.6,0.5,1'/>%s</bsdf>";
+    static const char paint[] = "<bsdf type='diffuse' id='paint'/>";
+    static const struct {
+        const char *outer, *inner, *param, *why; // inner: of a map within the first one, or null
+    } cases[] = {{"false", NULL, "plane.positions", "along a curve"}, {"false", NULL, "plane.normals", "along a curve"},
+                 {"false", NULL, "camera.to_world", "along a curve"}, {"false", NULL, "bulb.position", "along a curve"},
+                 {"true", "false", "map.normalmap.value", "another map's"}, {"true", "false", "plane.positions", "another map's"},
+                 {"true", "true", "bulb.position", NULL}, {"true", NULL, "plane.positions", NULL},
+                 {"false", NULL, "map.normalmap.value", NULL}, {"false", "true", "map.normalmap.value", NULL},
+                 {"false", NULL, "paint.reflectance.value", NULL}};
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        rey_scene *scene;
+        char inner[512], bsdf[1024];
+        static float image[NUMBERS], tangent[64] = {1};
+        snprintf(inner, sizeof inner, cut, cases[i].inner ? cases[i].inner : "", paint);
+        char *id = strstr(inner, "id='map'");
+        memcpy(id, "id='mop'", 8);
+        snprintf(bsdf, sizeof bsdf, cut, cases[i].outer, cases[i].inner ? inner : paint);
+        stage_load(s, "0,0,5", "0.1 0 1", bsdf, false, &scene);
+        rey_render_def def = def_make(0);
+        int param = rey_param_find(scene, cases[i].param);
+        assert_true(param >= 0);
+        rey_result result = rey_jvp(scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL);
+        if (result != (cases[i].why ? REY_ERROR_INCOMPLETE : REY_OK)) {
+            fail_msg("case %d: %s: %s", i, rey_result_text(result), rey_error(s->ctx));
+        }
+        assert_true(!cases[i].why || strstr(rey_error(s->ctx), cases[i].why));
+        def.terms = REY_TERM_INTERIOR;
+        assert_int_equal(rey_jvp(scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_OK);
+        rey_scene_destroy(scene);
+    }
+}
+
 // Along the recorded paths light scales with the reflectance exactly, and roughness gives what fresh paths give.
 static void test_replay(void **state) {
     const Stage *s = *state;
@@ -234,7 +271,7 @@ static void test_replay(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_normals_of_lights),
-                                       cmocka_unit_test(test_other_parameters),
+                                       cmocka_unit_test(test_other_parameters), cmocka_unit_test(test_cut_off),
                                        cmocka_unit_test(test_replay)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

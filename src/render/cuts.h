@@ -1,0 +1,12 @@
+// cuts.h: normal and bump maps without a shadowing function let light in abruptly at the plane of the surface's own shading
+// normal, although the map's normal still faces the light.
+#pragma once
+
+#include "render/blame.h"
+#include "scene/scene.h"
+
+// Whether a scattering function does, itself or inside.
+bool rey_cuts_within(const SceneView *view, int32_t bsdf);
+
+// Why a parameter's derivative lacks what moves along such planes; null where it does not. object: what it is about.
+const char *rey_cuts_gap(const rey_scene *scene, const Param *p, char object[OBJECT_NAME]);
