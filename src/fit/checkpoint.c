@@ -1,18 +1,18 @@
-// checkpoint.c: little-endian binary: magic, counts, resolved job, history, start and value as floats, variables and
-// moments, averages and the state of L-BFGS as doubles, and a 64-bit FNV-1a hash of everything before it.
+// checkpoint.c: little-endian binary: magic, counts, resolved job, hashes of what it read, history, start and value as floats,
+// variables and moments, averages and the state of L-BFGS as doubles, and a 64-bit FNV-1a hash of everything before it.
 #include "fit/checkpoint.h"
 
-#include "fit/job.h"
+#include "fit/inputs.h"
 #include "io/file.h"
 #include "io/number.h"
 
 #include <string.h>
 
-static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '3'};
+static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '4'};
 
 typedef struct CheckpointHeader {
     char magic[8];
-    uint64_t job_bytes, numbers, extra, rows, width; // extra: numbers of L-BFGS
+    uint64_t job_bytes, input_bytes, numbers, extra, rows, width; // extra: numbers of L-BFGS
     uint64_t iteration, converged, meshed;
     uint64_t job_hash; // of the resolved job
     double seconds;
@@ -50,11 +50,12 @@ static void append(unsigned char *bytes, size_t *at, const void *data, size_t si
     *at += size;
 }
 
-rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknowns *u, const FitState *state) {
+rey_result rey_checkpoint_write(const char *path, FitOrigin origin, const Unknowns *u, const FitState *state) {
     Part parts[PART_COUNT];
     list_parts(u, parts);
-    size_t job_bytes = strlen(flat), history = state->history.count * sizeof(double);
-    size_t size = sizeof(CheckpointHeader) + job_bytes + history + sizeof(uint64_t);
+    size_t job_bytes = strlen(origin.flat), input_bytes = strlen(origin.inputs);
+    size_t history = state->history.count * sizeof(double);
+    size_t size = sizeof(CheckpointHeader) + job_bytes + input_bytes + history + sizeof(uint64_t);
     for (int i = 0; i < PART_COUNT; i++) {
         size += parts[i].bytes;
     }
@@ -63,6 +64,7 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
         return REY_ERROR_MEMORY;
     }
     CheckpointHeader header = {.job_bytes = job_bytes,
+                               .input_bytes = input_bytes,
                                .numbers = (uint64_t)u->count,
                                .extra = (uint64_t)u->lbfgs_count,
                                .rows = state->history.count / (size_t)state->history_width,
@@ -70,12 +72,13 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
                                .iteration = (uint64_t)state->iteration,
                                .converged = state->converged,
                                .meshed = (uint64_t)state->meshed,
-                               .job_hash = hash_bytes(flat, job_bytes),
+                               .job_hash = hash_bytes(origin.flat, job_bytes),
                                .seconds = state->seconds};
     memcpy(header.magic, MAGIC, sizeof MAGIC);
     size_t at = 0;
     append(bytes, &at, &header, sizeof header);
-    append(bytes, &at, flat, job_bytes);
+    append(bytes, &at, origin.flat, job_bytes);
+    append(bytes, &at, origin.inputs, input_bytes);
     append(bytes, &at, state->history.data, history);
     for (int i = 0; i < PART_COUNT; i++) {
         append(bytes, &at, parts[i].data, parts[i].bytes);
@@ -90,12 +93,12 @@ rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknow
 // Whether the sizes that the header claims make up the file's size exactly.
 static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     const uint64_t most = (uint64_t)1 << 40;
-    if (h->job_bytes > most || h->numbers > most || h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
+    if (h->job_bytes > most || h->input_bytes > most || h->numbers > most || h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
         return false;
     }
     uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);
     uint64_t expected =
-        sizeof *h + h->job_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
+        sizeof *h + h->job_bytes + h->input_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
         h->extra * sizeof(double) + sizeof(uint64_t);
     return expected == size;
 }
@@ -113,18 +116,18 @@ static const char *find_line(const char *text, const char *key) {
     return "absent";
 }
 
-// The text of the job that a checkpoint was written for, owned.
-static char *stored_job(rey_context *ctx, const CheckpointHeader *header, const unsigned char *bytes) {
-    char *text = rey_alloc(ctx, (size_t)header->job_bytes + 1);
+// A text of a checkpoint, owned.
+static char *stored_text(rey_context *ctx, const unsigned char *bytes, uint64_t size) {
+    char *text = rey_alloc(ctx, (size_t)size + 1);
     if (text) {
-        memcpy(text, bytes + sizeof *header, (size_t)header->job_bytes);
+        memcpy(text, bytes, (size_t)size);
     }
     return text;
 }
 
 static rey_result check_job(rey_context *ctx, const char *path, const CheckpointHeader *header, const unsigned char *bytes,
                             const char *flat) {
-    char *old = stored_job(ctx, header, bytes);
+    char *old = stored_text(ctx, bytes + sizeof *header, header->job_bytes);
     if (!old) {
         return REY_ERROR_MEMORY;
     }
@@ -142,6 +145,25 @@ static rey_result check_job(rey_context *ctx, const char *path, const Checkpoint
     return result;
 }
 
+static rey_result check_inputs(rey_context *ctx, const char *path, const CheckpointHeader *header, const unsigned char *bytes,
+                               const char *inputs) {
+    char *old = stored_text(ctx, bytes + sizeof *header + header->job_bytes, header->input_bytes), what[1024];
+    if (!old) {
+        return REY_ERROR_MEMORY;
+    }
+    bool other = rey_fit_inputs_differ(old, inputs, what, sizeof what);
+    rey_free(ctx, old);
+    return other ? rey_fail(ctx, REY_ERROR_PARAM, "%s is from other inputs: %s since; put back what it was, or start "
+                            "anew with --overwrite or another -o", path, what)
+                 : REY_OK;
+}
+
+static rey_result check_origin(rey_context *ctx, const char *path, const CheckpointHeader *header, const unsigned char *bytes,
+                               FitOrigin origin) {
+    rey_result result = check_job(ctx, path, header, bytes, origin.flat);
+    return result || !origin.inputs ? result : check_inputs(ctx, path, header, bytes, origin.inputs);
+}
+
 // The header of an undamaged checkpoint.
 static rey_result read_header(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
                               CheckpointHeader *header) {
@@ -157,12 +179,12 @@ static rey_result read_header(rey_context *ctx, const char *path, const unsigned
     return REY_OK;
 }
 
-static rey_result decode(const char *path, const char *flat, const unsigned char *bytes, size_t size, Unknowns *u,
+static rey_result decode(const char *path, FitOrigin origin, const unsigned char *bytes, size_t size, Unknowns *u,
                          FitState *state) {
     CheckpointHeader header;
     rey_result result = read_header(u->ctx, path, bytes, size, &header);
     if (!result) {
-        result = check_job(u->ctx, path, &header, bytes, flat);
+        result = check_origin(u->ctx, path, &header, bytes, origin);
     }
     if (result) {
         return result;
@@ -173,7 +195,7 @@ static rey_result decode(const char *path, const char *flat, const unsigned char
         return rey_fail(u->ctx, REY_ERROR_FORMAT, "%s: made for %llu numbers, but the scene now has %lld", path,
                         (unsigned long long)header.numbers, (long long)u->count);
     }
-    size_t at = sizeof header + (size_t)header.job_bytes, cells = (size_t)(header.rows * header.width);
+    size_t at = sizeof header + (size_t)(header.job_bytes + header.input_bytes), cells = (size_t)(header.rows * header.width);
     state->history.count = 0;
     double *history = rey_array_push(u->ctx, &state->history, sizeof *history, cells ? cells : 1);
     if (!history) {
@@ -195,18 +217,18 @@ static rey_result decode(const char *path, const char *flat, const unsigned char
     return REY_OK;
 }
 
-rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state) {
+rey_result rey_checkpoint_read(const char *path, FitOrigin origin, Unknowns *u, FitState *state) {
     unsigned char *bytes;
     size_t size;
     rey_result result = rey_file_read(u->ctx, path, &bytes, &size);
     if (!result) {
-        result = decode(path, flat, bytes, size, u, state);
+        result = decode(path, origin, bytes, size, u, state);
     }
     rey_free(u->ctx, bytes);
     return result;
 }
 
-rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *flat, FitState *state) {
+rey_result rey_checkpoint_look(rey_context *ctx, const char *path, FitOrigin origin, FitState *state) {
     unsigned char *bytes;
     size_t size;
     CheckpointHeader header = {.iteration = 0};
@@ -215,7 +237,7 @@ rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *f
         result = read_header(ctx, path, bytes, size, &header);
     }
     if (!result) {
-        result = check_job(ctx, path, &header, bytes, flat);
+        result = check_origin(ctx, path, &header, bytes, origin);
     }
     rey_free(ctx, bytes);
     *state = (FitState){.iteration = (int)header.iteration, .seconds = header.seconds, .converged = header.converged,
@@ -232,7 +254,7 @@ rey_result rey_checkpoint_number(rey_context *ctx, const char *path, const char 
     if (!result) {
         result = read_header(ctx, path, bytes, size, &header);
     }
-    char *text = result ? NULL : stored_job(ctx, &header, bytes);
+    char *text = result ? NULL : stored_text(ctx, bytes + sizeof header, header.job_bytes);
     if (text) {
         const char *end;
         double value;

@@ -17,12 +17,18 @@ typedef struct FitState {
     bool converged; // the stop rule has ended the fit
 } FitState;
 
-// Writes so that the file is complete or the former one. flat: the resolved job's flat text.
-rey_result rey_checkpoint_write(const char *path, const char *flat, const Unknowns *u, const FitState *state);
+// What a checkpoint was written for.
+typedef struct FitOrigin {
+    const char *flat;   // the resolved job's flat text
+    const char *inputs; // of what it read (inputs.h); null where that is not known yet
+} FitOrigin;
 
-// Reads one that was written for the same job; names the first key that differs otherwise.
-rey_result rey_checkpoint_read(const char *path, const char *flat, Unknowns *u, FitState *state);
+// Writes so that the file is complete or the former one.
+rey_result rey_checkpoint_write(const char *path, FitOrigin origin, const Unknowns *u, const FitState *state);
+
+// Reads one that was written for the same job and inputs; names what differs otherwise.
+rey_result rey_checkpoint_read(const char *path, FitOrigin origin, Unknowns *u, FitState *state);
 // The same without the numbers: how far it came.
+rey_result rey_checkpoint_look(rey_context *ctx, const char *path, FitOrigin origin, FitState *state);
 // The value of a key of the job that it was written for, which is read as a number; `fallback` where there is none.
 rey_result rey_checkpoint_number(rey_context *ctx, const char *path, const char *key, double fallback, double *out);
-rey_result rey_checkpoint_look(rey_context *ctx, const char *path, const char *flat, FitState *state);

@@ -2,6 +2,7 @@
 #include "fit/fit.h"
 
 #include "base/parallel.h"
+#include "fit/inputs.h"
 #include "fit/report.h"
 #include "io/file.h"
 
@@ -58,7 +59,7 @@ static rey_result look_at_checkpoint(Fit *fit) {
     if (!result && access(path, F_OK) == 0) {
         result = keep_schedule(fit, path);
         if (!result) {
-            result = rey_checkpoint_look(fit->ctx, path, fit->flat, &state);
+            result = rey_checkpoint_look(fit->ctx, path, (FitOrigin){fit->flat, NULL}, &state);
         }
     }
     fit->state.meshed = state.meshed;
@@ -71,7 +72,7 @@ static rey_result resume(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin"), *job = rey_fit_output_path(fit, "job.resolved.yaml");
     rey_result result = path && job ? REY_OK : REY_ERROR_MEMORY;
     if (!result && (access(path, F_OK) == 0 || access(job, F_OK) != 0)) {
-        result = rey_checkpoint_read(path, fit->flat, &fit->unknowns, &fit->state);
+        result = rey_checkpoint_read(path, (FitOrigin){fit->flat, fit->inputs}, &fit->unknowns, &fit->state);
     }
     rey_free(fit->ctx, path);
     rey_free(fit->ctx, job);
@@ -112,6 +113,22 @@ static rey_result open_job(Fit *fit) {
     return result;
 }
 
+// A fit that goes on in the scene of a level began in the job's.
+static rey_result hash_inputs(Fit *fit) {
+    rey_scene *scene = NULL;
+    Unknowns unknowns = {0};
+    if (!fit->state.meshed) {
+        return rey_fit_inputs(fit, fit->scene, &fit->inputs);
+    }
+    rey_result result = rey_fit_open_start(fit, &scene, &unknowns);
+    if (!result) {
+        result = rey_fit_inputs(fit, scene, &fit->inputs);
+    }
+    rey_unknowns_free(&unknowns);
+    rey_scene_destroy(scene);
+    return result;
+}
+
 static rey_result open_fit(Fit *fit) {
     rey_result result = open_job(fit);
     if (!result) {
@@ -119,6 +136,9 @@ static rey_result open_fit(Fit *fit) {
     }
     if (!result) {
         result = rey_unknowns_create(&fit->job, fit->scene, fit->state.meshed != 0, &fit->unknowns);
+    }
+    if (!result) {
+        result = hash_inputs(fit);
     }
     if (!result) {
         result = allocate(fit);
@@ -145,7 +165,7 @@ static rey_result open_fit(Fit *fit) {
 }
 
 static void close_fit(Fit *fit) {
-    void *blocks[] = {fit->a, fit->b, fit->adjoint_a, fit->adjoint_b, fit->gradient, fit->flat, fit->output};
+    void *blocks[] = {fit->a, fit->b, fit->adjoint_a, fit->adjoint_b, fit->gradient, fit->flat, fit->inputs, fit->output};
     rey_metrics_close(fit);
     rey_fit_folder_close(fit);
     rey_unknowns_free(&fit->unknowns);

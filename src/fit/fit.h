@@ -82,7 +82,8 @@ typedef struct Fit {
     rey_context *ctx;
     const FitDef *def;
     Job job;
-    char *flat; // the resolved job
+    char *flat;   // the resolved job
+    char *inputs; // hashes of what it read (inputs.h)
     rey_scene *scene;
     Unknowns unknowns;
     FitView *views;

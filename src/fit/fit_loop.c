@@ -257,7 +257,7 @@ static bool has_converged(const Fit *fit) {
 static rey_result save(Fit *fit) {
     fit->state.seconds = rey_seconds() - fit->start_seconds;
     char *path = rey_fit_output_path(fit, "checkpoint.bin");
-    rey_result result = path ? rey_checkpoint_write(path, fit->flat, &fit->unknowns, &fit->state) : REY_ERROR_MEMORY;
+    rey_result result = path ? rey_checkpoint_write(path, (FitOrigin){fit->flat, fit->inputs}, &fit->unknowns, &fit->state) : REY_ERROR_MEMORY;
     rey_free(fit->ctx, path);
     return result;
 }

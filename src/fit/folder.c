@@ -1,8 +1,7 @@
 // folder.c: the folder that a fit writes into: made, locked, and never taken from an earlier fit unasked.
-#include "fit/fit.h"
+#include "fit/former.h"
 #include "io/file.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -53,31 +52,17 @@ static rey_result check_outputs(Fit *fit) {
     return result;
 }
 
-// Removes the files of a folder whose names start so.
-static void remove_files(const char *path, const char *start) {
-    DIR *folder = opendir(path);
-    const struct dirent *entry;
-    while (folder && (entry = readdir(folder))) {
-        if (!strncmp(entry->d_name, start, strlen(start))) {
-            unlinkat(dirfd(folder), entry->d_name, 0);
-        }
-    }
-    if (folder) {
-        closedir(folder);
-    }
-}
-
 // What the folder holds is not replaced unasked; the message says what it is.
 static rey_result refuse_former(Fit *fit, const char *path) {
     FitState state;
-    rey_result result = rey_checkpoint_look(fit->ctx, path, fit->flat, &state);
+    rey_result result = rey_checkpoint_look(fit->ctx, path, (FitOrigin){fit->flat, fit->inputs}, &state);
     if (result == REY_ERROR_MEMORY) {
         return result;
     }
     if (result) {
         char why[1024];
         snprintf(why, sizeof why, "%s", rey_error(fit->ctx));
-        return rey_fail(fit->ctx, result, "%s; --overwrite replaces it", why);
+        return rey_fail(fit->ctx, result, strstr(why, "--overwrite") ? "%s" : "%s; --overwrite replaces it", why);
     }
     if (state.iteration == fit->job.iterations || state.converged) {
         return rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds this fit, finished; --overwrite starts again, -o writes "
@@ -89,19 +74,13 @@ static rey_result refuse_former(Fit *fit, const char *path) {
 }
 
 static rey_result take_over(Fit *fit) {
-    char *path = rey_fit_output_path(fit, "checkpoint.bin"), *frames = rey_fit_output_path(fit, "frames");
-    rey_result result = path && frames ? REY_OK : REY_ERROR_MEMORY;
+    char *path = rey_fit_output_path(fit, "checkpoint.bin");
+    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
         result = fit->def->overwrite ? REY_OK : refuse_former(fit, path);
     }
-    if (!result) {
-        remove_files(fit->output, "events.out.tfevents."); // or this fit would go on in them
-        remove_files(frames, "view");
-        unlink(path); // --resume must not find the former fit's
-    }
     rey_free(fit->ctx, path);
-    rey_free(fit->ctx, frames);
-    return result;
+    return !result && rey_former_exists(fit) ? rey_former_remove(fit) : result;
 }
 
 rey_result rey_fit_folder_open(Fit *fit) {
@@ -109,10 +88,13 @@ rey_result rey_fit_folder_open(Fit *fit) {
     if (!result) {
         result = lock_folder(fit);
     }
-    if (!result && !fit->def->resume) {
-        result = take_over(fit);
+    if (!result) {
+        result = rey_former_refuse_inputs(fit);
     }
-    return result ? result : check_outputs(fit);
+    if (!result) {
+        result = check_outputs(fit);
+    }
+    return result || fit->def->resume ? result : take_over(fit);
 }
 
 void rey_fit_folder_close(Fit *fit) {
