@@ -124,10 +124,13 @@ static void json_values(Json *json, const char *key, const FitRow *row, const fl
 
 static void print_json(const FitResult *result) {
     Json json = json_begin(stdout);
+    char words[64];
     json_object(&json, NULL);
     json_integer(&json, "iterations", result->iterations);
     json_bool(&json, "converged", result->converged);
     json_number(&json, "loss", result->loss);
+    rey_fit_loss_words(result, words, sizeof words);
+    json_string(&json, "loss_is", result->iterations ? words : NULL);
     json_number(&json, "seconds", result->seconds);
     json_number(&json, "seconds_total", cli_seconds_total());
     json_number(&json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
@@ -174,12 +177,14 @@ static void print_json(const FitResult *result) {
 }
 
 static void print_words(const FitResult *result) {
+    char words[64];
     print_table(result);
     printf("\n%lld number%s, %d iteration%s%s, %.1f s (%.1f s in all)", (long long)result->numbers, PLURAL(result->numbers),
            result->iterations, PLURAL(result->iterations), result->converged ? " (converged)" : "", result->seconds,
            cli_seconds_total());
     if (result->iterations) {
-        printf(", loss %.4g\n", result->loss);
+        rey_fit_loss_words(result, words, sizeof words);
+        printf(", loss %.4g (%s)\n", result->loss, words);
     } else {
         printf(", no loss: nothing was rendered\n");
     }

@@ -55,7 +55,10 @@ static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name,
     bool array = size > 4 && strcasecmp(path + size - 4, ".npy") == 0;
     result = array ? cli_npy_read_param(ctx, path, &info, values) : read_picture(ctx, path, &info, values);
     if (result == REY_OK) {
+        char why[1024];
         result = rey_param_set(scene, param, values, info.count);
+        snprintf(why, sizeof why, "%s", rey_error(ctx));
+        result = result ? rey_fail(ctx, result, "%s: %s", path, why) : REY_OK;
     }
     rey_free(ctx, values);
     return result;

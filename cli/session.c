@@ -185,8 +185,16 @@ static rey_result load_scene(Session *s) {
     for (int i = 0; i < rey_scene_ignored_count(s->scene); i++) {
         cli_note("ignored: %s", rey_scene_ignored(s->scene, i));
     }
-    bool renders = o->command == COMMAND_RENDER || o->command == COMMAND_GRAD || o->command == COMMAND_CHECK;
-    return renders ? rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height) : REY_OK;
+    rey_scene_info info;
+    rey_scene_get_info(s->scene, &info);
+    if (o->command != COMMAND_RENDER && o->command != COMMAND_GRAD && o->command != COMMAND_CHECK) {
+        return REY_OK;
+    }
+    if (!info.integrator[0]) {
+        return rey_fail(s->ctx, REY_ERROR_SCENE,
+                        "%s: the scene has no integrator, expected one such as <integrator type=\"path\"/>", o->files[0]);
+    }
+    return rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height);
 }
 
 int cli_session_open(const Options *options, const char *label, Session *session) {

@@ -76,7 +76,8 @@ rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, i
         return result;
     }
     if (scene->view.sensors_count == 0) {
-        return rey_fail(scene->ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "%s: the scene has no sensor to render with, expected one such as <sensor "
+                                                     "type=\"perspective\">", rey_mitsuba_file(scene));
     }
     if (sensor < 0 || sensor >= scene->view.sensors_count) {
         return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", sensor,

@@ -106,8 +106,8 @@ static void test_changed_inputs(void **state) {
     assert_int_equal(write_all(f) || write_scene(f, "scene.xml", 4, "0.31", "0.5"), 0);
     expect_refusal(f, RESUME, "inputs: parameter wall.bsdf.reflectance.value has changed since"); // where the unknown started
     assert_int_equal(write_all(f) || write_scene(f, "scene.xml", 4, "0.3", "0.4"), 0);
-    expect_refusal(f, RESUME, "inputs: parameter shape_2.bsdf.reflectance.value has changed since; put back what it was, or start anew with "
-                              "--overwrite or another -o");
+    expect_refusal(f, RESUME, "inputs: parameter shape_2.bsdf.reflectance.value has changed since; put back what it was, or start "
+                              "anew with --overwrite or another -o");
     assert_int_equal(write_all(f) || write_scene(f, "scene.xml", 5, "0.3", "0.5"), 0);
     expect_refusal(f, RESUME, "inputs: what is no parameter of the scene has changed since");
     assert_int_equal(write_all(f) || write_scene(f, "truth.xml", 4, "0.6", "0.5") || write_targets_of_truth(f, 1, SIZE, 16), 0);
@@ -136,15 +136,16 @@ static void test_any_lanes(void **state) {
 
 static void test_differences_are_named(void **state) {
     UNUSED(state);
-    static const char *const before = "0000000000000001 target a: b\n0000000000000002 parameter x\n0000000000000003 what is no parameter "
-                                      "of the scene\n";
+#define TARGET "0000000000000001 target a: b\n"
+#define PARAMETER "0000000000000002 parameter x\n"
+#define REST "what is no parameter of the scene\n"
+    static const char *const before = TARGET PARAMETER "0000000000000003 " REST;
     char what[256];
     assert_false(rey_fit_inputs_differ(before, before, what, sizeof what));
-    assert_true(rey_fit_inputs_differ(before, "0000000000000001 target a: b\n0000000000000004 what is no parameter of the scene\n", what,
-                                      sizeof what));
+    assert_true(rey_fit_inputs_differ(before, TARGET "0000000000000004 " REST, what, sizeof what));
     assert_string_equal(what, "parameter x is gone");
-    assert_true(rey_fit_inputs_differ(before, "0000000000000001 target a: b\n0000000000000005 parameter w\n0000000000000002 parameter "
-                                      "x\n0000000000000004 what is no parameter of the scene\n", what, sizeof what));
+    assert_true(rey_fit_inputs_differ(before, TARGET "0000000000000005 parameter w\n" PARAMETER "0000000000000004 " REST, what,
+                                      sizeof what));
     assert_string_equal(what, "parameter w has come");
 }
 
@@ -212,8 +213,9 @@ static void test_own_result_is_no_scene(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_changed_inputs),  cmocka_unit_test(test_any_lanes),      cmocka_unit_test(test_differences_are_named),
-        cmocka_unit_test(test_nothing_stale),   cmocka_unit_test(test_foreign_folder), cmocka_unit_test(test_own_result_is_no_scene),
+        cmocka_unit_test(test_changed_inputs),         cmocka_unit_test(test_any_lanes),
+        cmocka_unit_test(test_differences_are_named),  cmocka_unit_test(test_nothing_stale),
+        cmocka_unit_test(test_foreign_folder),         cmocka_unit_test(test_own_result_is_no_scene),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

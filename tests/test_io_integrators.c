@@ -71,6 +71,8 @@ static void test_samplers(void **state) {
         {"<sampler type='stratified'><integer name='strength' value='2'/></sampler>", REY_ERROR_SCENE, "strength"},
         {"<sampler type='orthogonal'><integer name='strength' value='0'/></sampler>", REY_ERROR_SCENE, "strength"},
         {"<sampler type='multijiter'/>", REY_ERROR_SCENE, "did you mean 'multijitter'?"},
+        {"<sampler type='mersennetwister'/>", REY_ERROR_SCENE,
+         "there is no sampler 'mersennetwister', expected independent, stratified, multijitter, orthogonal, ldsampler or sobol"},
         {"<sampler type='stratified'><integer name='sample_count' value='0'/></sampler>", REY_ERROR_SCENE, "sample_count"},
     };
     check_cases(true, cases, sizeof cases / sizeof *cases);
@@ -106,9 +108,41 @@ static void test_integrators(void **state) {
          REY_ERROR_UNSUPPORTED, "'aov' takes one nested integrator, found two"},
         {"<integrator type='moment'><integrator type='moment'><integrator type='path'/></integrator></integrator>",
          REY_ERROR_UNSUPPORTED, "'moment' inside 'moment'"},
+        {"<integrator type='prb_basic'><integer name='max_depth' value='4'/></integrator>", REY_OK, ""},
+        {"<integrator type='prb_projective'><integer name='sppi' value='0'/><string name='guiding' value='no'/></integrator>",
+         REY_OK, ":2: 'prb_projective' is read as 'path' with its max_depth: every integrator finds the terms of moving edges"},
+        {"<integrator type='direct_projective'><string name='project_seed' value='bsdf'/></integrator>", REY_OK,
+         "read as 'direct'"},
+        {"<integrator type='prb'><integer name='sppi' value='0'/></integrator>", REY_ERROR_SCENE, "sppi"},
+        {"<integrator type='pathtracing-of-light'/>", REY_ERROR_SCENE,
+         "there is no integrator 'pathtracing-of-light', expected path, direct, moment,"},
         {"<integrator type='volpaht'/>", REY_ERROR_SCENE, "did you mean 'volpath'?"},
     };
     check_cases(false, cases, sizeof cases / sizeof *cases);
+}
+
+// The depths of integrators that stand for others: those of the format.
+static void test_depths(void **state) {
+    (void)state;
+    static const struct {
+        const char *type;
+        int depth;
+    } cases[] = {{"path", -1}, {"direct", 2}, {"prb", 6}, {"prb_basic", 6}, {"prb_projective", 6}, {"prbvolpath", 6},
+                 {"direct_projective", 2}};
+    rey_context *ctx;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[128];
+        rey_scene *scene = NULL;
+        rey_scene_info info;
+        snprintf(text, sizeof text, "<integrator type='%s'/>", cases[i].type);
+        assert_int_equal(load(ctx, text, "", &scene), REY_OK);
+        rey_scene_get_info(scene, &info);
+        assert_int_equal(info.max_depth, cases[i].depth);
+        assert_string_equal(info.integrator, cases[i].type);
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
 }
 
 // Far more threads than processors: as many run as make sense.
@@ -131,6 +165,6 @@ static void test_threads(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_samplers), cmocka_unit_test(test_integrators),
-                                       cmocka_unit_test(test_threads)};
+                                       cmocka_unit_test(test_depths), cmocka_unit_test(test_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -93,7 +93,8 @@ rey_result rey_checkpoint_write(const char *path, FitOrigin origin, const Unknow
 // Whether the sizes that the header claims make up the file's size exactly.
 static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     const uint64_t most = (uint64_t)1 << 40;
-    if (h->job_bytes > most || h->input_bytes > most || h->numbers > most || h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
+    if (h->job_bytes > most || h->input_bytes > most || h->numbers > most ||
+        h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
         return false;
     }
     uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);

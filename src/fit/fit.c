@@ -3,6 +3,7 @@
 
 #include "base/parallel.h"
 #include "fit/inputs.h"
+#include "fit/lbfgs.h"
 #include "fit/report.h"
 #include "io/file.h"
 
@@ -193,14 +194,31 @@ static rey_result save_scene(Fit *fit, FitResult *out) {
     return result;
 }
 
+// What is shown as the fit's loss. One iteration says little where samples are new in each; L-BFGS keeps its own, and its best.
+static void set_loss(const Fit *fit, FitResult *out) {
+    int done = fit->state.iteration;
+    bool best = fit->job.optimizer.kind == OPTIMIZER_LBFGS && done > 0;
+    out->loss_window = best ? 0 : done < LOSS_WINDOW ? done : LOSS_WINDOW;
+    out->loss = best   ? rey_lbfgs_best_value(fit->unknowns.lbfgs)
+                : done ? rey_fit_mean_loss(&fit->state, done, out->loss_window)
+                       : NAN;
+}
+
+void rey_fit_loss_words(const FitResult *result, char *text, size_t size) {
+    if (result->loss_window > 1) {
+        snprintf(text, size, "mean of the last %d iterations", result->loss_window);
+    } else {
+        snprintf(text, size, "%s", result->loss_window ? "of the last iteration" : "of the best point, which was taken");
+    }
+}
+
 static rey_result finish(Fit *fit, FitResult *out) {
     out->iterations = fit->state.iteration;
     out->converged = fit->state.converged;
     out->seconds = fit->state.seconds;
     out->numbers = fit->unknowns.count;
     out->nonfinite = fit->nonfinite;
-    int window = fit->state.iteration < LOSS_WINDOW ? fit->state.iteration : LOSS_WINDOW;
-    out->loss = window ? rey_fit_mean_loss(&fit->state, fit->state.iteration, window) : NAN;
+    set_loss(fit, out);
     out->output = rey_strdup(fit->ctx, fit->output);
     rey_result result = out->output ? REY_OK : REY_ERROR_MEMORY;
     if (!result && fit->job.optimizer.average > 0 && fit->state.iteration > 0) {

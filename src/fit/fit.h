@@ -53,7 +53,8 @@ typedef struct FitResult {
     rey_context *ctx;
     int iterations;
     bool converged; // by the stop rule
-    double loss;    // mean over the last 10 iterations; NaN when there was none
+    double loss;    // of the last iterations, or at the best point: see rey_fit_loss_words; NaN when there was none
+    int loss_window; // iterations that it is the mean of; 0 = it is the one at the best point, which L-BFGS ends at
     double seconds; // of all runs
     int64_t numbers;
     int64_t nonfinite; // samples of this run that were left out because they were not finite; 0 in a healthy fit
@@ -64,6 +65,8 @@ typedef struct FitResult {
     bool bad_override;             // the fit failed, and what is wrong is an override
 } FitResult;
 
+// What the loss is: "mean of the last 10 iterations".
+void rey_fit_loss_words(const FitResult *result, char *text, size_t size);
 rey_result rey_fit(rey_context *ctx, const FitDef *def, FitResult *out);
 void rey_fit_result_free(FitResult *result); // also after a failure
 

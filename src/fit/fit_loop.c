@@ -257,7 +257,8 @@ static bool has_converged(const Fit *fit) {
 static rey_result save(Fit *fit) {
     fit->state.seconds = rey_seconds() - fit->start_seconds;
     char *path = rey_fit_output_path(fit, "checkpoint.bin");
-    rey_result result = path ? rey_checkpoint_write(path, (FitOrigin){fit->flat, fit->inputs}, &fit->unknowns, &fit->state) : REY_ERROR_MEMORY;
+    FitOrigin origin = {fit->flat, fit->inputs};
+    rey_result result = path ? rey_checkpoint_write(path, origin, &fit->unknowns, &fit->state) : REY_ERROR_MEMORY;
     rey_free(fit->ctx, path);
     return result;
 }

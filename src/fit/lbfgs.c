@@ -170,6 +170,10 @@ void rey_lbfgs_take_best(const double *state, int64_t n, double *x) {
     }
 }
 
+double rey_lbfgs_best_value(const double *state) {
+    return state[VALUE];
+}
+
 void rey_lbfgs_forget(double *state) {
     memset(state, 0, SCALARS * sizeof *state);
 }

@@ -18,5 +18,7 @@ int64_t rey_lbfgs_numbers(int64_t n, int memory);
 void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const double *gradient, double *x);
 // x becomes the best point so far; nothing before the first step.
 void rey_lbfgs_take_best(const double *state, int64_t n, double *x);
+// The value there.
+double rey_lbfgs_best_value(const double *state);
 // Forgets everything: the function is another one from here on.
 void rey_lbfgs_forget(double *state);

@@ -28,6 +28,10 @@ rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out) {
     rey_result result =
         scene ? rey_scene_load(ctx, scene, fit->job.defines.list, fit->job.defines.count, out) : REY_ERROR_MEMORY;
     result = rey_job_named_scene(&fit->job, fit->job.scene_at, &fit->job.defines, result);
+    if (!result && !(*out)->integrator) {
+        result = rey_fail(ctx, REY_ERROR_SCENE, "%s: the scene has no integrator, expected one such as <integrator type=\"path\"/>",
+                          scene);
+    }
     if (!result && fit->job.load) {
         const char *values = rey_job_path(&fit->job, fit->job.load);
         result = values ? rey_scene_load_values(*out, values) : REY_ERROR_MEMORY;

@@ -48,7 +48,7 @@ static rey_result put_page(Fit *fit, FitResult *out, Text *html) {
         rey_report_table(fit, out, html);
         rey_report_histories(fit, out, html);
         rey_text_add(html, "<h2>Loss</h2>\n");
-        rey_report_loss(fit, html);
+        rey_report_loss(fit, out, html);
         result = rey_report_about(fit, out, html);
     }
     rey_text_add(html, "<script>\n");

@@ -196,7 +196,7 @@ static void put_chart(Chart *c, Text *html) {
     legend(c, html);
 }
 
-void rey_report_loss(const Fit *fit, Text *html) {
+void rey_report_loss(const Fit *fit, const FitResult *out, Text *html) {
     int reach = bin_count(fit, MOST_POINTS) / 50, negative = 0;
     Chart loss = {.fit = fit, .column = HISTORY_LOSS, .count = 1, .reach = reach, .label = "loss", .logarithmic = true};
     Chart norm = {.fit = fit,
@@ -212,6 +212,11 @@ void rey_report_loss(const Fit *fit, Text *html) {
     put_chart(&loss, html);
     put_chart(&norm, html);
     rey_text_add(html, "</div>\n");
+    if (out->iterations) {
+        char words[64];
+        rey_fit_loss_words(out, words, sizeof words);
+        rey_text_add(html, "<p class=\"note\">Loss %.4g, %s.</p>\n", out->loss, words);
+    }
     if (negative) {
         rey_text_add(html,
                      "<p class=\"note\">In %d of %d iterations the loss, an unbiased estimate, was not positive; they "

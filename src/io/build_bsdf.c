@@ -54,8 +54,10 @@ static rey_result metal_slot(Builder *b, rey_xml_node *node, const ParamDesc *p,
                             "either 'material' or 'eta' and 'k' may be given, not both");
     }
     if (!written && !rey_named_metal(material, eta, k)) {
+        const char *nearest = rey_nearest_word(material, rey_named_metal_name, NULL);
         return rey_xml_fail_word(b->ctx, rey_xml_find(node, "material")->at, material, rey_named_metal_name, NULL,
-                                 "there is no conductor '%s'", material);
+                                 "there is no conductor '%.100s'%s", material,
+                                 nearest ? "" : ", expected one such as Ag, Al, Au, Cr, Cu or W, 'none', or 'eta' and 'k'");
     }
     return build_slot(b, node, p->name, slot_use(p), p->type == PARAM_METAL_ETA ? eta : k, 3, path, out);
 }

@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const words[] = {"path", "direct",     "moment", "volpath", "volpathmis",
-                                    "prb",  "prbvolpath", "depth",  "aov",     "ptracer"};
+static const char *const words[] = {"path", "direct", "moment", "volpath", "volpathmis", "prb", "prbvolpath", "depth", "aov",
+                                    "ptracer", "prb_basic", "prb_projective", "direct_projective"};
 
 static const char *integrator_word(void *user, int i) {
     UNUSED(user);
@@ -39,17 +39,38 @@ static rey_result get_split(Builder *b, rey_xml_node *node, SceneView *view) {
     return REY_OK;
 }
 
+// Integrators whose pictures are those of others: how derivatives are sampled, no scene has to say.
+static rey_result get_projection(Builder *b, rey_xml_node *node) {
+    static const char *const counts[] = {"sppc", "sppp", "sppi", "guiding_rounds"};
+    int64_t count;
+    bool project;
+    const char *word;
+    for (int i = 0; i < COUNT_OF(counts); i++) {
+        TRY(rey_xml_get_int(b->ctx, node, counts[i], 0, INT32_MAX, 0, &count));
+    }
+    TRY(rey_xml_get_bool(b->ctx, node, "guiding_proj", true, &project));
+    TRY(rey_xml_get_string(b->ctx, node, "guiding", "octree", &word));
+    TRY(rey_xml_get_string(b->ctx, node, "project_seed", "both", &word));
+    return rey_scene_add_note(b->scene, "%s:%d: '%s' is read as '%s' with its max_depth: every integrator finds the terms of "
+                              "moving edges here, with as many samples as --spp and --spp-terms say", node->at.file, node->at.line,
+                              node->type, is(node, "direct_projective") ? "direct" : "path");
+}
+
 static rey_result get_depths(Builder *b, rey_xml_node *node, SceneView *view) {
     int64_t depth, roulette;
+    bool replays = !strncmp(node->type, "prb", 3), projects = strstr(node->type, "_projective") != NULL;
+    if (projects) {
+        TRY(get_projection(b, node));
+    }
     view->drops = is(node, "path");
     if (is(node, "direct")) {
         view->max_depth = 2;
         view->solid = true;
         return get_split(b, node, view);
     }
-    TRY(rey_xml_get_int(b->ctx, node, "max_depth", -1, INT32_MAX, is(node, "prb") || is(node, "prbvolpath") ? 6 : -1, &depth));
+    TRY(rey_xml_get_int(b->ctx, node, "max_depth", -1, INT32_MAX, replays || projects ? 6 : -1, &depth));
     TRY(rey_xml_get_int(b->ctx, node, "rr_depth", 1, INT32_MAX, 5, &roulette));
-    view->max_depth = (int32_t)depth;
+    view->max_depth = is(node, "direct_projective") ? 2 : (int32_t)depth;
     view->rr_depth = (int32_t)roulette;
     view->through = strstr(node->type, "volpath") != NULL;
     if (is(node, "volpathmis")) {

@@ -1,6 +1,7 @@
 // build_unknown.c: plugins that are refused: those of the format by name, with the reason; others with a near name.
 #include "io/build.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const char no_polarisation[] = "light has no polarisation here";
@@ -65,10 +66,16 @@ static const struct {
                {"gridtexture", "a picture of the grid can be a 'bitmap'"},
                {"scale", "the numbers of the texture inside can be scaled instead"},
                {"wireframe", missing},
-               {"curvature", missing},
-               {"prb_basic", missing},
-               {"direct_projective", missing},
-               {"prb_projective", missing}};
+               {"curvature", missing}};
+
+// The names that there are, where none is near.
+static void list_words(const char *(*known)(void *user, int i), void *user, char *text, size_t size) {
+    text[0] = 0;
+    for (int i = 0; known(user, i); i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%s", !i ? ", expected " : known(user, i + 1) ? ", " : " or ", known(user, i));
+    }
+}
 
 rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user) {
     const char *tag = rey_xml_tag_name(node->tag);
@@ -78,5 +85,8 @@ rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*kno
                                 refused[i].why);
         }
     }
-    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%s'", tag, node->type);
+    char list[1024];
+    list_words(known, user, list, sizeof list);
+    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%.100s'%s", tag, node->type,
+                             rey_nearest_word(node->type, known, user) ? "" : list);
 }

@@ -249,6 +249,12 @@ static void find_drops(Builder *b) {
     b->scene->view.drops = b->scene->view.drops && b->scene->view.hide_emitters && mixed;
 }
 
+const char *rey_mitsuba_file(const rey_scene *scene) {
+    const SceneSource *source = scene->document;
+    const char *file = source ? rey_xml_root(source->document)->at.file : NULL;
+    return file ? file : "scene";
+}
+
 static rey_result build_scene(Builder *b) {
     rey_xml_node *root = rey_xml_root(b->source->document);
     int counts[REY_XML_TAG_COUNT] = {0};

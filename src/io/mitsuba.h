@@ -12,6 +12,9 @@ enum {
 rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                             rey_scene **out);
 
+// The file that a scene was read from.
+const char *rey_mitsuba_file(const rey_scene *scene);
+
 // Of char *: what a lenient reader left out, and why.
 const Array *rey_mitsuba_ignored(const rey_scene *scene);
 
