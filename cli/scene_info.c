@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "io/mitsuba.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -26,6 +27,30 @@ static void count_rows(const rey_scene_info *info, CountRow rows[COUNT_ROWS]) {
         {"bytes", info->bytes},
     };
     memcpy(rows, all, sizeof all);
+}
+
+// What a scene lacks to make a picture that is not black.
+typedef struct Lack {
+    const char *name, *words;
+} Lack;
+enum { MOST_LACKS = 4 };
+static int find_lacks(const rey_scene_info *info, Lack lacks[MOST_LACKS]) {
+    const struct {
+        bool lacks;
+        Lack lack;
+    } all[MOST_LACKS] = {
+        {!info->integrator[0], {"integrator", "no integrator, such as <integrator type=\"path\"/>: nothing can be rendered"}},
+        {!info->sensors, {"sensor", "no sensor, such as <sensor type=\"perspective\">: nothing can be rendered"}},
+        {!info->shapes && !info->instances, {"shape", "no shape"}},
+        {!info->emitters, {"emitter", "no emitter: without light, pictures are black unless a medium glows"}},
+    };
+    int count = 0;
+    for (int i = 0; i < MOST_LACKS; i++) {
+        if (all[i].lacks) {
+            lacks[count++] = all[i].lack;
+        }
+    }
+    return count;
 }
 
 // A line for each sort of objects: "bsdf   diffuse 3, plastic 1".
@@ -78,19 +103,40 @@ static void print_info(const Session *s) {
     }
     printf("%-17s %.1f\n", "peak_rss_mb", (double)rey_peak_rss() / 1e6);
     print_kinds(s);
-    printf("%-17s %g %g %g to %g %g %g\n", "bounds", info.bounds[0], info.bounds[1], info.bounds[2], info.bounds[3],
-           info.bounds[4], info.bounds[5]);
-    printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
-    printf("%-17s %d\n", "samples per pixel", info.sample_count);
+    if (info.shapes > 0) {
+        printf("%-17s %g %g %g to %g %g %g\n", "bounds", info.bounds[0], info.bounds[1], info.bounds[2], info.bounds[3],
+               info.bounds[4], info.bounds[5]);
+    }
+    if (info.integrator[0]) {
+        printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
+    }
+    if (info.sensors > 0) {
+        printf("%-17s %d\n", "samples per pixel", info.sample_count);
+    }
     for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
         int width, height;
         if (rey_scene_film_size(s->scene, i, &width, &height) == REY_OK) {
             printf("sensor %-10d %d x %d pixels\n", i, width, height);
         }
     }
+    Lack lacks[MOST_LACKS];
+    int lack_count = find_lacks(&info, lacks);
+    for (int i = 0; i < lack_count; i++) {
+        printf("missing: %s\n", lacks[i].words);
+    }
     for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
         printf("note: %s\n", rey_scene_note(s->scene, i));
     }
+}
+
+static void json_missing(Json *json, const rey_scene_info *info) {
+    Lack lacks[MOST_LACKS];
+    int count = find_lacks(info, lacks);
+    json_array(json, "missing");
+    for (int i = 0; i < count; i++) {
+        json_string(json, NULL, lacks[i].name);
+    }
+    json_array_end(json);
 }
 
 static void print_info_json(const Session *s) {
@@ -107,14 +153,15 @@ static void print_info_json(const Session *s) {
     json_number(&json, "peak_rss_mb", (double)rey_peak_rss() / 1e6);
     json_kinds(&json, s);
     json_array(&json, "bounds");
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 6 && info.shapes > 0; i++) {
         json_number(&json, NULL, info.bounds[i]);
     }
     json_array_end(&json);
-    json_string(&json, "integrator", info.integrator);
-    json_integer(&json, "max_depth", info.max_depth);
-    json_integer(&json, "rr_depth", info.rr_depth);
-    json_integer(&json, "sample_count", info.sample_count);
+    json_string(&json, "integrator", info.integrator[0] ? info.integrator : NULL);
+    json_number(&json, "max_depth", info.integrator[0] ? info.max_depth : (double)NAN);
+    json_number(&json, "rr_depth", info.integrator[0] ? info.rr_depth : (double)NAN);
+    json_number(&json, "sample_count", info.sensors ? info.sample_count : (double)NAN);
+    json_missing(&json, &info);
     json_array(&json, "films");
     for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
         int width = 0, height = 0;

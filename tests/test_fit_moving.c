@@ -263,7 +263,7 @@ static void test_level_errors(void **state) {
         {"levels: [{from: 0, edge_length: 1}]\nparameters: [{name: ball.positions}]\n", "the job has none"},
         {"levels: [{from: 0, edge_length: 1}]\niterations: 1\nparameters: [{name: ball.positions, parameterisation: laplacian}]\n",
          "cannot remesh what has uv coordinates"},
-        {"parameters: [{name: views.2.exposure}]\n", "the scene has none of this name"},
+        {"parameters: [{name: views.2.exposure}]\n", "the job has no view 2, expected 0 to 1"},
         {"parameters: [{name: views.1.exposure, parameterisation: rigid}]\n", "an exposure is one number"},
         {"parameters: [{name: views.1.exposure}, {name: 'views.*'}]\n", "names it already"},
         {"optimizer: {type: lbfgs, schedule: cosine}\nparameters: [{name: ball.positions}]\n", "it has no schedule"},

@@ -142,6 +142,12 @@ static rey_result open_fit(Fit *fit) {
         result = hash_inputs(fit);
     }
     if (!result) {
+        result = rey_fit_check_derivatives(fit);
+    }
+    if (!result) {
+        result = rey_fit_check_truth(fit);
+    }
+    if (!result) {
         result = allocate(fit);
     }
     if (!result) {

@@ -140,6 +140,9 @@ rey_result rey_levels_remesh(Fit *fit, int level);
 // The job's scene, or that of a level: see FitState.meshed.
 rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);
 
+// Whether every fitted view has the gradients of all unknowns (derivatives.c).
+rey_result rey_fit_check_derivatives(Fit *fit);
+
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
 // back through that, with the gradient of an unknown exposure.
 double rey_exposure_of(const Fit *fit, int view, const float *values);
@@ -159,5 +162,7 @@ bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size);
 bool rey_fit_row_is_pose(const FitRow *row);
 // The scene and the values that the fit began with.
 rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns);
-// Adds truths and errors to the rows; opens the truth when the job names one, which nothing does before.
+// Whether the films of the truth, where the job names one that can be read, are those of the views; nothing else is looked at.
+rey_result rey_fit_check_truth(Fit *fit);
+// Adds truths and errors to the rows: opens the truth when the job names one, whose values nothing sees before.
 rey_result rey_fit_judge(Fit *fit, FitResult *result);

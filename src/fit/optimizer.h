@@ -7,6 +7,7 @@
 typedef struct Unknown { // one parameter of the scene, or of a view
     int param;           // its index; -1 = the exposure of a view
     int view;            // that one
+    int entry;           // of the job's parameters: the one that chose it
     const char *name;
     int64_t offset, count; // place in the arrays of Unknowns
     int dims;

@@ -310,9 +310,10 @@ static rey_result check_films(Fit *fit, const rey_scene *truth) {
         if (result) {
             return result;
         }
-        if (width != view->width || height != view->height) {
-            return rey_fail(fit->ctx, REY_ERROR_SCENE, "%s: sensor %d delivers %d x %d, the scene's %d x %d",
-                            fit->job.truth_scene, view->sensor, width, height, view->width, view->height);
+        if (width != view->full_width || height != view->full_height) {
+            return rey_job_fail_at(&fit->job, fit->job.truth_at, REY_ERROR_SCENE,
+                                   "%s: sensor %d delivers %d x %d, the scene's %d x %d", fit->job.truth_scene, view->sensor,
+                                   width, height, view->full_width, view->full_height);
         }
     }
     return REY_OK;
@@ -325,7 +326,18 @@ static rey_result load_truth(Fit *fit, rey_scene **out) {
     const JobDefines *defines = own ? &fit->job.truth_defines : &fit->job.defines;
     rey_result result = path ? rey_mitsuba_load(fit->ctx, path, defines->list, defines->count, own ? 0 : LOAD_SPARE, out)
                              : REY_ERROR_MEMORY;
-    return result ? rey_job_named_scene(&fit->job, fit->job.truth_at, defines, result) : rey_scene_update(*out);
+    return rey_job_named_scene(&fit->job, fit->job.truth_at, defines, result);
+}
+
+rey_result rey_fit_check_truth(Fit *fit) {
+    rey_scene *truth = NULL;
+    rey_result result = fit->job.truth_scene ? load_truth(fit, &truth) : REY_OK;
+    if (truth) {
+        result = check_films(fit, truth);
+    }
+    rey_scene_destroy(truth);
+    // What cannot be read is told at the end: until then it may come, and nothing that is found depends on it.
+    return truth || result == REY_ERROR_MEMORY ? result : REY_OK;
 }
 
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {
@@ -335,6 +347,9 @@ rey_result rey_fit_judge(Fit *fit, FitResult *out) {
     rey_scene *truth = NULL;
     float *ones = rey_alloc_array(fit->ctx, (size_t)fit->largest, sizeof *ones);
     rey_result result = ones ? load_truth(fit, &truth) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = rey_scene_update(truth);
+    }
     for (int64_t i = 0; ones && i < fit->largest; i++) {
         ones[i] = 1;
     }

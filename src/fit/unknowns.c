@@ -174,10 +174,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (result) {
         return result;
     }
-    const int known = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
-    // Jumps are refused when a path meets one. A job may say that some of the terms will do.
-    bool enough = job->terms ? (info.terms & REY_TERM_INTERIOR) != 0 : !(info.terms & ~REY_TERM_TERMINATOR & ~known);
-    if (!info.terms || !enough) {
+    if (!info.terms) { // whether all terms are there depends on the views: derivatives.c asks for all of them
         return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
     result = check_terms(job, &info);
@@ -206,6 +203,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     }
     *owner = job_index;
     *unknown = (Unknown){.param = param,
+                         .entry = job_index,
                          .name = several ? info.name : p->name, // aliases stay what the job calls them
                          .offset = u->count,
                          .count = info.count,
@@ -245,7 +243,7 @@ static rey_result add_exposure(Job *job, int view, const char *name, int index, 
         return REY_ERROR_MEMORY;
     }
     *owner = index;
-    *unknown = (Unknown){.param = -1, .view = view, .name = name, .offset = u->count, .count = 1,
+    *unknown = (Unknown){.param = -1, .view = view, .entry = index, .name = name, .offset = u->count, .count = 1,
                          .learning_rate = p->learning_rate, .parameterisation = p->parameterisation, .moment = p->moment};
     u->count++;
     return set_bounds(job, p, &info, unknown);
@@ -321,6 +319,18 @@ static rey_result match_medium(Job *job, rey_scene *scene, int index, Array *own
     return REY_OK;
 }
 
+// A view's exposure that match_exposures does not offer.
+static rey_result fail_exposure(Job *job, const JobParameter *p, int view) {
+    char why[160];
+    if (view >= 0 && view < job->view_count) {
+        snprintf(why, sizeof why, "view %d is held out: nothing that is fitted tells its exposure; its entry of 'views' can", view);
+    } else {
+        snprintf(why, sizeof why, "the job has no view %d, expected %s%d", view, job->view_count > 1 ? "0 to " : "",
+                 job->view_count - 1);
+    }
+    return fail_at(job, p, p->name, why);
+}
+
 static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
     const JobParameter *p = &job->parameters[index];
     if (p->parameterisation == PARAMETERISATION_SCATTERING) {
@@ -331,6 +341,10 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
     rey_result result = match_exposures(job, index, owners, u, &exposures);
     if (result || exposures) {
         return result;
+    }
+    int view, end = 0;
+    if (sscanf(p->name, "views.%d.exposure%n", &view, &end) == 1 && end && !p->name[end]) {
+        return fail_exposure(job, p, view);
     }
     if (!strchr(p->name, '*')) {
         int param = rey_param_find(scene, p->name);

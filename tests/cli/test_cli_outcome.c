@@ -16,8 +16,8 @@ static void write_job(Fixture *f, const char *lines) {
     if (access("target.exr", R_OK) != 0) {
         expect(f, 0, "render " TEST_JOBS "/truth.xml -o target.exr --spp 16");
     }
-    snprintf(text, sizeof text, "scene: " TEST_JOBS "/start.xml\nspp: 8\nreport_spp: 2\nimage_every: 0\nviews: [{target: target.exr}]\n"
-             "parameters: [{name: red.reflectance.value, learning_rate: 0.05}]\n%s", lines);
+    snprintf(text, sizeof text, "scene: " TEST_JOBS "/start.xml\nspp: 8\nreport_spp: 2\nimage_every: 0\n"
+             "views: [{target: target.exr}]\nparameters: [{name: red.reflectance.value, learning_rate: 0.05}]\n%s", lines);
     write_words("job.yaml", text);
 }
 
@@ -76,9 +76,51 @@ static void losses_are_explained(void **state) {
     assert_non_null(strstr(f->out, "(of the last iteration)"));
 }
 
+static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words)) {
+        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
+    }
+}
+
+// What would be found out at the end, or in the first iteration, is told before it.
+static void mistakes_are_told_at_the_start(void **state) {
+    Fixture *f = *state;
+    write_job(f, "iterations: 2\ntruth: {scene: wide.xml}\n");
+    assert_int_equal(system("sed 's/value=\"32\"/value=\"40\"/' " TEST_JOBS "/start.xml >wide.xml"), 0);
+    expect_words(f, 1, "fit job.yaml -o late", "job.yaml:8: wide.xml: sensor 0 delivers 40 x 24, the scene's 32 x 24");
+    assert_int_not_equal(access("late/metrics.jsonl", F_OK), 0);
+    write_job(f, "iterations: 2\ntruth: {scene: nowhere.xml}\n"); // which may come until then
+    expect_words(f, 1, "fit job.yaml -o late", "nowhere.xml: cannot open");
+    assert_int_equal(access("late/report.html", R_OK), 0);
+    write_job(f, "iterations: 2\n");
+    expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.7.exposure]'", "the job has no view 7, expected 0");
+    expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.1.exposure]' --set 'views.1={sensor: 0, target: target.exr, "
+                       "held_out: true}'", "view 1 is held out: nothing that is fitted tells its exposure");
+}
+
+// What `grad` refuses, a fit refuses in the same words.
+static void refusals_are_those_of_grad(void **state) {
+    Fixture *f = *state;
+    static char words[OUTPUT_BYTES];
+    expect(f, 0, "render %s -D ball=glass -o target.exr --spp 4");
+    expect(f, 1, "grad %s -D ball=glass --param floor.to_world:translate=1,0,0");
+    snprintf(words, sizeof words, "%s", f->words + strlen("reynolds: "));
+    words[strcspn(words, "\n")] = 0;
+    assert_non_null(strstr(words, "the term 'specular' does not know"));
+    write_words("glass.yaml", "scene: " TEST_SCENE "\ndefines: {ball: glass}\nviews: [{target: target.exr}]\niterations: 1\n"
+                              "spp: 2\nreport_spp: 0\nparameters:\n  - red.reflectance.value\n  - floor.to_world\n");
+    expect_words(f, 1, "fit glass.yaml -o glass", words);
+    assert_non_null(strstr(f->words, "glass.yaml:9: parameter 'floor.to_world': "));
+    assert_non_null(strstr(f->words, "(in a job, 'terms: interior')"));
+    expect(f, 0, "fit glass.yaml -o glass --set terms=interior");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses_are_explained),
+        cmocka_unit_test(mistakes_are_told_at_the_start),
+        cmocka_unit_test(refusals_are_those_of_grad),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
