@@ -442,6 +442,7 @@ int cli_check(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_CHECK, argc, argv, &options, &status)) {
         return status;
     }
+    cli_catch_terminations();
     status = cli_session_open(&options, "check", &work.session);
     if (!status) {
         status = run_checks(&options, &work);

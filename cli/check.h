@@ -36,6 +36,7 @@ typedef struct Check { // one direction
     double reverse_error;              // the one over the other, see check_reverse_error
     Verdict verdict;
     bool undecided;       // weak, and beyond the limits all the same
+    bool shown, open;     // its row went to standard error already; with a verdict that might change
     char *refusal;        // why there is no complete derivative; owned
 } Check;
 
@@ -65,7 +66,8 @@ const char *check_verdict_name(Verdict verdict);
 void check_judge(Check *check, double threshold, bool partial);
 // A row on standard error as soon as it is known. The limit of |z| rises with the number of tests, from `threshold` now to
 // `loosest` at most: a verdict that may change with it is open. reasons: of what was refused so far.
-rey_result check_print_ready(rey_context *ctx, const Check *check, bool first, double threshold, double loosest,
+rey_result check_print_ready(rey_context *ctx, Check *check, bool first, double threshold, double loosest,
                              bool partial, Reasons *reasons);
+// The table; on a terminal that has the rows already, only those that were open.
 rey_result check_print_table(rey_context *ctx, const Check *checks, int count, double threshold);
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold);

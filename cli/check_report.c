@@ -2,6 +2,7 @@
 #include "check.h"
 
 #include <stdio.h>
+#include <unistd.h>
 
 static int count_verdicts(const Check *checks, int count, Verdict verdict) {
     int n = 0;
@@ -32,12 +33,13 @@ static rey_result print_refusal(rey_context *ctx, FILE *file, const Check *check
     return *number ? REY_OK : REY_ERROR_MEMORY;
 }
 
-rey_result check_print_ready(rey_context *ctx, const Check *check, bool first, double threshold, double loosest,
+rey_result check_print_ready(rey_context *ctx, Check *check, bool first, double threshold, double loosest,
                              bool partial, Reasons *reasons) {
     Check tight = *check, loose = *check;
     if (first) {
         print_titles(stderr);
     }
+    check->shown = true;
     if (check->verdict == VERDICT_REFUSED) {
         int number;
         rey_result result = print_refusal(ctx, stderr, check, reasons, &number);
@@ -48,13 +50,23 @@ rey_result check_print_ready(rey_context *ctx, const Check *check, bool first, d
     }
     check_judge(&tight, threshold, partial);
     check_judge(&loose, loosest, partial);
-    print_row(stderr, check, tight.verdict == loose.verdict ? check_verdict_name(tight.verdict) : "open: see the table");
+    check->open = tight.verdict != loose.verdict;
+    print_row(stderr, check, check->open ? "open: see below" : check_verdict_name(tight.verdict));
     return REY_OK;
 }
 
 static rey_result print_rows(rey_context *ctx, const Check *checks, int count) {
     Reasons reasons = {0};
     rey_result result = REY_OK;
+    bool stand = count > 0 && checks[0].shown && isatty(STDOUT_FILENO) && isatty(STDERR_FILENO);
+    for (int i = 0; i < count && stand; i++) {
+        if (checks[i].open) {
+            print_row(stdout, &checks[i], check_verdict_name(checks[i].verdict));
+        }
+    }
+    if (stand) {
+        return REY_OK;
+    }
     print_titles(stdout);
     for (int i = 0; i < count && !result; i++) {
         int number;

@@ -98,6 +98,8 @@ double cli_seconds_total(void);
 
 // SIGINT sets a flag that the progress callbacks read; a second SIGINT ends the process at once.
 void cli_catch_interrupts(void);
+// SIGTERM and SIGHUP do the same: of commands that look at the flag all the time.
+void cli_catch_terminations(void);
 bool cli_interrupted(void);
 
 typedef struct Progress {

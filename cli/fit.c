@@ -6,20 +6,12 @@
 #include "fit/pose.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 enum { SHOWN_ENTRIES = 3, LINE_SECONDS = 5 };
-
-static volatile sig_atomic_t terminated; // SIGTERM before a batch system takes the machine away, SIGHUP with a terminal
-
-static void on_terminate(int number) {
-    UNUSED(number);
-    terminated = 1;
-}
 
 typedef struct Display {
     bool terminal;
@@ -41,7 +33,7 @@ static bool show_progress(void *user, const FitProgress *p) {
                 p->seconds_left, display->terminal ? "" : "\n");
         display->shown = now;
     }
-    return !cli_interrupted() && !terminated;
+    return !cli_interrupted();
 }
 
 static void entries_text(const FitRow *row, int column, char *text, size_t size) {
@@ -340,13 +332,7 @@ int cli_fit(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_FIT, argc, argv, &options, &status)) {
         return status;
     }
-    struct sigaction action = {.sa_handler = on_terminate, .sa_flags = (int)SA_RESETHAND};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGTERM, &action, NULL);
-    struct sigaction former; // nohup has it ignored
-    if (!sigaction(SIGHUP, NULL, &former) && former.sa_handler != SIG_IGN) {
-        sigaction(SIGHUP, &action, NULL);
-    }
+    cli_catch_terminations();
     status = cli_context_open(&options, &session);
     if (!status) {
         char *command = command_text(argc, argv);

@@ -75,6 +75,7 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     write_terms(&json, g);
     json_bool(&json, "complete", terms_left_out(g) == 0);
     cli_json_terms(&json, "needed_terms", g->needed & (~REY_TERM_TERMINATOR | g->stats.missing_terms));
+    cli_json_terms(&json, "left_out", terms_left_out(g));
     json_array(&json, "parameters");
     for (int i = 0; i < g->direction.count; i++) {
         json_string(&json, NULL, g->direction.names[i]);
@@ -299,15 +300,27 @@ static rey_result differentiate(Grad *g) {
     return s->options->reverse ? reverse(g) : forward(g);
 }
 
+// Which terms a restricted gradient lacks, and why all of them together cannot be had, where that is so.
+static void note_left_out(const Grad *g) {
+    const Session *s = &g->session;
+    char missing[128], asked[128];
+    cli_terms_text(terms_left_out(g), missing, sizeof missing);
+    cli_terms_text(g->used, asked, sizeof asked);
+    cli_note("incomplete on request: --terms %s leaves out %s", asked, missing);
+    rey_render_def whole = s->def;
+    whole.terms = 0;
+    if (rey_derivative_check(s->scene, &whole, cli_direction_selection(&g->direction)) == REY_ERROR_INCOMPLETE) {
+        cli_note("without --terms it is refused: %s", rey_error(s->ctx));
+    }
+}
+
 static void print_result(const Grad *g) {
     cli_warn_nonfinite(&g->stats);
     if (g->png_scale > 0) {
         cli_note("blue -%g, white 0, red %g", (double)g->png_scale, (double)g->png_scale);
     }
     if (terms_left_out(g)) {
-        char missing[128];
-        cli_terms_text(terms_left_out(g), missing, sizeof missing);
-        cli_note("incomplete on request: left out %s", missing);
+        note_left_out(g);
     }
     if (g->session.options->json) {
         write_json(stdout, g, NULL);
@@ -326,6 +339,7 @@ int cli_grad(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_GRAD, argc, argv, &options, &status)) {
         return status;
     }
+    cli_catch_terminations();
     status = cli_session_open(&options, "grad", &g.session);
     if (!status) {
         status = cli_specs_open(&g.session, &specs);

@@ -43,6 +43,7 @@ int cli_render(int argc, char **argv) {
     if (!cli_options_parse(COMMAND_RENDER, argc, argv, &options, &status)) {
         return status;
     }
+    cli_catch_terminations();
     status = cli_session_open(&options, "render", &session);
     if (!status) {
         rey_stats stats = {0};

@@ -30,6 +30,17 @@ void cli_catch_interrupts(void) {
     sigaction(SIGXFSZ, &action, NULL);
 }
 
+void cli_catch_terminations(void) {
+    static const int numbers[] = {SIGTERM, SIGHUP}; // a batch system takes the machine away; a terminal is closed
+    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND}, former;
+    sigemptyset(&action.sa_mask);
+    for (int i = 0; i < COUNT_OF(numbers); i++) {
+        if (!sigaction(numbers[i], NULL, &former) && former.sa_handler != SIG_IGN) { // nohup has it ignored
+            sigaction(numbers[i], &action, NULL);
+        }
+    }
+}
+
 bool cli_interrupted(void) {
     return interrupted != 0;
 }

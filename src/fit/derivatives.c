@@ -14,8 +14,8 @@ static rey_result refuse(const Fit *fit, const Unknown *unknown, rey_result resu
     if (result == REY_ERROR_MEMORY) {
         return result;
     }
-    return rey_job_fail_at(&fit->job, fit->job.parameters[unknown->entry].at, REY_ERROR_PARAM, "parameter '%s': %s%s", unknown->name,
-                           why, strstr(why, "--terms interior") ? " (in a job, 'terms: interior')" : "");
+    return rey_job_fail_at(&fit->job, fit->job.parameters[unknown->entry].at, REY_ERROR_PARAM, "parameter '%s': %s%s",
+                           unknown->name, why, strstr(why, "--terms interior") ? " (in a job, 'terms: interior')" : "");
 }
 
 static rey_result check_view(Fit *fit, int view) {

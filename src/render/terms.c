@@ -142,6 +142,18 @@ static rey_result check_cuts(rey_scene *scene, const Param *p) {
                : REY_OK;
 }
 
+// Terms that are asked for by name must exist.
+static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int chains, rey_selection selection) {
+    int wrong = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains), bit = wrong & -wrong;
+    if (bit == REY_TERM_SPECULAR && selection.count > 0) {
+        char reason[REASON];
+        const Param *p = &ARRAY_AT(scene->params, Param, selection.params[0]);
+        term_reason(scene, scene->view.sensors + def->sensor, bit, p, reason);
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term 'specular' does not cover this yet: %s", reason);
+    }
+    return wrong ? rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit)) : REY_OK;
+}
+
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
     if (scene->view.drops) {
@@ -195,12 +207,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         // What chains turn moves shadows of what lies behind them.
         *needed |= info.terms | (info.terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0);
     }
-    const int exist = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
-    if (def->terms & ~exist) {
-        int bit = def->terms & ~exist;
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit & -bit));
-    }
-    return REY_OK;
+    return check_asked(scene, def, chains, selection);
 }
 
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {

@@ -116,11 +116,111 @@ static void refusals_are_those_of_grad(void **state) {
     expect(f, 0, "fit glass.yaml -o glass --set terms=interior");
 }
 
+// What a restricted gradient lacks is named, and why more cannot be had where that is so.
+static void restricted_gradients_say_what_they_lack(void **state) {
+    Fixture *f = *state;
+    expect_words(f, 0, "grad %s --param floor.to_world:translate=1,0,0 --spp 16 --terms interior,primary",
+                 "incomplete on request: --terms interior,primary leaves out indirect\n");
+    assert_null(strstr(f->words, "without --terms"));
+    expect_words(f, 0, "grad %s -D ball=glass --param floor.to_world:translate=1,0,0 --spp 16 --terms interior",
+                 "without --terms it is refused: the term 'specular' does not know the curves");
+    JsonNode *node = run_json(f, 0, "grad %s --param floor.to_world:translate=1,0,0 --spp 16 --terms interior,indirect --json");
+    assert_string_equal(json_get(node, "left_out")->first->text, "primary");
+    assert_null(json_get(node, "left_out")->first->next);
+    json_free(node);
+}
+
+// How often a text holds a word.
+static int occurrences(const char *text, const char *word) {
+    int count = 0;
+    for (; (text = strstr(text, word)); text += strlen(word)) {
+        count++;
+    }
+    return count;
+}
+
+// On a terminal that shows rows as they are ready, a table of the same rows would be one too many.
+static void rows_of_check_stand_once(void **state) {
+    Fixture *f = *state;
+    static char text[OUTPUT_BYTES];
+    const char *check = "check %s --spp 16 --param red.reflectance.value --param white.reflectance.value";
+    expect(f, 0, check);
+    assert_int_equal(occurrences(f->out, "red.reflectance.value") + occurrences(f->words, "red.reflectance.value"), 2);
+    if (system("script -qc true /dev/null >nothing 2>&1") != 0) {
+        return; // no terminal can be had
+    }
+    char command[2048], filled[1024];
+    snprintf(filled, sizeof filled, check, TEST_SCENE);
+    snprintf(command, sizeof command, "script -qec \"'%s' %s\" /dev/null >pty.txt </dev/null", REYNOLDS_COMMAND, filled);
+    assert_int_equal(system(command), 0);
+    read_text("pty.txt", text);
+    assert_int_equal(occurrences(text, "derivative"), 1);
+    assert_int_equal(occurrences(text, "white.reflectance.value"), 1 + occurrences(text, "open"));
+    assert_int_equal(occurrences(text, "passed: "), 1);
+}
+
+// A scene that is not done yet is shown as far as it goes.
+static void infos_say_what_is_missing(void **state) {
+    Fixture *f = *state;
+    write_words("empty.xml", "<scene version='3.0.0'></scene>");
+    write_words("ball.xml", "<scene version='3.0.0'><integrator type='direct'/><shape type='sphere'/></scene>");
+    expect(f, 0, "info empty.xml");
+    static const char *const lacks[] = {"missing: no integrator", "missing: no sensor", "missing: no shape", "missing: no emitter"};
+    for (size_t i = 0; i < sizeof lacks / sizeof *lacks; i++) {
+        assert_non_null(strstr(f->out, lacks[i]));
+    }
+    static const char *const absent[] = {"bounds", "max_depth", "samples per pixel"};
+    for (size_t i = 0; i < sizeof absent / sizeof *absent; i++) {
+        assert_null(strstr(f->out, absent[i]));
+    }
+    expect(f, 0, "info ball.xml");
+    assert_non_null(strstr(f->out, "direct, max_depth 2"));
+    assert_int_equal(occurrences(f->out, "missing: "), 2);
+    JsonNode *node = run_json(f, 0, "info empty.xml --json");
+    assert_int_equal(json_get(node, "integrator")->kind, JSON_NULL);
+    assert_int_equal(json_get(node, "sample_count")->kind, JSON_NULL);
+    assert_string_equal(json_get(node, "missing")->first->text, "integrator");
+    json_free(node);
+    expect(f, 0, "info %s");
+    assert_null(strstr(f->out, "missing"));
+    expect_words(f, 1, "render empty.xml -o a.exr", "empty.xml: the scene has no integrator, expected one such as");
+    expect_words(f, 1, "render ball.xml -o a.exr", "ball.xml: the scene has no sensor to render with");
+    FILE *file = fopen("wrong.npy", "wb"); // 2, where 1 is the most
+    assert_non_null(file);
+    fwrite("\x93NUMPY\1\0\x46\0", 1, 10, file);
+    fprintf(file, "%-69s\n", "{'descr': '<f4', 'fortran_order': False, 'shape': (3,), }");
+    fwrite((float[3]){0.5f, 2, 0.5f}, sizeof(float), 3, file);
+    fclose(file);
+    expect_words(f, 1, "render %s -o a.exr --load red.reflectance.value=wrong.npy",
+                 "wrong.npy: red.reflectance.value[1] = 2, expected a number in [0, 1]");
+}
+
+// A batch system that ends a job gets the status of an interruption, and no picture is left half written.
+static void terminations_are_interruptions(void **state) {
+    (void)state;
+    static const char *const calls[] = {"render '" TEST_SCENE "' -o slow.exr --spp 1000000",
+                                        "grad '" TEST_SCENE "' --param red.reflectance.value -o slow.exr --spp 1000000",
+                                        "check '" TEST_SCENE "' --param red.reflectance.value --spp 1000000"};
+    for (size_t i = 0; i < sizeof calls / sizeof *calls; i++) {
+        char command[1024];
+        snprintf(command, sizeof command, "timeout --preserve-status -s TERM 1 '%s' %s >out.txt 2>words.txt", REYNOLDS_COMMAND,
+                 calls[i]);
+        int status = system(command);
+        assert_true(WIFEXITED(status));
+        assert_int_equal(WEXITSTATUS(status), 130);
+        assert_int_equal(system("grep -q 'reynolds: interrupted' words.txt && [ ! -e slow.exr ]"), 0);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses_are_explained),
         cmocka_unit_test(mistakes_are_told_at_the_start),
         cmocka_unit_test(refusals_are_those_of_grad),
+        cmocka_unit_test(restricted_gradients_say_what_they_lack),
+        cmocka_unit_test(rows_of_check_stand_once),
+        cmocka_unit_test(infos_say_what_is_missing),
+        cmocka_unit_test(terminations_are_interruptions),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
