@@ -168,7 +168,7 @@ static rey_result reserve_workspaces(Render *r) {
 static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
-                                                  [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1};
+                                                  [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -219,16 +219,14 @@ static void watch_smooth_normals(Render *r) {
     }
 }
 
-// Whether what only vertex normals move is known: silhouettes have no part in it.
-static bool knows_turning(const Render *r) {
-    const SceneView *view = &r->scene->view;
-    return !has_chains(view) && boundary_sees(r->plan.sensor) && !view->has_media;
+bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
+    return !has_chains(view) && boundary_sees(sensor) && !view->has_media;
 }
 
 rey_result rey_boundaries_begin(Render *r) {
     bool moves = r->job.any_motion || r->job.any_places;
     rey_result result = REY_OK;
-    if (!moves && !r->def.terms && !knows_turning(r)) {
+    if (!moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor)) {
         r->terms &= REY_TERM_INTERIOR; // paths look out instead
     }
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {

@@ -6,6 +6,8 @@
 // Prepares the terms of a derivative after the selection is mapped, where they can be computed, and records why not; a
 // rey_boundary_free of every plan follows in any case.
 rey_result rey_boundaries_begin(Render *r);
+// Whether what only vertex normals move is known for a sensor: silhouettes have no part in it.
+bool rey_turning_known(const SceneView *view, const SensorRecord *sensor);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.
 bool rey_chains_known(const SceneView *view, const SensorRecord *sensor);
 // Why not: null, or words and the object, -1 = none of that sort, that they are followed by.

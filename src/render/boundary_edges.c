@@ -3,6 +3,7 @@
 #include "render/boundary_edges.h"
 
 #include "bsdf/table.h"
+#include "render/cuts.h"
 #include "render/light_borders.h"
 #include "render/projection.h"
 #include "render/texture_steps.h"
@@ -249,7 +250,7 @@ static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
 // Whether it moves what an edge looks like. Meetings were looked for where something moves.
 static bool edge_moves(const Render *r, const EdgeRecord *e) {
     return e->kind == EDGE_MEETING || moves_on_film(r, e->shape, e->instance) ||
-           (e->kind == EDGE_TERMINATOR && r->job.normals_at[e->shape] >= 0);
+           ((e->kind == EDGE_TERMINATOR || e->kind == EDGE_CUT) && r->job.normals_at[e->shape] >= 0);
 }
 
 // The length of a curve in the world, where what meets there can move.
@@ -300,6 +301,21 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
 
 static double round_edge_weight(const SceneView *view, const EdgeRecord *e) {
     return 20 * rey_pose_size(view->theta + view->shapes[e->shape].to_world) * (double)(e->last - e->first);
+}
+
+// World area of a triangle.
+static double triangle_area(const SceneView *view, const EdgeRecord *e) {
+    const int32_t *corners = view->triangles + 3 * ((int64_t)view->shapes[e->shape].triangle + e->prim);
+    double p[3][3], area2 = 0;
+    for (int k = 0; k < 3; k++) {
+        mesh_point(view, e, corners[k], p[k]);
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        double n = (p[1][i] - p[0][i]) * (p[2][j] - p[0][j]) - (p[1][j] - p[0][j]) * (p[2][i] - p[0][i]);
+        area2 += n * n;
+    }
+    return 0.5 * sqrt(area2);
 }
 
 // World area of a triangle times the largest sine of the angles between its normals.
@@ -356,12 +372,17 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;
+    if ((w->kind == BOUNDARY_CUT) != (e->kind == EDGE_CUT)) {
+        return 0;
+    }
     if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || e->kind == EDGE_MARK)) {
         return 0;
     }
     switch (e->kind) {
     case EDGE_MEETING:
         return w->kind == BOUNDARY_PRIMARY ? see_meeting(r, &w->projection, e) : meeting_weight(r, e);
+    case EDGE_CUT:
+        return factor * triangle_area(view, e);
     case EDGE_MARK:
         return see_mark(r, &w->projection, e);
     case EDGE_TERMINATOR:
@@ -400,6 +421,7 @@ static rey_result find_edges(Render *r) {
     if (result == REY_OK) {
         result = rey_marks_find(r->scene, &steps, moves_on_film, r, &r->edges, &r->marks);
     }
+    result = result == REY_OK ? rey_cuts_find(r->scene, &r->edges) : result;
     rey_array_free(r->scene->ctx, &steps);
     return result;
 }

@@ -8,5 +8,8 @@
 // Whether a scattering function does, itself or inside.
 bool rey_cuts_within(const SceneView *view, int32_t bsdf);
 
+// Appends the triangles of meshes with such functions to `edges`, an Array of EdgeRecord.
+rey_result rey_cuts_find(rey_scene *scene, Array *edges);
+
 // Why a parameter's derivative lacks what moves along such planes; null where it does not. object: what it is about.
-const char *rey_cuts_gap(const rey_scene *scene, const Param *p, char object[OBJECT_NAME]);
+const char *rey_cuts_gap(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char object[OBJECT_NAME]);

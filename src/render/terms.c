@@ -132,9 +132,9 @@ static bool surfaces_read_volumes(const SceneView *view) {
     return false;
 }
 
-static rey_result check_cuts(rey_scene *scene, const Param *p) {
+static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
     char object[OBJECT_NAME];
-    const char *gap = rey_cuts_gap(scene, p, object);
+    const char *gap = rey_cuts_gap(scene, sensor, p, object);
     return gap ? rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                           "the gradient of %s needs a part of the term 'indirect' that does not exist yet: normal and bump maps "
                           "whose use_shadowing_function is off ('%s') %s. --terms interior gives the part that does", p->name,
@@ -185,7 +185,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
                             "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
                             "move look them up elsewhere", info.name);
         }
-        result = def->terms ? REY_OK : check_cuts(scene, p);
+        result = def->terms ? REY_OK : check_cuts(scene, scene->view.sensors + def->sensor, p);
         if (result != REY_OK) {
             return result;
         }
@@ -255,7 +255,7 @@ void rey_terms_book(Render *r, int set, int term, const double *picture) {
     int index = 0;
     for (; term >> index > 1; index++) {
     }
-    values[index] = sum - r->booked;
+    values[index] += sum - r->booked; // terms may have several parts
     r->booked = sum;
 }
 

@@ -6,8 +6,9 @@
 
 // EDGE_OUTLINE: of a sphere; EDGE_SIDE: one of the two lines that bound a cylinder for a viewer; EDGE_TERMINATOR: the curve in
 // a triangle along which its shading normal is at right angles to the viewer; EDGE_MEETING: a MeetingRecord (meetings.h);
-// EDGE_MARK: a MarkRecord (marks.h).
-enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TERMINATOR, EDGE_MEETING, EDGE_MARK };
+// EDGE_MARK: a MarkRecord (marks.h); EDGE_CUT: a triangle whose scattering function
+// cuts light off at the plane of its shading normal.
+enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TERMINATOR, EDGE_MEETING, EDGE_MARK, EDGE_CUT };
 enum { EDGE_OPEN = -1 };
 enum { EDGE_NONE = -1, EDGE_ANY = -2 };
 // EDGE_SOFT: only the plane does behind which rays start

@@ -7,7 +7,8 @@
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
-// along chains of smooth mirrors and glass (chained.h); and those that the camera sees along such chains (mirrored.h).
+// along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); and the planes
+// at which maps cut light off (turning.h).
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -16,6 +17,7 @@ enum {
     BOUNDARY_MEETING,
     BOUNDARY_CHAINED,
     BOUNDARY_MIRRORED,
+    BOUNDARY_CUT,
     BOUNDARY_KINDS
 };
 

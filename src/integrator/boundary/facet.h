@@ -10,13 +10,14 @@ typedef struct Facet {
     Vec3 p[3], n[3]; // corners and their normals in the world; normals of any length, on the side that shades
 } Facet;
 
-// Triangles of meshes with vertex normals in the lanes of m, of one of them in the others.
+// Triangles of meshes in the lanes of m, of one of them in the others; normals of those that have them at their vertices.
 static Facet facet_load(const SceneView *scene, const Hit *hit, Mask m) {
     Hit h = *hit;
     h.shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m))));
     h.prim = i_select(m, hit->prim, i_set(i_lane(hit->prim, m_first(m))));
     Corners c = mesh_corners(scene, h.shape, h.prim);
     Int positions = SHAPE_FIELD(scene, h.shape, positions), normals = SHAPE_FIELD(scene, h.shape, normals);
+    normals = i_select(mi_lt(i_set(-1), normals), normals, positions);
     Mask inside = m & mi_lt(i_set(-1), SHAPE_FIELD(scene, h.shape, collection));
     Mask flip = mi_lt(i_set(0), SHAPE_FIELD(scene, h.shape, flags) & SHAPE_FLIP_NORMALS);
     h.instance = i_select(inside, hit->instance, i_set(0));

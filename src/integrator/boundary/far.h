@@ -124,6 +124,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     case BOUNDARY_TERMINATOR:
         return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
     case BOUNDARY_HORIZON:
+    case BOUNDARY_CUT:
     case BOUNDARY_MEETING:
         return reflected;
     case BOUNDARY_CHAINED:

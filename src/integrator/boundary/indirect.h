@@ -8,17 +8,9 @@
 // NOT differentiated: edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/glimpse.h"
+#include "integrator/boundary/slide.h"
 
 // ---- the near side -----------------------------------------------------------------------------------------------
-
-// Where on its lens the sensor sees the near points of segments from.
-KFN Vec2 near_lens(const Indirect *in, Int slot) {
-    SampleKey key = slot_key(in->t, slot);
-    key.scramble = in->b->job.scramble;
-    Vec2 centre = {f_set(0.5f), f_set(0.5f)};
-    return sensor_has_lens(in->t->sensor) ? rng_2d(&key, DIMENSION_LENS) : centre;
-}
 
 // What a vertex that is seen at x, y brings to the derivative: to the picture, or times the film's adjoint to the segment.
 static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_t bounce, Mask m) {
@@ -117,14 +109,20 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     return collision_scatter(t, &v, &c, &key, bounce, v.m, -1, next_count);
 }
 
+// Whether particles start at the near points themselves.
+KFN bool segments_at_surface(const BoundaryJob *b) { return b->kind == BOUNDARY_HORIZON || b->kind == BOUNDARY_CUT; }
+
 static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order, int32_t count, int32_t bounce,
                           int32_t next_count) {
     const SceneView *scene = in->t->scene;
     Landing at;
     at.v = vertex_load(in->t, order, count, bounce);
     landing_look(in->t, group, &at);
-    if (in->b->kind == BOUNDARY_HORIZON && bounce == 0) {
+    if (segments_at_surface(in->b) && bounce == 0) {
         at.cosine = f_set(1); // is part of no weight of the segment's
+        if (in->b->kind == BOUNDARY_CUT) { // on the side that `factor` says
+            at.wl.z = f_copysign(f_set(1e-6f), real_gather(in->q.along, at.v.slot));
+        }
     }
     if (scene->has_media) {
         at.v.m = near_reaches(in->t, &at.v);
@@ -175,7 +173,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         if (t->scene->has_media) {
             near_place(t, q, k);
         }
-        if (in->b->kind == BOUNDARY_HORIZON) { // they are there
+        if (segments_at_surface(in->b)) { // they are there
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
             hit_store(t, k, &hit);
@@ -184,7 +182,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     t->active = q->count;
     t->current = 0;
     const bool media = t->scene->has_media;
-    t->placed = in->b->kind == BOUNDARY_HORIZON || media;
+    t->placed = segments_at_surface(in->b) || media;
     int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (media ? (int32_t)t->scene->media_count : 0);
     t->lobes = in->upstream ? q->lobe : NULL;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
@@ -220,47 +218,6 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
 }
 
 // ---- what moves --------------------------------------------------------------------------------------------------
-
-// Adds the adjoint of points that slide over their surfaces because the sensor sees them at fixed film positions.
-static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Vec2 lens, Sink *sink, Mask m) {
-    const Tracer *t = in->t;
-    const SceneView *scene = t->scene;
-    View view = view_make(scene, in->pinhole, t->sensor, lens);
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
-        const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_select(left, hit->shape, i_set(first)), group), i_set(id));
-        bool moves = t->job->live[id] & LIVE_MOTION;
-        if (!moves && !sink->any_camera) {
-            continue;
-        }
-        Hit h = *hit;
-        h.shape = i_select(mine, hit->shape, i_set(first));
-        h.prim = i_select(mine, hit->prim, i_set(0));
-        h.instance = i_select(mine, hit->instance, i_set(0));
-        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
-        Seen seen = view_see(&view, si.p);
-        Slide slide[2];
-        SurfaceAdj d = surface_adj_zero();
-        shape_slide(scene, group->shape_kind, group->shape_flags, &h, &si, slide);
-        d.p = dp;
-        Vec3 position = slide_adj(slide, seen.d, &d);
-        if (moves) {
-            d.p = v3_sub(d.p, position);
-            shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, &d, sink, mine);
-        }
-        if (sink->any_camera) {
-            RayAdj ray = {si.p, position, v3_zero()};
-            sensor_ray_adj(scene, t->sensor, seen.x, seen.y, view.lens, &ray, sink, mine);
-        }
-    }
-}
-
-KFN Float sink_taken(Sink *sink) {
-    Float d = sink->derivative;
-    sink->derivative = f_set(0);
-    return d;
-}
 
 // The share of the near points in the motion of the segments k..., after that of everything else.
 static void segments_near_adj(Indirect *in, int32_t k, const Hit *near, Vec3 dnear, Float seen, Float unseen, Sink *sink, Mask m) {
@@ -434,6 +391,35 @@ static void turnings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     segments_near_adj(in, k, &near, apart, seen, unseen, sink, m);
 }
 
+// The same where maps cut light off. The plane of the shading normal turns where x slides.
+static void cuts_move_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    bool forward = in->b->job.mode == MODE_FORWARD;
+    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(1) : f_load(q->unseen + k);
+    Mask m = m_first_n(q->count - k) & m_finite(seen + unseen);
+    Vec3 apart = v3_scale(record_v3(q->nx, q->ny, q->nz, k), f_load(q->behind + k));
+    Vec3 turned = v3_scale(record_v3(q->dx, q->dy, q->dz, k), f_load(q->along + k));
+    apart = v3_select(m, apart, v3_zero());
+    Hit x = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
+    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
+    Mask attached = m & mi_lt(i_set(-1), far.shape);
+    points_move_adj(in->t, &far, v3_scale(apart, forward ? f_set(1) : seen + unseen), v3_zero(), sink, attached);
+    Float common = forward ? sink_taken(sink) : f_set(0);
+    SurfaceAdj own = surface_adj_zero();
+    own.p = v3_scale(apart, -seen);
+    own.n = v3_select(m, v3_scale(turned, seen), v3_zero());
+    surfaces_slide_adj(in, &x, &own, lens, sink, m);
+    if (forward) {
+        f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
+    }
+    own.p = v3_scale(apart, -unseen);
+    own.n = v3_select(m, v3_scale(turned, unseen), v3_zero());
+    surfaces_move_adj(in->t, &x, &own, sink, m);
+    if (forward) {
+        f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
+    }
+}
+
 // The same of the two surfaces of meetings. Where near points are has no part in it.
 static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     const Segments *q = &in->q;
@@ -459,6 +445,8 @@ static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
         segments_move_adj(in, k, sink);
     } else if (in->b->kind == BOUNDARY_MEETING) {
         meetings_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_CUT) {
+        cuts_move_adj(in, k, sink);
     } else {
         turnings_move_adj(in, k, sink);
     }

@@ -4,7 +4,10 @@
 // because rays then start behind the surface; scattering goes by the shading normal and goes on. With r the distance,
 //   dI += integral dA_x dphi |n_g . w| (n' . w + n . (a' - x') / r) (L+ - L-) W        terminator, W the importance at a
 //   dI += integral dA_x dphi f |n_s . w| (n' . w + n . (b' - x') / r) L W              horizon, -L from below
-// over the points x of smooth meshes and the directions w at right angles to n. docs/derivations/boundary.md.
+// over the points x of meshes, for the first two smooth ones, and the directions w at right angles to n:
+// docs/derivations/boundary.md.
+// Cut: maps without a shadowing function scatter what comes from one side of the plane of the surface's own shading normal n
+// only, f with the cosine of the map's normal: as the horizon, f on either side.
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
 #pragma once
 
@@ -43,24 +46,34 @@ KFN Vec3 turning_cross(const SceneView *scene, const Facet *f, const Hit *hit, M
     return v3_select(flip, v3_neg(cross), cross);
 }
 
-static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Turning *out) {
-    const SceneView *scene = t->scene;
-    SampleKey key = slot_key(t, slot);
-    Vec2 at = rng_2d(&key, DIMENSION_EDGE_SEGMENT), way = rng_2d(&key, DIMENSION_SEGMENT_END);
-    Float choice = rng_1d(&key, DIMENSION_SEGMENT_LIGHT), probability, root = f_sqrt(1.0f - at.x);
-    Int e = edge_choose(b, choice, &probability);
+// A point of a random triangle; cross: normal times twice the area. Returns the shading normal.
+static Vec3 turning_point(const SceneView *scene, const BoundaryJob *b, const SampleKey *key, Turning *out, Vec3 *cross,
+                          Float *probability) {
+    Vec2 at = rng_2d(key, DIMENSION_EDGE_SEGMENT);
+    Int e = edge_choose(b, rng_1d(key, DIMENSION_SEGMENT_LIGHT), probability);
+    Float root = f_sqrt(1.0f - at.x);
     out->hit = (Hit){EDGE_FIELD(b, e, shape), EDGE_FIELD(b, e, prim), 1.0f - root, at.y * root, v3_zero(),
                      EDGE_FIELD(b, e, instance)};
     Facet f = facet_load(scene, &out->hit, m_set(true));
-    Vec3 cross = turning_cross(scene, &f, &out->hit, m_set(true)), shading = facet_at(f.n, out->hit.u, out->hit.v);
-    Float twice = v3_length(cross);
-    shading = v3_normalize(shading);
-    out->ng = v3_scale(cross, f_safe_rcp(twice));
+    *cross = turning_cross(scene, &f, &out->hit, m_set(true));
+    out->ng = v3_scale(*cross, f_safe_rcp(v3_length(*cross)));
     out->p = out->hit.p = facet_at(f.p, out->hit.u, out->hit.v);
-    bool horizon = b->kind == BOUNDARY_HORIZON;
-    Vec3 other = horizon ? shading : out->ng;
-    out->n = horizon ? out->ng : shading;
-    // The part of the other normal across this one; directions in proportion to their cosine with it.
+    Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(scene, out->hit.shape, flags) & SHAPE_HAS_NORMALS);
+    return v3_select(smooth, v3_normalize(facet_at(f.n, out->hit.u, out->hit.v)), out->ng);
+}
+
+// Any direction at right angles to n; returns what of the rest has no density, as turning_directions does.
+static Float cut_directions(Vec2 way, Turning *out) {
+    Frame around = frame_from_normal(out->n);
+    Float sine, cosine;
+    f_sincos(TWO_PI * way.x, &sine, &cosine);
+    out->d = v3_madd(v3_scale(around.s, cosine), sine, around.t);
+    return f_set(TWO_PI);
+}
+
+// In proportion to the cosine with the part of another normal across n; returns dphi over their density, of terminators times
+// |n_g . d|, which is the length of that part times that cosine; 0 where there is none.
+static Float turning_directions(Vec2 way, Vec3 other, bool horizon, Turning *out) {
     Vec3 across = v3_madd(other, -v3_dot(other, out->n), out->n);
     Float size = v3_length(across), rcp = f_safe_rcp(size);
     Vec3 x = v3_scale(across, rcp), y = v3_cross(out->n, x);
@@ -68,22 +81,34 @@ static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Tu
     Float share = f_select(outside, f_set(TURNING_OUTSIDE), f_set(1 - TURNING_OUTSIDE));
     Float sine = 2.0f * way.y - 1.0f, cosine = f_safe_sqrt(1.0f - sine * sine);
     out->d = v3_madd(v3_scale(x, f_select(outside, cosine, -cosine)), sine, y);
-    // dA dphi over densities: of dphi, cosine / 2. The terminator has the factor |n_g . d| = size cosine.
-    Float density = probability * share * (horizon ? 0.5f * cosine : f_set(0.5f));
-    out->weight = (horizon ? f_set(0.5f) : 0.5f * size) * twice * f_safe_rcp(density);
+    Float density = share * (horizon ? 0.5f * cosine : f_set(0.5f));
+    return f_zero_unless(m_gt(size, f_set(1e-6f)) & m_gt(density, f_set(0)), (horizon ? f_set(1) : size) * f_safe_rcp(density));
+}
+
+static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Turning *out) {
+    SampleKey key = slot_key(t, slot);
+    Vec2 way = rng_2d(&key, DIMENSION_SEGMENT_END);
+    Float probability;
+    Vec3 cross, shading = turning_point(t->scene, b, &key, out, &cross, &probability);
+    bool horizon = b->kind == BOUNDARY_HORIZON;
+    out->n = horizon ? out->ng : shading;
+    Float around = b->kind == BOUNDARY_CUT ? cut_directions(way, out)
+                                           : turning_directions(way, horizon ? shading : out->ng, horizon, out);
+    out->weight = 0.5f * v3_length(cross) * around * f_safe_rcp(probability);
     out->factor = f_set(1);
-    if (horizon) { // what comes from above or from below, each with its own distance
+    if (b->kind != BOUNDARY_TERMINATOR) { // what comes from above or from below, each with its own distance
         Mask above = m_lt(rng_1d(&key, DIMENSION_TURNING_SIDE), f_set(0.5f));
         out->factor = f_select(above, f_set(2), f_set(-2));
     }
-    out->m = m & m_gt(size, f_set(1e-6f)) & m_gt(probability, f_set(0)) & m_gt(density, f_set(0)) & m_finite(out->weight) &
-             m_gt(out->weight, f_set(0));
+    out->m = m & m_gt(probability, f_set(0)) & m_finite(out->weight) & m_gt(out->weight, f_set(0));
 }
 
 // Finds where the segments end and keeps those that do.
 static void turning_trace(Tracer *t, const Turning *s, bool horizon, Int number, Segments *q) {
     Float step = (1.0f + f_max(f_max(f_abs(s->p.x), f_abs(s->p.y)), f_abs(s->p.z))) * 9e-5f;
-    Float up = horizon ? s->factor : v3_dot(s->ng, s->d);
+    // Where both normals are the same, what comes from above n is above the surface.
+    Float up = v3_dot(s->ng, s->d);
+    up = f_select(m_gt(f_abs(up), f_set(horizon ? 1e-4f : 0)), up, s->factor);
     Ray ray = {v3_madd(s->p, f_copysign(step, up), s->ng), s->d, f_set(INFINITY)};
     t->job->rays += m_count(s->m);
     Hit end = trace_closest(t->scene, &ray, s->m, false);
@@ -121,7 +146,7 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {
-            turning_trace(t, &s, b->kind == BOUNDARY_HORIZON, i_iota() + i, q);
+            turning_trace(t, &s, b->kind != BOUNDARY_TERMINATOR, i_iota() + i, q);
         }
     }
 }
