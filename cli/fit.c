@@ -278,6 +278,31 @@ static char *command_text(int argc, char **argv) {
     return text;
 }
 
+// An entry that -D, --load or --spp stands for is told as what the user wrote.
+static void name_option(const Options *o, rey_context *ctx, rey_result code, const char *entry) {
+    char message[2048], prefix[256], option[512] = "";
+    snprintf(message, sizeof message, "%s", rey_error(ctx));
+    int length = snprintf(prefix, sizeof prefix, "--set %.200s: ", entry);
+    if (strncmp(message, prefix, (size_t)length)) {
+        return;
+    }
+    if (!strncmp(entry, "load=", 5) && o->load_count) {
+        snprintf(option, sizeof option, "--load %s", o->loads[0]);
+    }
+    for (int i = 0; i < o->define_count && !strncmp(entry, "defines.", 8); i++) {
+        size_t name = strlen(o->defines[i].name);
+        if (!strncmp(entry + 8, o->defines[i].name, name) && entry[8 + name] == '=') {
+            snprintf(option, sizeof option, "-D %s=%s", o->defines[i].name, o->defines[i].value);
+        }
+    }
+    if (!strncmp(entry, "spp=", 4) && o->spp) {
+        snprintf(option, sizeof option, "--spp %d", o->spp);
+    }
+    if (option[0]) {
+        rey_fail(ctx, code, "%s: %s", option, message + length);
+    }
+}
+
 static int run(const Options *options, Session *session, const char *command) {
     int override_count = 0;
     char **overrides = job_overrides(options, &override_count);
@@ -299,6 +324,15 @@ static int run(const Options *options, Session *session, const char *command) {
     FitResult result;
     rey_result code = rey_fit(session->ctx, &def, &result);
     int status = EXIT_OK;
+    for (int i = 0; i < override_count && code; i++) { // those of --set come in between: their texts are the user's own
+        bool set = false;
+        for (int k = 0; k < options->set_count; k++) {
+            set = set || !strcmp(overrides[i], options->sets[k]);
+        }
+        if (!set) {
+            name_option(options, session->ctx, code, overrides[i]);
+        }
+    }
     if (display.terminal) {
         fprintf(stderr, "\r\033[K");
     }

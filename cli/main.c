@@ -3,8 +3,11 @@
 
 #include "base/context.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #define DIRECTION_NOTES                                                                                                \
     "\nA direction P is NAME[:OP]. Names are listed by 'reynolds params'; a * in NAME stands for any text: for the\n"  \
@@ -104,8 +107,19 @@ static int unknown_word(const char *word, bool as_json) {
     return EXIT_USAGE;
 }
 
+// A stream that the caller closed would be the next file that is opened, and words would go into it. What stands in its place
+// can be neither read nor written.
+static void hold_streams(void) {
+    for (int i = STDIN_FILENO; i <= STDERR_FILENO; i++) {
+        if (fcntl(i, F_GETFD) == -1 && errno == EBADF && open("/dev/null", i == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) {
+            return; // the lowest number that is free is this one
+        }
+    }
+}
+
 int main(int argc, char **argv) {
     cli_seconds_total();
+    hold_streams();
     if (argc < 2) {
         print_help(stderr);
         return EXIT_USAGE;

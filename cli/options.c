@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum {
     RENDERS = 1 << COMMAND_RENDER | 1 << COMMAND_GRAD | 1 << COMMAND_CHECK,
@@ -136,6 +137,23 @@ static bool parse_terms(Options *o, const char *text) {
         return false;
     }
     o->terms |= terms;
+    return true;
+}
+
+static bool parse_load(Options *o, const char *text) {
+    static const char *const pictures[] = {".npy", ".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".bmp"};
+    const char *equals = strchr(text, '='), *dot = strrchr(text, '.');
+    if (!text[0] || equals == text || (equals && !equals[1])) {
+        cli_usage_error(o, "--load: expected FILE.xml or NAME=FILE, got '%s'", text);
+        return false;
+    }
+    for (size_t i = 0; i < sizeof pictures / sizeof *pictures && !equals && dot; i++) {
+        if (!strcasecmp(dot, pictures[i])) {
+            cli_usage_error(o, "--load: whose values are in '%s'? expected NAME=%s", text, text);
+            return false;
+        }
+    }
+    o->loads[o->load_count++] = text;
     return true;
 }
 
@@ -323,8 +341,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_STEP:
         return parse_step(o, value);
     case OPTION_LOAD:
-        o->loads[o->load_count++] = value;
-        return true;
+        return parse_load(o, value);
     case OPTION_SET:
         return parse_set(o, value);
     default:
@@ -389,6 +406,10 @@ static bool add_file(Options *o, const char *text) {
     static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     if (o->file_count >= most[o->command]) {
         cli_usage_error(o, "unexpected argument '%s'", text);
+        return false;
+    }
+    if (!text[0]) {
+        cli_usage_error(o, "the name of a file is empty");
         return false;
     }
     o->files[o->file_count++] = text;

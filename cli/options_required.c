@@ -33,7 +33,9 @@ static bool is_scene_name(const char *path) {
 bool cli_options_required(const Options *o) {
     static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     Command c = o->command;
-    if (o->file_count < needed[c]) {
+    if (o->output && !o->output[0]) {
+        cli_usage_error(o, "-o: the name is empty");
+    } else if (o->file_count < needed[c]) {
         cli_usage_error(o, "%s", missing_file(c, o->file_count));
     } else if (o->all && o->param_count) {
         cli_usage_error(o, "--all and --param: give one of them");
@@ -41,14 +43,14 @@ bool cli_options_required(const Options *o) {
         cli_usage_error(o, "--param is missing");
     } else if (o->variance && (o->reverse || !o->output || !strcmp(o->output, "-"))) {
         cli_usage_error(o, "--variance is of forward mode and needs -o with the name of a file");
-    } else if (c == COMMAND_GRAD && o->reverse && !o->adjoint) {
+    } else if (c == COMMAND_GRAD && o->reverse && (!o->adjoint || !o->adjoint[0])) {
         cli_usage_error(o, "--mode reverse needs --adjoint");
     } else if (c == COMMAND_GRAD && o->reverse && is_nonfinite(o->adjoint)) {
         cli_usage_error(o, "--adjoint: '%s' is not a finite number; a file of that name is ./%s", o->adjoint, o->adjoint);
     } else if (c == COMMAND_GRAD && !o->reverse && o->adjoint) {
         cli_usage_error(o, "--adjoint needs --mode reverse");
-    } else if (c == COMMAND_GRAD && o->reverse && o->output && !strcmp(o->output, "-")) {
-        cli_usage_error(o, "reverse mode writes a folder, -o - is not one");
+    } else if (((c == COMMAND_GRAD && o->reverse) || c == COMMAND_FIT) && o->output && !strcmp(o->output, "-")) {
+        cli_usage_error(o, "%s writes a folder, -o - is not one", c == COMMAND_FIT ? "a fit" : "reverse mode");
     } else if (c == COMMAND_GRAD && o->reverse && o->output && cli_image_format(o->output) != IMAGE_UNKNOWN) {
         cli_usage_error(o, "reverse mode writes a folder of .npy files, -o %s names a picture", o->output);
     } else if ((c == COMMAND_RENDER || (c == COMMAND_GRAD && !o->reverse)) && o->output &&

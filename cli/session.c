@@ -219,8 +219,8 @@ int cli_session_open(const Options *options, const char *label, Session *session
         rey_scene_get_info(session->scene, &info);
         status = cli_interrupted() ? cli_report_failure(options, session->ctx, REY_ERROR_CANCELLED)
                  : info.sensors > 0 && options->sensor >= info.sensors
-                     ? cli_usage_error(options, "--sensor: the scene has the sensors 0 to %d, got %d", (int)info.sensors - 1,
-                                       options->sensor)
+                     ? cli_usage_error(options, "--sensor: the scene has %d sensor%s, counted from 0, got %d", (int)info.sensors,
+                                       PLURAL(info.sensors), options->sensor)
                      : cli_report(options, session->ctx, result);
         cli_session_close(session);
         return status;

@@ -72,7 +72,10 @@ static rey_result look_at_checkpoint(Fit *fit) {
 static rey_result resume(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin"), *job = rey_fit_output_path(fit, "job.resolved.yaml");
     rey_result result = path && job ? REY_OK : REY_ERROR_MEMORY;
-    if (!result && (access(path, F_OK) == 0 || access(job, F_OK) != 0)) {
+    if (!result && access(path, F_OK) != 0 && access(job, F_OK) != 0) {
+        result = rey_fail(fit->ctx, REY_ERROR_IO, "%s: this folder holds no fit to resume", fit->output);
+    }
+    if (!result && access(path, F_OK) == 0) {
         result = rey_checkpoint_read(path, (FitOrigin){fit->flat, fit->inputs}, &fit->unknowns, &fit->state);
     }
     rey_free(fit->ctx, path);

@@ -29,6 +29,9 @@ rey_result rey_fit_make_folder(rey_context *ctx, const char *path) {
 
 // The lock is the system's: it ends with the process, however that ends. Some network file systems have none.
 static rey_result lock_folder(Fit *fit) {
+    if (fit->def->resume && access(fit->output, F_OK) != 0) {
+        return rey_fail(fit->ctx, REY_ERROR_IO, "%s: there is no such folder, and so no fit to resume", fit->output);
+    }
     int folder = open(fit->output, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (folder < 0) {
         return rey_fail(fit->ctx, REY_ERROR_IO, "%s: cannot open this folder: %s", fit->output, strerror(errno));

@@ -333,6 +333,13 @@ static rey_result check_lbfgs(Job *job) {
 rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
                                const char *const *overrides, int override_count, Job *job) {
     *job = (Job){.ctx = ctx, .path = path};
+    size_t blank = 0;
+    while (blank < size && strchr(" \t\r\n\xef\xbb\xbf", bytes[blank]) && bytes[blank]) {
+        blank++;
+    }
+    if (blank < size && bytes[blank] == '<') {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: this is XML, as scenes are; expected a job, whose key 'scene' names one", path);
+    }
     rey_result result = rey_yaml_read(ctx, path, bytes, size, &job->tree);
     for (int i = 0; i < override_count && !result; i++) {
         result = rey_yaml_override(ctx, job->tree, overrides[i]);

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 NAMES(rey_parameterisation_name, "identity", "log", "logit", "softplus", "rigid", "similarity", "laplacian",
       "scattering", "simplex")
@@ -36,6 +37,13 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     JobParameter *parameter = target;
     double value;
     parameter->start_at = rey_job_place(node);
+    static const char *const infinite[] = {"nan", ".nan", "inf", ".inf", "-inf", "-.inf", "infinity", "-infinity"};
+    for (int i = 0; i < COUNT_OF(infinite) && node->kind == YAML_SCALAR && node->text; i++) {
+        if (!strcasecmp(node->text, infinite[i])) {
+            return rey_job_fail(job, node, "start: %s, expected a finite number; a file of this name is './%s'", node->text,
+                                node->text);
+        }
+    }
     if (node->kind == YAML_SCALAR && !rey_job_is_real(node, &value)) {
         return rey_job_read_text(job, node, &parameter->start_file);
     }

@@ -114,7 +114,7 @@ rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count) {
     char *line;
     rey_result result = rey_text_take(&t, &line);
     if (!result && (fputs(line, fit->metrics) < 0 || fflush(fit->metrics))) {
-        result = rey_fail(fit->ctx, REY_ERROR_IO, "%s/metrics.jsonl: cannot write", fit->output);
+        result = rey_fail(fit->ctx, REY_ERROR_IO, "%s/metrics.jsonl: cannot write: %s", fit->output, strerror(errno));
     }
     rey_free(fit->ctx, line);
     return result ? result : put_scalars(fit, step, row);

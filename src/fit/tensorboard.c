@@ -6,6 +6,7 @@
 #include "io/image.h"
 
 #include <stdio.h>
+#include <errno.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -91,7 +92,8 @@ static rey_result write_event(TensorBoard *board, Message *event) {
                        fwrite(&head, sizeof head, 1, board->file) == 1 &&
                        fwrite(event->bytes.data, 1, length, board->file) == length &&
                        fwrite(&tail, sizeof tail, 1, board->file) == 1 && !fflush(board->file);
-        result = written ? REY_OK : rey_fail(board->ctx, REY_ERROR_IO, "%s: cannot write", board->path);
+        result = written ? REY_OK : rey_fail(board->ctx, REY_ERROR_IO, "%s: cannot write: %s", board->path,
+                                                 strerror(errno));
     }
     rey_array_free(board->ctx, &event->bytes);
     return result;

@@ -11,6 +11,8 @@ enum { DEEPEST = 32, MOST_KEYS = 4096 };
 typedef struct Reader {
     rey_context *ctx;
     const char *name;
+    const unsigned char *bytes; // all of the text
+    size_t size;
     const char *override; // "key=value" that the text comes from: lines are 0; null = from a file
     yaml_parser_t parser;
     yaml_event_t event;
@@ -26,6 +28,17 @@ static rey_result fail_at(const Reader *r, int line, const char *message) {
                        : rey_fail(r->ctx, REY_ERROR_FORMAT, "%s:%d: %s", r->name, line, message);
 }
 
+// Whether the indentation of a line, from 0, has a tab, which the format does not allow and no editor shows.
+static bool has_tab(const Reader *r, size_t line) {
+    const unsigned char *at = r->bytes, *end = r->bytes + r->size;
+    for (; at < end && line > 0; at++) {
+        line -= *at == '\n';
+    }
+    for (; at < end && *at == ' '; at++) {
+    }
+    return at < end && *at == '\t';
+}
+
 static rey_result next_event(Reader *r) {
     yaml_event_delete(&r->event);
     if (yaml_parser_parse(&r->parser, &r->event)) {
@@ -35,7 +48,9 @@ static rey_result next_event(Reader *r) {
     if (r->parser.error == YAML_MEMORY_ERROR) {
         return rey_fail_memory(r->ctx, 0);
     }
-    return fail_at(r, (int)r->parser.problem_mark.line + 1, r->parser.problem ? r->parser.problem : "malformed YAML");
+    const char *problem = r->parser.problem ? r->parser.problem : "malformed YAML";
+    problem = has_tab(r, r->parser.problem_mark.line) ? "a tab in the indentation, expected spaces" : problem;
+    return fail_at(r, (int)r->parser.problem_mark.line + 1, problem);
 }
 
 static rey_result fail_here(Reader *r, const char *message) {
@@ -191,7 +206,7 @@ static rey_result read_document(Reader *r, YamlNode **out) {
 
 static rey_result read_text(rey_context *ctx, const char *name, const char *override, const unsigned char *bytes, size_t size,
                             YamlNode **out) {
-    Reader r = {.ctx = ctx, .name = name, .override = override};
+    Reader r = {.ctx = ctx, .name = name, .override = override, .bytes = bytes, .size = size};
     *out = NULL;
     if (!yaml_parser_initialize(&r.parser)) {
         return rey_fail_memory(ctx, sizeof r.parser);

@@ -164,9 +164,11 @@ static rey_result run_parser(XmlFile *file) {
             result = file->reader->result;
             if (!result) {
                 enum XML_Error error = XML_GetErrorCode(file->parser);
+                bool other = XML_GetErrorByteIndex(file->parser) < 8 && error != XML_ERROR_NO_ELEMENTS;
+                const char *hint = other ? "; a scene begins with <scene version=\"3.0.0\">" : "";
                 result = error == XML_ERROR_NO_MEMORY ? rey_fail_memory(ctx, 0)
                                                       : rey_xml_fail(ctx, parser_position(file), REY_ERROR_FORMAT,
-                                                                     "not well-formed XML: %s", XML_ErrorString(error));
+                                                                     "not well-formed XML: %s%s", XML_ErrorString(error), hint);
             }
         }
         if (last) {

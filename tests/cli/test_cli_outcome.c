@@ -212,6 +212,41 @@ static void terminations_are_interruptions(void **state) {
     }
 }
 
+// A stream that is closed is no place for a file: no word goes into what a fit writes.
+static void closed_streams_stay_closed(void **state) {
+    Fixture *f = *state;
+    char command[1024];
+    write_job(f, "iterations: 1\n");
+    snprintf(command, sizeof command, "rm -rf closed; '%s' fit job.yaml -o closed <&- >&- 2>&-", REYNOLDS_COMMAND);
+    int status = system(command);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 1); // the table was not delivered
+    assert_int_equal(access("closed/report.html", R_OK), 0);
+    assert_int_equal(system("! grep -rq 'iteration 1/1\\|making the table' closed"), 0);
+}
+
+// Files of another kind, and what the user wrote.
+static void mistakes_are_recognised(void **state) {
+    Fixture *f = *state;
+    write_job(f, "iterations: 1\n");
+    write_words("tab.yaml", "scene: a.xml\nviews:\n\t- {target: a.exr}\n");
+    expect_words(f, 1, "fit tab.yaml", "tab.yaml:3: a tab in the indentation, expected spaces");
+    expect_words(f, 1, "fit %s", "this is XML, as scenes are; expected a job, whose key 'scene' names one");
+    expect_words(f, 1, "render job.yaml -o a.exr", "a scene begins with <scene version=");
+    expect_words(f, 2, "render '' -o a.exr", "the name of a file is empty");
+    expect_words(f, 2, "fit job.yaml -o ''", "-o: the name is empty");
+    expect_words(f, 2, "fit job.yaml -o -", "a fit writes a folder");
+    expect_words(f, 1, "fit job.yaml -o nowhere --resume", "nowhere: there is no such folder, and so no fit to resume");
+    assert_int_equal(system("mkdir -p no_fit"), 0);
+    expect_words(f, 1, "fit job.yaml -o no_fit --resume", "no_fit: this folder holds no fit to resume");
+    expect_words(f, 2, "fit job.yaml -D blue=1", "-D blue=1: ");
+    expect_words(f, 2, "fit job.yaml --spp 1", "--spp 1: spp = 1, expected 2 to");
+    expect_words(f, 1, "fit job.yaml --load no.xml", "--load no.xml: ");
+    expect_words(f, 2, "fit job.yaml --set defines.blue=1", "--set defines.blue=1: ");
+    expect_words(f, 2, "fit job.yaml --set parameters.0.start=nan", "start: nan, expected a finite number");
+    expect_words(f, 2, "render %s -o a.exr --load target.exr", "whose values are in 'target.exr'? expected NAME=target.exr");
+    expect_words(f, 2, "render %s -o a.exr --load red.reflectance.value=", "expected FILE.xml or NAME=FILE");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses_are_explained),
@@ -221,6 +256,8 @@ int main(void) {
         cmocka_unit_test(rows_of_check_stand_once),
         cmocka_unit_test(infos_say_what_is_missing),
         cmocka_unit_test(terminations_are_interruptions),
+        cmocka_unit_test(closed_streams_stay_closed),
+        cmocka_unit_test(mistakes_are_recognised),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

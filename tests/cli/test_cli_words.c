@@ -108,7 +108,7 @@ static void places_of_jobs_are_told(void **state) {
     expect_words(f, 1, "fit job.yaml -o fit --set views.0.target=no.exr", "--set views.0.target=no.exr: " TEST_JOBS "/no.exr");
     expect_words(f, 2, "fit job.yaml -o fit --set views.0.target=start.xml", "--set views.0.target=start.xml: " TEST_JOBS);
     expect_words(f, 1, "fit job.yaml -o fit --set scene=no.xml", "--set scene=no.xml: " TEST_JOBS "/no.xml: cannot open the scene");
-    expect_words(f, 2, "fit job.yaml -o fit --spp 1", "--set spp=1: spp = 1, expected 2 to 65536");
+    expect_words(f, 2, "fit job.yaml -o fit --spp 1", "--spp 1: spp = 1, expected 2 to 65536");
     expect_words(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
     expect_words(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
     expect_words(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
