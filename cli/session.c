@@ -66,8 +66,10 @@ bool cli_progress_step(void *user, double fraction) {
     }
     if (p->visible && now - p->shown > 0.2) {
         double done = (p->part + fraction) / p->parts;
-        double left = done > 0 ? (now - p->start) * (1 - done) / done : 0;
-        fprintf(stderr, "\r\033[K%s %3.0f %%  %.0f s left", p->label, 100 * done, left);
+        fprintf(stderr, "\r\033[K%s %3.0f %%", p->label, 100 * done);
+        if (done > 0) {
+            fprintf(stderr, "  %.0f s left", (now - p->start) * (1 - done) / done);
+        }
         p->shown = now;
     }
     return !cli_interrupted();

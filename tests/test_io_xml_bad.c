@@ -160,7 +160,7 @@ static void test_wrong_kinds(void **state) {
     assert_int_equal(rey_xml_get_colour(ctx, bsdf, "c", REY_COLOUR_UNBOUNDED, zero, v), REY_OK);
     assert_int_equal(rey_xml_get_colour(ctx, bsdf, "n", REY_COLOUR_EMISSION, zero, v), REY_ERROR_SCENE);
     assert_int_equal(rey_xml_get_ior(ctx, bsdf, "s", "air", v), REY_ERROR_SCENE);
-    assert_non_null(strstr(rey_error(ctx), "unknown material 'bk8' of 's', expected a number or a material's name, "
+    assert_non_null(strstr(rey_error(ctx), "unknown material 'bk8' of 's', expected a number or a material's name such as 'bk7', "
                                            "did you mean 'bk7'?"));
     assert_int_equal(rey_xml_get_ior(ctx, bsdf, "n", "air", v), REY_ERROR_SCENE);
     assert_int_equal(rey_xml_get_ior(ctx, bsdf, "none", "Air", v), REY_OK);

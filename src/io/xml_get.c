@@ -223,7 +223,7 @@ rey_result rey_xml_get_ior(rey_context *ctx, const rey_xml_node *node, const cha
     const char *word = property ? property->string : otherwise;
     if (!rey_named_ior(word, out)) {
         return rey_xml_fail_word(ctx, property ? property->at : node->at, word, rey_named_ior_name, NULL,
-                                 "unknown material '%.100s' of '%s', expected a number or a material's name", word,
+                                 "unknown material '%.100s' of '%s', expected a number or a material's name such as 'bk7'", word,
                                  name);
     }
     return REY_OK;
