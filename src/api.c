@@ -80,8 +80,8 @@ rey_result rey_scene_film_size(const rey_scene *scene, int sensor, int *width, i
                                                      "type=\"perspective\">", rey_mitsuba_file(scene));
     }
     if (sensor < 0 || sensor >= scene->view.sensors_count) {
-        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", sensor,
-                        (int)scene->view.sensors_count);
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d, counted from 0",
+                        sensor, (int)scene->view.sensors_count);
     }
     *width = scene->view.sensors[sensor].crop_width;
     *height = scene->view.sensors[sensor].crop_height;

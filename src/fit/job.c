@@ -118,6 +118,8 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
                      : rey_job_fail(job, entry, "views: expected entries such as {sensor: 0, target: photo.exr}");
         if (!result) {
             view->target_at = rey_job_place(rey_yaml_find(entry, "target"));
+            const YamlNode *sensor = rey_yaml_find(entry, "sensor");
+            view->sensor_at = sensor ? rey_job_place(sensor) : view->at;
             view->mask_at = rey_job_place(rey_yaml_find(entry, "mask"));
             job->fitted_count += !view->held_out;
         }

@@ -40,7 +40,7 @@ typedef struct JobView {
     double weight;      // of this view in the loss
     double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
     int held_out;       // not fitted: the report says how well it is predicted
-    JobPlace at, target_at, mask_at;
+    JobPlace at, sensor_at, target_at, mask_at;
 } JobView;
 
 typedef struct JobParameter {

@@ -336,8 +336,8 @@ rey_result rey_fit_check_truth(Fit *fit) {
         result = check_films(fit, truth);
     }
     rey_scene_destroy(truth);
-    // What cannot be read is told at the end: until then it may come, and nothing that is found depends on it.
-    return truth || result == REY_ERROR_MEMORY ? result : REY_OK;
+    // A file that is missing is told at the end: until then it may come, and nothing that is found depends on it.
+    return result == REY_ERROR_IO ? REY_OK : result;
 }
 
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {

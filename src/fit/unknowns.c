@@ -15,6 +15,10 @@ static rey_result fail_at(Job *job, const JobParameter *p, const char *name, con
     return rey_job_fail_at(job, p->at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
 }
 
+static rey_result fail_start_at(Job *job, const JobParameter *p, const char *name, const char *why) {
+    return rey_job_fail_at(job, p->start_at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
+}
+
 // Which numbers are allowed, from the job and from the parameter itself.
 static rey_result set_bounds(Job *job, const JobParameter *p, const rey_param_info *info, Unknown *unknown) {
     bool given = !isnan(p->bounds[0]);
@@ -60,13 +64,13 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
             }
             snprintf(why, sizeof why, "%s holds %d x %d x %d numbers, expected %s", p->start_file, image.height,
                      image.width, image.channels, shape);
-            result = fail_at(job, p, unknown->name, why);
+            result = fail_start_at(job, p, unknown->name, why);
         } else {
             memcpy(start, image.data, (size_t)count * sizeof *start);
         }
         for (int64_t i = 0; i < count && !result; i++) {
             if (!isfinite(start[i])) {
-                result = fail_at(job, p, unknown->name, "the start file holds a value that is not finite");
+                result = fail_start_at(job, p, unknown->name, "the start file holds a value that is not finite");
             }
         }
     }
@@ -92,7 +96,7 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
         char why[128];
         snprintf(why, sizeof why, "start holds %d numbers, expected %s%lld", p->start_count,
                  unknown->count > 1 ? "1 or " : "", (long long)unknown->count);
-        return fail_at(job, p, unknown->name, why);
+        return fail_start_at(job, p, unknown->name, why);
     }
     for (int64_t i = 0; i < unknown->count; i++) { // shorter lists repeat: a colour for every texel
         start[i] = (float)p->start[i % p->start_count];

@@ -63,7 +63,7 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
     *view = (FitView){.sensor = job_view->sensor, .weight = job_view->weight};
     rey_result result = rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height);
     if (result) {
-        return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_FORMAT, "%s", rey_error(fit->ctx));
+        return rey_job_fail_at(&fit->job, job_view->sensor_at, REY_ERROR_FORMAT, "%s", rey_error(fit->ctx));
     }
     rey_image image = {0};
     result = load_picture(fit, job_view->target_at, view, job_view->target, &image);

@@ -93,6 +93,9 @@ static void mistakes_are_told_at_the_start(void **state) {
     write_job(f, "iterations: 2\ntruth: {scene: nowhere.xml}\n"); // which may come until then
     expect_words(f, 1, "fit job.yaml -o late", "nowhere.xml: cannot open");
     assert_int_equal(access("late/report.html", R_OK), 0);
+    write_words("broken.xml", "<scene version='3.0.0'><shape type='spehre'/></scene>");
+    expect_words(f, 1, "fit job.yaml -o broken --set truth.scene=broken.xml", "broken.xml:1:24: there is no shape 'spehre'");
+    assert_int_not_equal(access("broken/metrics.jsonl", F_OK), 0);
     write_job(f, "iterations: 2\n");
     expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.7.exposure]'", "the job has no view 7, expected 0");
     expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.1.exposure]' --set 'views.1={sensor: 0, target: target.exr, "
@@ -243,6 +246,8 @@ static void mistakes_are_recognised(void **state) {
     expect_words(f, 1, "fit job.yaml --load no.xml", "--load no.xml: ");
     expect_words(f, 2, "fit job.yaml --set defines.blue=1", "--set defines.blue=1: ");
     expect_words(f, 2, "fit job.yaml --set parameters.0.start=nan", "start: nan, expected a finite number");
+    expect_words(f, 2, "fit job.yaml --set parameters.0.start=[1,2]", "--set parameters.0.start=[1,2]: parameter 'red.reflec");
+    expect_words(f, 2, "fit job.yaml --set parameters.0.start=target.exr", "--set parameters.0.start=target.exr: par");
     expect_words(f, 2, "render %s -o a.exr --load target.exr", "whose values are in 'target.exr'? expected NAME=target.exr");
     expect_words(f, 2, "render %s -o a.exr --load red.reflectance.value=", "expected FILE.xml or NAME=FILE");
 }
