@@ -217,7 +217,7 @@ static void test_errors(void **state) {
         {"views=[{target: target_0.exr, held_out: true}]", "all are held out"},
         {"views.0.held_out=maybe", "unknown value 'maybe'"},
         {"views_per_iteration=3", "the job has 2 views that are not held out"},
-        {"parameters.1.name=views.2.exposure", "has none of this name"},
+        {"parameters.1.name=views.2.exposure", "view 2 is held out"},
     };
     for (int i = 0; i < COUNT_OF(cases); i++) {
         FitResult result;
