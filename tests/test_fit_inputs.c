@@ -209,6 +209,14 @@ static void test_own_result_is_no_scene(void **state) {
         assert_non_null(strstr(rey_error(f->ctx), "it would be lost"));
         assert_true(stands(f, "out/recovered.xml"));
     }
+    // nor is a scene that reads a picture there
+    assert_int_equal(write_scene(f, "reads.xml", 4, "0.3", "0.5"), 0);
+    char command[256];
+    snprintf(command, sizeof command, "sed -i 's:floor.png:out/recovered_data/floor.png:' '%s/reads.xml'", f->folder);
+    assert_int_equal(system(command), 0);
+    assert_int_equal(run_fit(f, OVERWRITE, 1, "scene=reads.xml"), REY_ERROR_ARGUMENT);
+    assert_non_null(strstr(rey_error(f->ctx), "out/recovered_data/floor.png, which the former fit wrote"));
+    assert_true(stands(f, "out/recovered_data/floor.png"));
 }
 
 int main(void) {

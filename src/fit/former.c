@@ -2,6 +2,7 @@
 #include "fit/former.h"
 
 #include "io/file.h"
+#include "io/mitsuba.h"
 
 #include <dirent.h>
 #include <limits.h>
@@ -152,10 +153,32 @@ rey_result rey_former_refuse_inputs(Fit *fit) {
     return REY_OK;
 }
 
+// The start is read again for the table and the report, with its meshes and pictures.
+static rey_result refuse_data(Fit *fit) {
+    static const char *const names[] = {"recovered_data/", "level_"};
+    char folder[PATH_MAX], beginning[PATH_MAX + 32], *file = NULL;
+    rey_result result = REY_OK;
+    for (int i = 0; i < COUNT_OF(names) && !result && realpath(fit->output, folder); i++) {
+        snprintf(beginning, sizeof beginning, "%s/%s", folder, names[i]);
+        result = rey_mitsuba_reads(fit->scene, beginning, &file);
+        if (file) {
+            result = rey_job_fail_at(&fit->job, fit->job.scene_at, REY_ERROR_PARAM, "%s reads %s, which the former fit wrote and "
+                                     "--overwrite removes; copy the scene with 'reynolds convert', or use another -o",
+                                     fit->job.scene, file);
+        }
+        rey_free(fit->ctx, file);
+        file = NULL;
+    }
+    return result;
+}
+
 rey_result rey_former_remove(Fit *fit) {
     static const char *const files[] = {"report.html", "metrics.jsonl", "events.out.tfevents.#.*"};
     char *frames = rey_fit_output_path(fit, "frames");
-    rey_result result = frames ? remove_scene(fit, "recovered") : REY_ERROR_MEMORY;
+    rey_result result = frames ? refuse_data(fit) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = remove_scene(fit, "recovered");
+    }
     if (!result) {
         result = remove_levels(fit);
     }

@@ -1,7 +1,10 @@
-// kinds_used.c: which plugins a scene uses, and how often.
+// kinds_used.c: which plugins a scene uses, and how often; which files it reads.
 #include "io/build.h"
 #include "io/mitsuba.h"
+#include "io/xml_parts.h"
 
+#include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 
 static KindCount *find(const Array *counts, const rey_xml_node *node) {
@@ -32,6 +35,26 @@ rey_result rey_mitsuba_kinds(const rey_scene *scene, Array *counts) {
             if (c) {
                 c->count++;
             }
+        }
+    }
+    return REY_OK;
+}
+
+rey_result rey_mitsuba_reads(const rey_scene *scene, const char *beginning, char **out) {
+    const SceneSource *source = scene->document;
+    size_t length = strlen(beginning);
+    *out = NULL;
+    for (int i = 0; source && i < rey_xml_node_count(source->document) && !*out; i++) {
+        const rey_xml_property *p = rey_xml_find(rey_xml_node_at(source->document, i), "filename");
+        char *path = NULL, real[PATH_MAX];
+        if (!p || p->kind != REY_XML_STRING_VALUE) {
+            continue;
+        }
+        TRY(rey_xml_search(scene->ctx, source->document, NULL, p->string, &path));
+        if (path && realpath(path, real) && !strncmp(real, beginning, length)) {
+            *out = path;
+        } else {
+            rey_free(scene->ctx, path);
         }
     }
     return REY_OK;

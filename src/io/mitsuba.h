@@ -25,5 +25,9 @@ typedef struct KindCount {
     int count;                   // objects, each once however often it is referred to
 } KindCount;
 
+// A file of meshes, pictures and the like that a scene reads and whose path begins so, symbolic links followed; null when there is
+// none. The caller frees *out with rey_free.
+rey_result rey_mitsuba_reads(const rey_scene *scene, const char *beginning, char **out);
+
 // Of KindCount, ordered by tag; the caller frees it with rey_array_free.
 rey_result rey_mitsuba_kinds(const rey_scene *scene, Array *counts);
