@@ -55,6 +55,23 @@ bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BU
 // Of TURNED_CONFIG the second switch.
 bool rey_bsdf_cuts(const BsdfNode *node) { return rey_bsdf_turns(node->kind) && !node->config[1]; }
 
+bool rey_bsdf_oriented(const SceneView *view, const BsdfNode *node) {
+    const BsdfKind *kind = rey_bsdf_kinds + node->kind;
+    bool oriented = rey_bsdf_turns(node->kind);
+    for (int k = 0; k < kind->param_count; k++) {
+        const ParamDesc *p = kind->params + k;
+        const TextureNode *t = node->slot[k] >= 0 ? view->textures + node->slot[k] : NULL;
+        bool none = t && t->kind == TEXTURE_CONSTANT && view->theta[t->theta] == 0;
+        oriented |= p->type == PARAM_ALPHA_V && node->slot[k] != node->slot[k - 1]; // "alpha" fills both
+        oriented |= t && !none && strcmp(p->name, "anisotropic") == 0;
+    }
+    return oriented;
+}
+
+bool rey_bsdf_takes_slope(int kind, int slot) {
+    return slot < rey_bsdf_kinds[kind].param_count && rey_bsdf_kinds[kind].params[slot].type == PARAM_HEIGHT;
+}
+
 int32_t rey_bsdf_table_size(int kind) {
     return kind == BSDF_ROUGHPLASTIC ? COAT_TABLE_SIZE : 0;
 }

@@ -34,6 +34,11 @@ bool rey_bsdf_turns(int kind);
 // Whether it drops light abruptly at the plane of the normal that it turns: without use_shadowing_function.
 bool rey_bsdf_cuts(const BsdfNode *node);
 
+// Whether a function itself depends on the direction of the surface's tangents.
+bool rey_bsdf_oriented(const SceneView *view, const BsdfNode *node);
+// Whether a kind takes the slope of the texture in a slot.
+bool rey_bsdf_takes_slope(int kind, int slot);
+
 // Numbers in `tables` that a function of this kind derives, 0 for most.
 int32_t rey_bsdf_table_size(int kind);
 rey_result rey_bsdf_update(rey_scene *scene, int32_t bsdf);

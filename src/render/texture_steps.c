@@ -63,6 +63,7 @@ typedef struct Steps {
     size_t first;
     int32_t shape;
     bool varies; // with uv
+    bool oriented; // with the direction of the tangents
 } Steps;
 
 static rey_result push_step(Steps *s, TextureStep step) {
@@ -82,22 +83,24 @@ static rey_result push_step(Steps *s, TextureStep step) {
     return REY_OK;
 }
 
-// Lines x' = level / width and y' = level / height, (x', y') = to_uv (x, y). Behind the border of a picture that is clamped
-// nothing jumps.
-static rey_result push_grid(Steps *s, const TextureNode *t, int32_t width, int32_t height, bool clamped) {
+// Lines x' = level / width and y' = level / height, (x', y') = to_uv (x, y); with `slopes`, half a texel further, where those of
+// bilinear filtering jump. Behind the border of a picture that is clamped nothing jumps.
+static rey_result push_grid(Steps *s, const TextureNode *t, int32_t width, int32_t height, bool clamped, bool slopes) {
     static const float identity[6] = {1, 0, 0, 0, 1, 0};
     const float *m = t->to_uv >= 0 ? s->scene->view.theta + t->to_uv : identity;
     rey_result result = REY_OK;
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         double n = k ? height : width;
         result = push_step(s, (TextureStep){.sort = STEP_LINES, .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
-                                            .offset = n * (double)m[3 * k + 2], .low = clamped ? 1 : -INFINITY,
+                                            .offset = n * (double)m[3 * k + 2] - (slopes ? 0.5 : 0),
+                                            .low = !clamped ? -INFINITY : slopes ? 0 : 1,
                                             .high = clamped ? n - 1 : INFINITY});
     }
     return result;
 }
 
-static rey_result add_texture(Steps *s, int32_t id) {
+// slopes: it is the slope that is looked up (texture_gradient.h).
+static rey_result add_texture(Steps *s, int32_t id, bool slopes) {
     if (id < 0) {
         return REY_OK;
     }
@@ -105,22 +108,24 @@ static rey_result add_texture(Steps *s, int32_t id) {
     rey_result result = REY_OK;
     s->varies |= t->kind == TEXTURE_BITMAP || t->kind == TEXTURE_CHECKERBOARD;
     if (t->kind == TEXTURE_CHECKERBOARD) {
-        result = push_grid(s, t, 2, 2, false);
-    } else if (t->kind == TEXTURE_BITMAP && t->filter == FILTER_NEAREST) {
-        result = push_grid(s, t, t->width, t->height, t->wrap == WRAP_CLAMP);
+        result = push_grid(s, t, 2, 2, false, false);
+    } else if (t->kind == TEXTURE_BITMAP && (t->filter == FILTER_NEAREST) != slopes) { // those of nearest texels are 0
+        result = push_grid(s, t, t->width, t->height, t->wrap == WRAP_CLAMP, slopes);
     } else if (t->kind == TEXTURE_ATTRIBUTE && t->per_face) {
         result = push_step(s, (TextureStep){.sort = STEP_FACES});
     }
     for (int k = 0; k < 2 && result == REY_OK; k++) {
-        result = add_texture(s, t->child[k]);
+        result = add_texture(s, t->child[k], slopes);
     }
     return result;
 }
 
 static rey_result add_bsdf(Steps *s, int32_t id) {
+    const BsdfNode *node = s->scene->view.bsdfs + id;
     rey_result result = REY_OK;
+    s->oriented |= id >= 0 && rey_bsdf_oriented(&s->scene->view, node);
     for (int k = 0; id >= 0 && k < MAX_SLOTS && result == REY_OK; k++) {
-        result = add_texture(s, s->scene->view.bsdfs[id].slot[k]);
+        result = add_texture(s, node->slot[k], rey_bsdf_takes_slope(node->kind, k));
     }
     for (int k = 0; id >= 0 && k < MAX_CHILDREN && result == REY_OK; k++) {
         result = add_bsdf(s, s->scene->view.bsdfs[id].child[k]);
@@ -133,7 +138,7 @@ static rey_result add_emitter(Steps *s, int32_t id) {
     const EmitterKind *kind = id >= 0 ? rey_emitter_kinds + e->kind : NULL;
     rey_result result = REY_OK;
     for (int k = 0; kind && k < kind->param_count && result == REY_OK; k++) {
-        result = kind->params[k].type < EMITTER_PARAM_POSITION ? add_texture(s, e->slot[k]) : REY_OK;
+        result = kind->params[k].type < EMITTER_PARAM_POSITION ? add_texture(s, e->slot[k], false) : REY_OK;
     }
     return result;
 }
@@ -150,6 +155,9 @@ rey_result rey_texture_steps(rey_scene *scene, Array *steps) {
         result = result == REY_OK ? add_emitter(&s, shape->emitter) : result;
         if (result == REY_OK && s.varies) {
             result = push_step(&s, (TextureStep){.sort = STEP_SEAMS});
+        }
+        if (result == REY_OK && s.oriented) {
+            result = push_step(&s, (TextureStep){.sort = STEP_TANGENTS});
         }
     }
     return result;

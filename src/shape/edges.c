@@ -177,6 +177,50 @@ static void side_uv(const SceneView *view, const ShapeRecord *shape, const Side 
     }
 }
 
+// The unit vector along which u grows in a triangle, as interactions have it, and its normal.
+static void triangle_tangent(const SceneView *view, const ShapeRecord *shape, int32_t prim, double tangent[3], double n[3]) {
+    const int32_t *corners = mesh_indices(view, shape) + 3 * (int64_t)prim;
+    const float *p[3], *uv[3] = {NULL, NULL, NULL};
+    double u = 1, v = 0, e[2][3], sizes[2] = {0, 0};
+    for (int k = 0; k < 3; k++) {
+        p[k] = vertex_of(view, shape, corners[k]);
+        uv[k] = shape->uvs >= 0 ? view->theta + shape->uvs + 2 * (int64_t)corners[k] : NULL;
+    }
+    if (uv[0]) {
+        double v1 = (double)uv[1][1] - (double)uv[0][1], v2 = (double)uv[2][1] - (double)uv[0][1];
+        double det = ((double)uv[1][0] - (double)uv[0][0]) * v2 - v1 * ((double)uv[2][0] - (double)uv[0][0]);
+        u = fabs(det) > 1e-20 ? v2 / det : 1;
+        v = fabs(det) > 1e-20 ? -v1 / det : 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        e[0][k] = (double)p[1][k] - (double)p[0][k];
+        e[1][k] = (double)p[2][k] - (double)p[0][k];
+        tangent[k] = u * e[0][k] + v * e[1][k];
+        sizes[0] += tangent[k] * tangent[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        n[k] = e[0][i] * e[1][j] - e[0][j] * e[1][i];
+        sizes[1] += n[k] * n[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        tangent[k] = sizes[0] > 0 ? tangent[k] / sqrt(sizes[0]) : 0;
+        n[k] = sizes[1] > 0 ? n[k] / sqrt(sizes[1]) : 0;
+    }
+}
+
+// Whether the tangents of two triangles differ by more than the angle between them explains.
+static bool tangents_jump(const SceneView *view, const ShapeRecord *shape, const Side *a, const Side *b) {
+    double t[2][3], n[2][3], tangents = 0, normals = 0;
+    triangle_tangent(view, shape, a->at / 3, t[0], n[0]);
+    triangle_tangent(view, shape, b->at / 3, t[1], n[1]);
+    for (int k = 0; k < 3; k++) {
+        tangents += (t[0][k] - t[1][k]) * (t[0][k] - t[1][k]);
+        normals += (n[0][k] - n[1][k]) * (n[0][k] - n[1][k]);
+    }
+    return sqrt(tangents) > 2 * sqrt(normals) + 1e-4;
+}
+
 // Whether the textures of a shape, whose steps begin at number `first`, jump along an edge.
 static bool texture_jumps(const SceneView *view, const Array *steps, size_t first, const Side *sides, const Around *r) {
     const int32_t id = first < steps->count ? ARRAY_AT(*steps, TextureStep, first).shape : -1;
@@ -188,7 +232,8 @@ static bool texture_jumps(const SceneView *view, const Array *steps, size_t firs
     side_uv(view, view->shapes + id, sides + r->side[1], uv[1]);
     for (size_t i = first; i < steps->count && ARRAY_AT(*steps, TextureStep, i).shape == id; i++) {
         int32_t sort = ARRAY_AT(*steps, TextureStep, i).sort;
-        if (sort == STEP_FACES || (sort == STEP_SEAMS && memcmp(uv[0], uv[1], sizeof uv[0]) != 0)) {
+        bool turns = sort == STEP_TANGENTS && tangents_jump(view, view->shapes + id, sides + r->side[0], sides + r->side[1]);
+        if (turns || sort == STEP_FACES || (sort == STEP_SEAMS && memcmp(uv[0], uv[1], sizeof uv[0]) != 0)) {
             return true;
         }
     }

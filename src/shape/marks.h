@@ -5,8 +5,8 @@
 
 // Where the textures of a shape jump. STEP_LINES: where u x + v y + offset, (x, y) the surface's own uv, is a whole number from
 // `low` to `high`. STEP_FACES: from triangle to triangle. STEP_SEAMS: where uv itself does, between triangles and where
-// round surfaces close.
-enum { STEP_LINES, STEP_FACES, STEP_SEAMS };
+// round surfaces close. STEP_TANGENTS: where the direction in which u grows does, by which the surface scatters, between triangles.
+enum { STEP_LINES, STEP_FACES, STEP_SEAMS, STEP_TANGENTS };
 typedef struct TextureStep {
     int32_t shape, sort;
     double u, v, offset, low, high;
