@@ -61,6 +61,14 @@ static void segment_store(Sample *s) {
     KEEP(s, edge);
     KEEP(s, near);
     KEEP(s, far);
+    // The near point as the only vertex of the segment's way upstream.
+    const Upstream *u = q->up;
+    q->levels = 1;
+    keep(u->u, u->v, u->x, u->y, u->z, u->shape, u->prim, u->instance, &s->w, &s->near);
+    u->met[0] = UPSTREAM_RAY;
+    u->lobe[0] = LOBE_SMOOTH;
+    u->seen[0] = s->seen;
+    u->unseen[0] = s->unseen;
 }
 
 static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) {
@@ -69,7 +77,7 @@ static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) 
     world_make(&s->w, random);
     const float a = 0.4f + 0.1f * uniform(random), b = 0.3f + 0.1f * uniform(random);
     s->edge = (Hit){EDGE_SHAPE, 0, a, b, v3_zero(), 0};
-    s->near = (Hit){NEAR_SHAPE, 1, b, a, v3_zero(), 0};
+    s->near = kind == BOUNDARY_CUT ? s->edge : (Hit){NEAR_SHAPE, 1, b, a, v3_zero(), 0}; // cuts start at the point itself
     s->far = (Hit){FAR_SHAPE, 0, 0, 0, v3(a, -b, 0), 0};
     s->n = random_vector(random);
     s->other = random_vector(random);
@@ -96,7 +104,7 @@ static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) 
 }
 
 static void gradient_of(Sample *s, double *gradient) {
-    Indirect in = {.t = &s->t, .b = &s->job, .pinhole = &s->pinhole, .q = s->q};
+    Indirect in = {.t = &s->t, .b = &s->job, .pinhole = &s->pinhole, .q = s->q, .upstream = s->job.kind == BOUNDARY_CHAINED};
     Sink sink = {.gradient = gradient,
                  .points_at = points_at,
                  .normals_at = normals_at,
@@ -115,6 +123,18 @@ static Vec3 near_seen(const Sample *s) {
     return v3_madd(ray.o, v3_dot(v3_sub(si.p, ray.o), si.ng) / v3_dot(ray.d, si.ng), ray.d);
 }
 
+// What light that is cut off at a point is worth: n . (far - x) / r, and the shading normal.
+static double cut_of(const Sample *s, const Interaction *x) {
+    return s->behind * v3_dot(s->n, v3_sub(look(&s->w, &s->far).p, x->p)) + s->along * v3_dot(s->d, x->sh.n);
+}
+
+static double cuts_of(const Sample *s) {
+    Vec3 normal;
+    Hit hit = point_hit(&s->w.scene, s->edge.shape, s->edge.prim, s->edge.instance, near_seen(s), &normal);
+    Interaction seen = look(&s->w, &hit), unseen = look(&s->w, &s->edge);
+    return s->seen * cut_of(s, &seen) + s->unseen * cut_of(s, &unseen);
+}
+
 // What the segment is worth in a world that has moved.
 static double worth_of(const Sample *s) {
     const World *w = &s->w;
@@ -122,6 +142,9 @@ static double worth_of(const Sample *s) {
     const float both = s->seen + s->unseen, size = s->behind * both;
     Vec3 near = v3_madd(v3_scale(near_seen(s), s->seen), s->unseen, look(w, &s->near).p);
     switch (s->job.kind) {
+    case BOUNDARY_CUT:
+        return cuts_of(s);
+    case BOUNDARY_CHAINED:
     case BOUNDARY_INDIRECT: // n . (edge - lerp(near, far, along))
         return both * (v3_dot(s->n, edge.p) - s->along * v3_dot(s->n, far.p)) - (1 - s->along) * v3_dot(s->n, near);
     case BOUNDARY_MEETING:
@@ -172,8 +195,9 @@ static void test_kind(void **state) {
 }
 
 int main(void) {
-    static const int32_t kinds[] = {BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_MEETING};
-    static const char *const names[] = {"silhouettes", "terminators", "horizons", "meetings"};
+    static const int32_t kinds[] = {BOUNDARY_INDIRECT, BOUNDARY_TERMINATOR, BOUNDARY_HORIZON, BOUNDARY_MEETING, BOUNDARY_CUT,
+                                    BOUNDARY_CHAINED};
+    static const char *const names[] = {"silhouettes", "terminators", "horizons", "meetings", "cuts", "ways"};
     struct CMUnitTest tests[COUNT_OF(kinds)];
     for (int i = 0; i < COUNT_OF(kinds); i++) {
         tests[i] = (struct CMUnitTest){names[i], test_kind, NULL, NULL, (void *)(uintptr_t)(kinds + i)};
