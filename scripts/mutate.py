@@ -51,7 +51,8 @@ SEEN = [BOUNDARY + " boundary_lamp.xml ball", BOUNDARY + " boundary_plan", BOUND
 EDGES = SEEN + [BOUNDARY + " boundary_lamp.xml lamp", BOUNDARY + " boundary_lamp.xml camera.to_world", BOUNDARY + " boundary_bulb.xml bulb",
                 BOUNDARY + " boundary_lamp.xml card", BOUNDARY + " boundary_sky.xml camera", BOUNDARY + " meeting_view.xml crate",
                 BOUNDARY + " meeting_slide.xml ball", BOUNDARY + " meeting_lamp.xml bulb", BOUNDARY + " turning_lamp.xml ball",
-                BOUNDARY + " turning_light.xml ball.positions", BOUNDARY + " mirror_wall", BOUNDARY + " air_beam.xml bulb"]
+                BOUNDARY + " turning_light.xml ball.positions", BOUNDARY + " mirror_wall", BOUNDARY + " air_beam.xml bulb",
+                BOUNDARY + " marks_bump.xml tile"]
 TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_adjoint principledthin"]),
          ("src/bsdf/", ["test_kinds_adjoint {stem}", "test_kinds_adjoint"] + LOCAL + MOVING[:4]),
          ("src/math/", ["test_math_leaves", "test_kinds_adjoint"]),
@@ -64,7 +65,7 @@ TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_a
          ("src/shape/", ["test_moves"] + LOCAL[:2] + ["test_differences tiles.xml"] + MOVING),
          ("src/integrator/path_adj.h", LOCAL[:1] + MOVING[4:6] + LOCAL[3:4] + MOVING[:4] + LOCAL[1:3] + LOCAL[4:] + MEDIA[5:]),
          ("src/integrator/path_move.h", ["test_places"] + MOVING[:4] + EDGES + MOVING[4:]),
-         ("src/integrator/particle_adj.h", ["test_particle_gradients"]),
+         ("src/integrator/particle_adj.h", ["test_terminator", "test_particle_gradients"]),
          ("src/integrator/boundary/airborne.h", [BOUNDARY + " air_"]),
          ("src/integrator/boundary/meeting.h", [BOUNDARY + " meeting_"]),
          ("src/integrator/boundary/facet.h", ["test_edge_curves", BOUNDARY + " turning_"]),

@@ -27,7 +27,14 @@ typedef struct Stage {
     rey_context *ctx;
     rey_scene *scene;
     char folder[64];
+    const char *integrator, *light;
+    int depth;
 } Stage;
+
+static const char bulb[] = "<emitter type='constant'/>"
+                           "<emitter type='point' id='bulb'><point name='position' x='0.3' y='0.2' z='4'/></emitter>";
+static const char torch[] = "<emitter type='spot'><float name='cutoff_angle' value='12'/><transform name='to_world'>"
+                            "<lookat origin='0.3,0.2,4' target='0,0,0' up='0,1,0'/></transform></emitter>";
 
 static void write_text(const Stage *s, const char *name, const char *text) {
     char path[128];
@@ -46,13 +53,12 @@ static void stage_load(const Stage *s, const char *origin, const char *normal, c
              reversed ? "3 2 1 0\n3 3 2 0\n" : "3 0 1 2\n3 0 2 3\n");
     write_text(s, "plane.ply", ply);
     snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>"
+             "<scene version='3.0.0'><integrator type='%s'><integer name='max_depth' value='%d'/></integrator>"
              "<sensor type='perspective' id='camera'><float name='fov' value='10'/><transform name='to_world'>"
              "<lookat origin='%s' target='0,0,0' up='0,1,0.1'/></transform><film type='hdrfilm'>"
              "<integer name='width' value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film></sensor>"
-             "<emitter type='constant'/><emitter type='point' id='bulb'><point name='position' x='0.3' y='0.2' z='4'/></emitter>"
-             "<shape type='ply' id='plane'><string name='filename' value='plane.ply'/>%s</shape></scene>",
-             origin, SIZE, SIZE, bsdf);
+             "%s<shape type='ply' id='plane'><string name='filename' value='plane.ply'/>%s</shape></scene>",
+             s->integrator, s->depth, origin, SIZE, SIZE, s->light, bsdf);
     write_text(s, "scene.xml", xml);
     snprintf(path, sizeof path, "%s/scene.xml", s->folder);
     if (rey_scene_load(s->ctx, path, NULL, 0, out) != REY_OK) {
@@ -66,6 +72,9 @@ static int set_up(void **state) {
         return 1;
     }
     snprintf(s->folder, sizeof s->folder, "/tmp/reynolds_test_terminator_XXXXXX");
+    s->integrator = "path";
+    s->light = bulb;
+    s->depth = 3;
     *state = s;
     return !folder_make(s->folder);
 }
@@ -197,6 +206,67 @@ static void test_other_parameters(void **state) {
     rey_scene_destroy(scene);
 }
 
+// Particles look at normals of maps and of vertices alike.
+static void test_particles_look(void **state) {
+    Stage s = *(const Stage *)*state;
+    static const char map[] = "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='0.6,0.5,1'/>"
+                              "<bsdf type='diffuse'/></bsdf>";
+    rey_scene *scene;
+    int missing;
+    s.integrator = "ptracer";
+    s.depth = 2;
+    stage_load(&s, "0,0,5", "0.3 0 1", map, false, &scene);
+    assert_int_equal(derive(&s, scene, "plane.normals", REY_TERM_INTERIOR, &missing), REY_OK);
+    assert_int_equal(missing, 0);
+    rey_scene_destroy(scene);
+}
+
+// Two by two pixels of three bytes, from the last row up.
+static void write_heights(const Stage *s) {
+    static const unsigned char heights[2][8] = {{40, 40, 40, 200, 200, 200}, {170, 170, 170, 90, 90, 90}};
+    unsigned char bytes[70] = {'B', 'M', 70, [10] = 54, [14] = 40, [18] = 2, [22] = 2, [26] = 1, [28] = 24, [34] = 16};
+    char path[128];
+    memcpy(bytes + 54, heights, 16);
+    snprintf(path, sizeof path, "%s/heights.bmp", s->folder);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, sizeof bytes, file), sizeof bytes);
+    fclose(file);
+}
+
+// Vertex normals turn the tangents that slopes of heights stand on, for particles as for paths.
+static void test_particles_turn(void **state) {
+    Stage s = *(const Stage *)*state;
+    static const char bumps[] = "<bsdf type='bumpmap'><texture type='bitmap'><string name='filename' value='heights.bmp'/>"
+                                "<boolean name='raw' value='true'/></texture><float name='scale' value='0.5'/>"
+                                "<bsdf type='diffuse'/></bsdf>";
+    static float adjoint[NUMBERS];
+    double gradient[2][12], worst = 0, size = 0;
+    write_heights(&s);
+    for (int i = 0; i < NUMBERS; i++) {
+        adjoint[i] = 1;
+    }
+    for (int k = 0; k < 2; k++) {
+        rey_scene *scene;
+        s.integrator = k ? "ptracer" : "path";
+        s.light = torch;
+        stage_load(&s, "0,0,5", "0.3 0.2 1", bumps, false, &scene);
+        rey_render_def def = def_make(REY_TERM_INTERIOR);
+        def.spp = 2048;
+        int param = rey_param_find(scene, "plane.normals");
+        if (rey_vjp(scene, &def, (rey_selection){&param, 1}, adjoint, gradient[k], NULL, NULL) != REY_OK) {
+            fail_msg("%s", rey_error(s.ctx));
+        }
+        rey_scene_destroy(scene);
+    }
+    for (int i = 0; i < 12; i++) {
+        worst = fmax(worst, fabs(gradient[1][i] - gradient[0][i]));
+        size = fmax(size, fabs(gradient[0][i]));
+    }
+    print_message("particles and paths differ by %.3g of %.3g\n", worst, size);
+    assert_true(size > 0 && worst < 2e-3 * size);
+}
+
 // Maps without shadowing cut light off at the plane of the surface: what is not known of that is refused by name.
 static void test_cut_off(void **state) {
     const Stage *s = *state;
@@ -272,6 +342,7 @@ static void test_replay(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_normals_of_lights),
                                        cmocka_unit_test(test_other_parameters), cmocka_unit_test(test_cut_off),
+                                       cmocka_unit_test(test_particles_look), cmocka_unit_test(test_particles_turn),
                                        cmocka_unit_test(test_replay)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
