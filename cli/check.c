@@ -339,8 +339,7 @@ static bool can_replay(const Work *w, const Direction *d) {
 }
 
 static bool is_partial(const Work *w, const Check *check) {
-    const Options *o = w->session.options;
-    return o->all && o->terms && (cli_direction_terms(w->session.scene, &check->direction) & ~o->terms);
+    return w->session.options->all && check->left_out;
 }
 
 static int build_directions(Work *w, const Specs *specs, Check *checks) {
@@ -351,6 +350,8 @@ static int build_directions(Work *w, const Specs *specs, Check *checks) {
             return status;
         }
         checks[i].replays = can_replay(w, &checks[i].direction);
+        int needed = cli_direction_terms(w->session.scene, &checks[i].direction), asked = w->session.options->terms;
+        checks[i].left_out = asked ? needed & ~asked : 0;
     }
     return EXIT_OK;
 }

@@ -36,6 +36,7 @@ typedef struct Check { // one direction
     double reverse_error;              // the one over the other, see check_reverse_error
     Verdict verdict;
     bool undecided;       // weak, and beyond the limits all the same
+    int left_out;         // terms that it needs and --terms does not name; the difference has them
     bool shown, open;     // its row went to standard error already; with a verdict that might change
     char *refusal;        // why there is no complete derivative; owned
 } Check;

@@ -83,6 +83,21 @@ static rey_result print_rows(rey_context *ctx, const Check *checks, int count) {
     return result;
 }
 
+// Differences know no terms: where some are left out on request, that is what they differ by.
+static void print_left_out(const Check *checks, int count) {
+    int terms = 0, directions = 0;
+    char text[128];
+    for (int i = 0; i < count; i++) {
+        int left = checks[i].verdict == VERDICT_REFUSED ? 0 : checks[i].left_out & TERMS_ESTIMATED;
+        terms |= left;
+        directions += left != 0;
+    }
+    if (directions) {
+        cli_terms_text(terms, text, sizeof text);
+        printf("--terms leaves out %s of what %d of %d need, which the differences have\n", text, directions, count);
+    }
+}
+
 rey_result check_print_table(rey_context *ctx, const Check *checks, int count, double threshold) {
     rey_result result = print_rows(ctx, checks, count);
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
@@ -92,6 +107,7 @@ rey_result check_print_table(rey_context *ctx, const Check *checks, int count, d
     }
     printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3, fresh z up to %d, reverse = forward to %g\n",
            wrong ? "FAILED" : undecided ? "undecided" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
+    print_left_out(checks, count);
     if (count_verdicts(checks, count, VERDICT_KINK)) {
         printf("%d of %d stand at a kink: the derivative is that of one side\n", count_verdicts(checks, count, VERDICT_KINK),
                count);
@@ -122,6 +138,7 @@ void check_print_json(const Session *session, const rey_stats *stats, const Chec
         json_object(&json, NULL);
         json_string(&json, "param", checks[i].spec);
         json_string(&json, "verdict", check_verdict_name(checks[i].verdict));
+        cli_json_terms(&json, "left_out", checks[i].left_out & TERMS_ESTIMATED);
         json_bool(&json, "passed", checks[i].verdict != VERDICT_WRONG && !checks[i].undecided);
         if (checks[i].refusal) {
             json_string(&json, "why", checks[i].refusal);

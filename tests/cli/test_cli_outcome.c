@@ -133,6 +133,21 @@ static void restricted_gradients_say_what_they_lack(void **state) {
     json_free(node);
 }
 
+// So does a check of one, whose differences lack nothing.
+static void restricted_checks_say_what_they_lack(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "check %s --param red.reflectance.value --spp 16 --terms interior");
+    assert_null(strstr(f->out, "leaves out"));
+    JsonNode *node = run_json(f, run(f, "check %s --param camera.x_fov --spp 16 --terms interior --json"),
+                              "check %s --param camera.x_fov --spp 16 --terms interior --json");
+    const JsonNode *left = json_get(json_get(node, "directions")->first, "left_out");
+    assert_string_equal(left->first->text, "primary");
+    assert_string_equal(left->first->next->text, "indirect");
+    json_free(node);
+    run(f, "check %s --param camera.x_fov --spp 16 --terms interior");
+    assert_non_null(strstr(f->out, "--terms leaves out primary,indirect of what 1 of 1 need, which the differences have\n"));
+}
+
 // How often a text holds a word.
 static int occurrences(const char *text, const char *word) {
     int count = 0;
@@ -258,6 +273,7 @@ int main(void) {
         cmocka_unit_test(mistakes_are_told_at_the_start),
         cmocka_unit_test(refusals_are_those_of_grad),
         cmocka_unit_test(restricted_gradients_say_what_they_lack),
+        cmocka_unit_test(restricted_checks_say_what_they_lack),
         cmocka_unit_test(rows_of_check_stand_once),
         cmocka_unit_test(infos_say_what_is_missing),
         cmocka_unit_test(terminations_are_interruptions),
