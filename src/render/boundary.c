@@ -51,16 +51,16 @@ static bool has_chains(const SceneView *view) {
 }
 
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
-    int32_t texture = rey_texture_any_step(view);
+    int32_t texture = -1;
+    const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
     const char *what = !boundary_sees(sensor) ? "this sensor"
                        : view->through        ? "the integrator 'volpath'"
                        : view->has_media      ? "participating media"
-                       : texture >= 0         ? "the jumps of the texture"
+                       : step                 ? step
                        : !has_chains(view)    ? "functions that let light pass"
                                               : NULL;
     if (what) {
-        bool jumps = boundary_sees(sensor) && !view->through && !view->has_media;
-        return (ChainObstacle){what, -1, -1, jumps ? texture : -1};
+        return (ChainObstacle){what, -1, -1, what == step ? texture : -1};
     }
     for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
         int kind = view->bsdfs[i].kind;
@@ -150,6 +150,8 @@ void rey_boundary_free(Render *r, BoundaryPlan *plan) {
     rey_free(ctx, plan->edges);
     rey_free(ctx, plan->cdf);
     rey_free(ctx, plan->films);
+    rey_array_free(ctx, &plan->steps);
+    rey_array_free(ctx, &plan->step_at);
     *plan = (BoundaryPlan){.shards = 0};
 }
 
@@ -181,7 +183,9 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     *plan = (BoundaryPlan){.film = r->plan};
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
-    if (result == REY_OK && kind != BOUNDARY_MIRRORED) { // it looks for edges where they are seen
+    if (result == REY_OK && kind == BOUNDARY_MIRRORED) { // it looks for edges where they are seen
+        result = rey_texture_step_records(r->scene, &plan->steps, &plan->step_at);
+    } else if (result == REY_OK) {
         result = rey_boundary_edges(r, kind, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
@@ -196,6 +200,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
+                              .steps = plan->steps.data, .step_at = plan->step_at.data,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none, .everywhere = r->turns_rays,
                               .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};

@@ -222,6 +222,18 @@ static double see_mark(const Render *r, const Projection *p, EdgeRecord *e) {
     return fmin(hypot(film[0][0] - film[1][0], film[0][1] - film[1][1]), most) + 0.01;
 }
 
+// Length in the world.
+static double mark_weight(const Render *r, const EdgeRecord *e) {
+    const float *ends = ARRAY_AT(r->marks, MarkRecord, e->corner).ends;
+    double a[3], b[3], length2 = 0;
+    mark_point(&r->scene->view, e, ends, a);
+    mark_point(&r->scene->view, e, ends + 2, b);
+    for (int k = 0; k < 3; k++) {
+        length2 += (b[k] - a[k]) * (b[k] - a[k]);
+    }
+    return sqrt(length2);
+}
+
 // A piece of a round shape: as many pixels as the shape's size has, if it is not behind the sensor.
 static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
     const float *m = view->theta + view->shapes[e->shape].to_world;
@@ -375,7 +387,8 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if ((w->kind == BOUNDARY_CUT) != (e->kind == EDGE_CUT)) {
         return 0;
     }
-    if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || e->kind == EDGE_MARK)) {
+    bool marks = w->kind == BOUNDARY_PRIMARY || w->kind == BOUNDARY_CHAINED;
+    if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || (e->kind == EDGE_MARK && !marks))) {
         return 0;
     }
     switch (e->kind) {
@@ -384,7 +397,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     case EDGE_CUT:
         return factor * triangle_area(view, e);
     case EDGE_MARK:
-        return see_mark(r, &w->projection, e);
+        return w->kind == BOUNDARY_PRIMARY ? see_mark(r, &w->projection, e) : factor * mark_weight(r, e);
     case EDGE_TERMINATOR:
         return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
     case EDGE_MESH:
@@ -412,6 +425,12 @@ static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan,
     return result;
 }
 
+// Whether lines of textures on a shape matter: along chains, what moves shows them also where they stand still.
+static bool seen_moving(const void *render, int32_t id, int32_t instance) {
+    const Render *r = render;
+    return (r->terms & REY_TERM_SPECULAR) || moves_on_film(r, id, instance);
+}
+
 static rey_result find_edges(Render *r) {
     Array steps = {0};
     rey_result result = rey_texture_steps(r->scene, &steps);
@@ -419,7 +438,7 @@ static rey_result find_edges(Render *r) {
         result = rey_edges_find(r->scene, &steps, &r->edges, &r->fans);
     }
     if (result == REY_OK) {
-        result = rey_marks_find(r->scene, &steps, moves_on_film, r, &r->edges, &r->marks);
+        result = rey_marks_find(r->scene, &steps, seen_moving, r, &r->edges, &r->marks);
     }
     result = result == REY_OK ? rey_cuts_find(r->scene, &r->edges) : result;
     rey_array_free(r->scene->ctx, &steps);

@@ -13,6 +13,7 @@ typedef struct BoundaryPlan {
     BoundaryJob job;         // what all units share
     EdgeRecord *edges;
     float *cdf;
+    Array steps, step_at;    // where textures jump (shape/marks.h): StepRecord, and of every shape its first one
     FilmPlan film;           // one tile that covers the picture
     double *films;           // forward: one per shard
     int64_t samples;         // of one set

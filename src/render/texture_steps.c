@@ -17,18 +17,9 @@ static bool texture_jumps(const SceneView *view, int32_t id) {
                        texture_jumps(view, view->textures[id].child[1]));
 }
 
-int32_t rey_texture_any_step(const SceneView *view) {
-    for (int32_t i = 0; i < (int32_t)view->textures_count; i++) {
-        if (jumps_itself(view->textures + i)) {
-            return i;
-        }
-    }
-    return -1;
-}
-
 const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture) {
-    // Later vertices are attached to where they are on their surfaces.
-    const bool film = term == REY_TERM_PRIMARY;
+    // Vertices move over their surfaces where the sensor sees them, and along chains; others are attached to them.
+    const bool film = term != REY_TERM_INDIRECT;
     for (int32_t i = 0; i < (int32_t)view->textures_count && film; i++) {
         if (view->textures[i].kind == TEXTURE_VOLUME && jumps_itself(view->textures + i)) {
             *texture = i;
@@ -160,5 +151,25 @@ rey_result rey_texture_steps(rey_scene *scene, Array *steps) {
             result = push_step(&s, (TextureStep){.sort = STEP_TANGENTS});
         }
     }
+    return result;
+}
+
+rey_result rey_texture_step_records(rey_scene *scene, Array *records, Array *step_at) {
+    Array steps = {0};
+    rey_result result = rey_texture_steps(scene, &steps);
+    size_t count = (size_t)scene->view.shapes_count, k = 0;
+    if (result == REY_OK && steps.count > 0) {
+        StepRecord *to = rey_array_push(scene->ctx, records, sizeof *to, steps.count);
+        int32_t *at = to ? rey_array_push(scene->ctx, step_at, sizeof *at, count + 1) : NULL;
+        for (size_t i = 0; at && i <= count; i++) {
+            at[i] = (int32_t)k;
+            for (; k < steps.count && ARRAY_AT(steps, TextureStep, k).shape == (int32_t)i; k++) {
+                const TextureStep *s = &ARRAY_AT(steps, TextureStep, k);
+                to[k] = (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high, s->sort};
+            }
+        }
+        result = at ? REY_OK : REY_ERROR_MEMORY;
+    }
+    rey_array_free(scene->ctx, &steps);
     return result;
 }

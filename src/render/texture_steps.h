@@ -5,8 +5,9 @@
 
 // Appends the steps of all surfaces' textures to `steps`, an Array of TextureStep, by shape.
 rey_result rey_texture_steps(rey_scene *scene, Array *steps);
-// A texture that jumps, -1 = there is none.
-int32_t rey_texture_any_step(const SceneView *view);
+// The same for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the end. Both
+// stay empty where nothing jumps.
+rey_result rey_texture_step_records(rey_scene *scene, Array *records, Array *step_at);
 // What of the scene's textures jumps in a way that a boundary term (REY_TERM_) does not know, and *texture, one that does; NULL
 // if nothing does.
 const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture);

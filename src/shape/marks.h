@@ -12,6 +12,12 @@ typedef struct TextureStep {
     double u, v, offset, low, high;
 } TextureStep;
 
+// The same as kernels read it.
+typedef struct StepRecord {
+    float u, v, offset, low, high;
+    int32_t sort;
+} StepRecord;
+
 // A piece of such a curve: two points, by their barycentrics in a triangle, or by uv on other shapes.
 typedef struct MarkRecord {
     float ends[4];

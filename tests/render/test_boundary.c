@@ -104,6 +104,8 @@ static const Motion motions[] = {
     {"mirror_lamp.xml", "mirror.to_world", SHIFT, {1, 0.5f, 0}, 0.05, 4},
     {"mirror_wall.xml", "card.to_world", SHIFT, {0.3f, 1, 0.5f}, 0.05, 2},
     {"mirror_prism.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 4},
+    {"mirror_tiles.xml", "wall.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.05, 16},
+    {"mirror_tiles.xml", "mirror.to_world", SHIFT, {0, 1, 1}, 0.07, 16},
     {"seen_glow.xml", "crate.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
     {"seen_glow.xml", "ball.to_world", GROW, {0.7f, 0.3f, 0.9f}, 0.02, 1},
     {"seen_glow.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
@@ -120,6 +122,9 @@ static const Motion motions[] = {
     {"seen_drop.xml", "glass.eta", ADD, {0}, 0.005, 1},
     {"seen_bulge.xml", "crate.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
     {"seen_bulge.xml", "bulge.to_world", SHIFT, {0.3f, 1, 0.5f}, 0.02, 1},
+    {"seen_tiles.xml", "ball.to_world", TURN, {0.3f, 1, 0.4f}, 4, 4},
+    {"seen_tiles.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 4},
+    {"seen_tiles.xml", "coin.to_world", TURN, {0, 0.3f, 1}, 2, 3},
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }

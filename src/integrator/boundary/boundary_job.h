@@ -28,6 +28,8 @@ typedef struct BoundaryJob {
     const int32_t *fans;      // see EdgeRecord
     const MeetingRecord *meetings;
     const MarkRecord *marks;
+    const StepRecord *steps;  // where textures jump: those of a shape from step_at[shape] to step_at[shape + 1]
+    const int32_t *step_at;   // null: nothing jumps
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count;
     bool round;               // there are outlines of round surfaces, or marks, among them

@@ -1,9 +1,10 @@
 // crossing.h: which edge lies between two lines of sight that part: what they meet says it, and how it moves. With r a point
 // of the line there, both sides part where F = n . e - n' . e' - (n - n') . r = 0. Of an edge, e is its point, n the normal of
 // the plane of edge and line, and n' = 0. Where two surfaces pass through each other, their points e and e' are at the same
-// distance on the line, n = N / (N . d) and n' = N' / (N' . d).
+// distance on the line, n = N / (N . d) and n' = N' / (N' . d). Lines of textures are as edges.
 #pragma once
 
+#include "integrator/boundary/field.h"
 #include "integrator/boundary/sightline.h"
 
 typedef struct Crossing {
@@ -19,6 +20,7 @@ typedef struct Miss {
     Hit edge;
     Vec3 n;
     Float inside;
+    Vec3 normal, du, dv; // of the surface at `own`: its unit normal, and tangents along u and v
 } Miss;
 
 // Where rounding could have brought a ray from one side of an edge to the other.
@@ -107,11 +109,10 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
     return out;
 }
 
-// The edges of the surfaces that other rays meet at `own`, next to rays; and unit normals there.
-static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m, Vec3 *normal) {
+// The edges of the surfaces that other rays meet at `own`, next to rays.
+static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
-    Miss out = {.edge = *own, .n = v3_zero(), .inside = f_set(1)};
-    *normal = v3_zero();
+    Miss out = {.edge = *own, .n = v3_zero(), .inside = f_set(1), .normal = v3_zero(), .du = v3_zero(), .dv = v3_zero()};
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t first = i_lane(own->shape, m_first(left)), id = scene->shapes[first].group;
         const Group *group = scene->groups + id;
@@ -134,8 +135,10 @@ static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3
         default:
             break;
         }
-        Vec3 ng = shape_interaction(scene, group->shape_kind, group->shape_flags, &h).ng;
-        *normal = v3_select(mine, ng, *normal);
+        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
+        out.normal = v3_select(mine, si.ng, out.normal);
+        out.du = v3_select(mine, si.dp_du, out.du);
+        out.dv = v3_select(mine, si.dp_dv, out.dv);
         out.edge = hit_select(mine, &one.edge, &out.edge);
         out.n = v3_select(mine, one.n, out.n);
         out.inside = f_select(mine, one.inside, out.inside);
@@ -146,7 +149,9 @@ static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3
 // What two lines meet at the levels where they part.
 typedef struct Ends {
     Hit hit[2];
-    Vec3 o[2], d[2], normal[2];
+    Vec3 o[2], d[2];
+    Vec2 uv[2];
+    Int behind[2];
     Float reach[2];
 } Ends;
 
@@ -154,17 +159,38 @@ static void ends_load(const Sightline *line, Int level, int k, Ends *e) {
     e->hit[k] = line->hit[0];
     e->o[k] = line->o[0];
     e->d[k] = line->d[0];
+    e->uv[k] = line->uv[0];
+    e->behind[k] = line->behind[0];
     for (int32_t i = 1; i < line->last; i++) {
         Mask here = mi_eq(level, i_set(i));
         e->hit[k] = hit_select(here, line->hit + i, e->hit + k);
         e->o[k] = v3_select(here, line->o[i], e->o[k]);
         e->d[k] = v3_select(here, line->d[i], e->d[k]);
+        e->uv[k] = (Vec2){f_select(here, line->uv[i].x, e->uv[k].x), f_select(here, line->uv[i].y, e->uv[k].y)};
+        e->behind[k] = i_select(here, line->behind[i], e->behind[k]);
     }
     Mask found = mi_lt(i_set(-1), e->hit[k].shape);
     e->reach[k] = f_select(found, v3_dot(v3_sub(e->hit[k].p, e->o[k]), e->d[k]), f_set(INFINITY));
 }
 
-static NOINLINE Crossing crossing_find(const Tracer *t, const Sightline lines[2], Int level, Mask m) {
+// Where they meet one surface on both sides of a line of its texture, half-way between them: the normal of the plane of line and
+// ray.
+static Mask crossing_mark(const Tracer *t, const BoundaryJob *b, const Ends *e, const Miss *miss, Mask m, Hit *hit, Vec3 *n) {
+    const Hit *h = e->hit;
+    Vec2 across;
+    m = m & mi_eq(h[0].shape, h[1].shape) & mi_eq(h[0].prim, h[1].prim) & mi_eq(h[0].instance, h[1].instance) &
+        mi_eq(e->behind[0], e->behind[1]);
+    m = fields_part(t->scene, b, h[0].shape, e->uv[0], e->uv[1], m, &across);
+    Vec3 line = v3_madd(v3_scale(miss->du, -across.y), across.x, miss->dv);
+    *hit = h[0];
+    hit->u = 0.5f * (h[0].u + h[1].u);
+    hit->v = 0.5f * (h[0].v + h[1].v);
+    hit->p = v3_scale(v3_add(h[0].p, h[1].p), f_set((real)0.5));
+    *n = v3_normalize(v3_cross(e->d[0], line));
+    return m;
+}
+
+static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, const Sightline lines[2], Int level, Mask m) {
     Ends e;
     Miss miss[2];
     for (int k = 0; k < 2; k++) {
@@ -173,9 +199,12 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const Sightline lines[2]
     Mask met[2], edge[2];
     for (int k = 0; k < 2; k++) {
         met[k] = m & mi_lt(i_set(-1), e.hit[k].shape);
-        miss[k] = surfaces_miss(t, e.hit + k, e.o[1 - k], e.d[1 - k], met[k], e.normal + k);
+        miss[k] = surfaces_miss(t, e.hit + k, e.o[1 - k], e.d[1 - k], met[k]);
         edge[k] = met[k] & m_lt(miss[k].inside, f_set(0));
     }
+    Hit line;
+    Vec3 across;
+    Mask mark = crossing_mark(t, b, &e, miss, met[0] & met[1], &line, &across);
     // Rounding may leave the other ray inside, too: there it is the edge of what is nearer, or of what ends next to it.
     Mask open = m & ~edge[0] & ~edge[1];
     for (int k = 0; k < 2; k++) {
@@ -187,14 +216,17 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const Sightline lines[2]
     Crossing c = {.hit = hit_select(second, &miss[1].edge, &miss[0].edge), .other = e.hit[1]};
     c.n = v3_select(second, miss[1].n, miss[0].n);
     c.p = c.hit.p;
-    c.meeting = met[0] & met[1] & ~edge[0] & ~edge[1];
-    Float slant[2] = {v3_dot(e.normal[0], e.d[0]), v3_dot(e.normal[1], e.d[1])};
-    c.n = v3_select(c.meeting, v3_scale(e.normal[0], f_safe_rcp(slant[0])), c.n);
-    c.n_other = v3_select(c.meeting, v3_scale(e.normal[1], f_safe_rcp(slant[1])), v3_zero());
+    c.meeting = met[0] & met[1] & ~edge[0] & ~edge[1] & ~mark;
+    Float slant[2] = {v3_dot(miss[0].normal, e.d[0]), v3_dot(miss[1].normal, e.d[1])};
+    c.n = v3_select(c.meeting, v3_scale(miss[0].normal, f_safe_rcp(slant[0])), c.n);
+    c.n_other = v3_select(c.meeting, v3_scale(miss[1].normal, f_safe_rcp(slant[1])), v3_zero());
     c.hit = hit_select(c.meeting, e.hit, &c.hit);
     c.p = v3_select(c.meeting, e.hit[0].p, c.p);
+    c.hit = hit_select(mark, &line, &c.hit);
+    c.p = v3_select(mark, line.p, c.p);
+    c.n = v3_select(mark, across, c.n);
     c.across = v3_sub(c.n, c.n_other);
-    c.m = edge[0] | edge[1] | c.meeting;
+    c.m = edge[0] | edge[1] | c.meeting | mark;
     return c;
 }
 

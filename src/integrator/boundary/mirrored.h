@@ -77,13 +77,16 @@ static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again
     return strip_around(x, y, way * (cosine * nx - sine * ny), way * (cosine * ny + sine * nx), length, v.y * length);
 }
 
-// The first vertex at which two lines of sight part because they meet different surfaces there. 0: none, or what the sensor
-// sees itself, or they are mirrored or refracted differently.
-static Int lines_part(const Sightline *a, const Sightline *b, Mask m) {
+// The first vertex at which two lines of sight part because they meet different surfaces there, or different fields of one's
+// textures. 0: none, or what the sensor sees itself, or they are mirrored or refracted differently.
+static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *a, const Sightline *b, Mask m) {
     Int level = i_set(0);
     for (int32_t i = 0; i < a->last && i < b->last; i++) {
         Mask same = mi_eq(a->hit[i].shape, b->hit[i].shape) & mi_eq(a->hit[i].prim, b->hit[i].prim) &
                     mi_eq(a->hit[i].instance, b->hit[i].instance) & mi_eq(a->behind[i], b->behind[i]);
+        Vec2 unused;
+        Mask met = m & same & mi_lt(i_set(-1), a->hit[i].shape);
+        same = same & ~fields_part(t->scene, job, a->hit[i].shape, a->uv[i], b->uv[i], met, &unused);
         level = i_select(m & ~same, i_set(i), level);
         m = m & same & mi_eq(a->lobe[i], b->lobe[i]) & lobe_turns(a->lobe[i]);
     }
@@ -119,7 +122,7 @@ static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKe
     strip_look(t, key, lens, s, 0, m, line);
     m = m & mi_lt(i_set(0), line[0].turns);
     strip_look(t, key, lens, s, 1, m, line + 1);
-    Int level = lines_part(line, line + 1, m);
+    Int level = lines_part(t, b, line, line + 1, m);
     m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
     for (;;) {
         Mask open = m & mi_lt(i_set(0), level) & m_gt(s->length, f_set(end));
@@ -128,7 +131,7 @@ static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKe
         }
         Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]);
         sightline_trace(t, key, lens, x, y, open, &middle);
-        Int before = lines_part(line, &middle, open), behind = lines_part(&middle, line + 1, open);
+        Int before = lines_part(t, b, line, &middle, open), behind = lines_part(t, b, &middle, line + 1, open);
         Mask first = open & mi_lt(i_set(0), before), second = open & ~first;
         sightline_take(line + 1, &middle, first);
         sightline_take(line, &middle, second);
@@ -159,9 +162,9 @@ static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const
     c->lens = sightline_lens(t, &own);
     strip_look(t, &key, c->lens, s, 0, m, c->line);
     strip_look(t, &key, c->lens, s, 1, m, c->line + 1);
-    c->level = lines_part(c->line, c->line + 1, m);
+    c->level = lines_part(t, b, c->line, c->line + 1, m);
     m = m & mi_lt(i_set(0), c->level);
-    c->crossing = crossing_find(t, c->line, c->level, m);
+    c->crossing = crossing_find(t, b, c->line, c->level, m);
     Carried carried = crossing_move_adj(t, &c->crossing, c->line, c->level, f_set(1), &still);
     c->x = 0.5f * (s->x[0] + s->x[1]);
     c->y = 0.5f * (s->y[0] + s->y[1]);
@@ -206,7 +209,7 @@ static int32_t strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         m = m & mi_lt(i_set(0), line[0].turns);
         if (m_any(m)) {
             strip_look(t, &key, lens, &s, 1, m, line + 1);
-            Int level = lines_part(line, line + 1, m);
+            Int level = lines_part(t, b, line, line + 1, m);
             m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
         }
         i_compress(kept + kept_count, slot, m);

@@ -11,6 +11,7 @@ typedef struct Sightline {
     Hit hit[MOST_SIGHT + 1]; // shape -1: nothing
     Vec3 d[MOST_SIGHT + 1];  // directions in which the line comes to them
     Vec3 o[MOST_SIGHT + 1];  // and where it begins behind the vertex before
+    Vec2 uv[MOST_SIGHT + 1]; // of the surfaces
     Int lobe[MOST_SIGHT + 1], behind[MOST_SIGHT + 1]; // LOBE_SMOOTH at its end; whether a surface is met from behind
     Int turns;               // how many of them mirror or refract
     Spec through[MOST_SIGHT + 1]; // what the vertices before let through, over the probability of their lobes
@@ -34,6 +35,8 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Vec3 wi = frame_to_local(&si.sh, v3_neg(s->d[i])), dp_dv;
         BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &h), t->floor, NULL, NULL};
+        s->uv[i].x = f_select(mine, si.uv.x, s->uv[i].x);
+        s->uv[i].y = f_select(mine, si.uv.y, s->uv[i].y);
         BsdfSurface surface;
         if (scene->bsdfs[group->bsdf].surface) {
             find_surface(scene, group, &h, &surface, &dp_dv);
@@ -85,6 +88,7 @@ static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens,
         s->o[i] = ray.o;
         s->lobe[i] = i_set(LOBE_SMOOTH);
         s->behind[i] = i_set(0);
+        s->uv[i] = (Vec2){f_set(0), f_set(0)};
         s->last = i + 1;
         m = m & mi_lt(i_set(-1), hit.shape);
         m = i < MOST_SIGHT && m_any(m) ? sightline_turn(t, key, i, m, s, &ray) : m_set(false);
@@ -101,6 +105,7 @@ static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
             to->o[i] = from->o[i];
             to->lobe[i] = from->lobe[i];
             to->behind[i] = from->behind[i];
+            to->uv[i] = from->uv[i];
             to->through[i] = from->through[i];
             continue;
         }
@@ -109,6 +114,7 @@ static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
         to->o[i] = v3_select(m, from->o[i], to->o[i]);
         to->lobe[i] = i_select(m, from->lobe[i], to->lobe[i]);
         to->behind[i] = i_select(m, from->behind[i], to->behind[i]);
+        to->uv[i] = (Vec2){f_select(m, from->uv[i].x, to->uv[i].x), f_select(m, from->uv[i].y, to->uv[i].y)};
         to->through[i] = spec_select(m, from->through[i], to->through[i]);
     }
     to->turns = i_select(m, from->turns, to->turns);
