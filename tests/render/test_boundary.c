@@ -34,6 +34,7 @@ static const Motion motions[] = {
     {"boundary_bulb.xml", "camera.to_world", SHIFT, {0, 0.5f, 1}, 0.02, 1},
     {"boundary_sky.xml", "card.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 4},
     {"boundary_sky.xml", "camera.to_world", SHIFT, {1, 0, 0}, 0.02, 1},
+    {"boundary_near.xml", "ball.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.02, 1},
     {"boundary_plan.xml", "tube.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1},
     {"boundary_plan.xml", "ball.to_world", GROW, {0.8f, -0.3f, 0.3f}, 0.02, 1},
     {"boundary_view.xml", "camera.to_world", TURN, {0.3f, 0.2f, 1}, 1, 1},
