@@ -55,6 +55,7 @@ static const Motion motions[] = {
     {"meeting_slide.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
     {"meeting_slide.xml", "floor.to_world", TURN, {1, 0.5f, 0}, 1, 1},
     {"meeting_slide.xml", "ball.to_world", GROW, {-0.7f, 0.3f, 0.9f}, 0.02, 1},
+    {"meeting_crate.xml", "crate.to_world", SHIFT, {1, 0, 0}, 0.01, 1},
     {"meeting_glow.xml", "floor.to_world", SHIFT, {0.2f, 0.3f, 1}, 0.1, 16},
     {"turning_lamp.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 1},
     {"turning_lamp.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},

@@ -376,12 +376,16 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n,
         Hit hit = trace_closest(t->scene, &ray, m, false);
         Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
+        // Surfaces that pass through each other are met where the ray is as far from the curve, by the angle in which it does.
+        Float beside = 2.0f * v3_length(v3_sub(v3_madd(ray.o, reach, ray.d), e->p));
+        Mask own_near = near | m_le(f_abs(found - reach), beside * f_safe_rcp(f_abs(v3_dot(ray.d, e->across[0]))));
+        Mask met_near = near | m_le(f_abs(found - reach), beside * f_safe_rcp(f_abs(v3_dot(ray.d, e->across[1]))));
         own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
         Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
-                                  (near & mi_eq(e->other, i_set(EDGE_ANY))));
+                                  (own_near & mi_eq(e->other, i_set(EDGE_ANY))));
         if (m_any(e->meeting)) {
             Mask other = met & mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
-            faces = faces | (e->meeting & near & other);
+            faces = faces | (e->meeting & met_near & other);
         }
         own[side] = (silhouette & own[side]) | faces;
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));

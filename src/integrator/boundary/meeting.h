@@ -52,15 +52,12 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
         hits[k].v = f_select(first, e.hit.v, e.met.v);
         first = ~first;
     }
-    if (m_any(border)) { // beside the curve
-        Vec3 normal, beside = v3_madd(e.p, step * f_safe_rcp(v3_length(half)), half);
-        Hit moved = point_hit(t->scene, i_select(border, hits[0].shape, i_set(-1)), hits[0].prim, hits[0].instance, beside,
-                              &normal);
-        hits[0].u = f_select(border, moved.u, hits[0].u);
-        hits[0].v = f_select(border, moved.v, hits[0].v);
-        e.p = v3_select(border, beside, e.p);
-    }
-    KEEP_HIT(q, at, edge, hits, e.p, m);
+    // Beside the curve, out of the way of the other surface.
+    Vec3 normal, beside = v3_madd(e.p, step * f_safe_rcp(v3_length(half)), half);
+    Hit moved = point_hit(t->scene, i_select(m, hits[0].shape, i_set(-1)), hits[0].prim, hits[0].instance, beside, &normal);
+    hits[0].u = f_select(m, moved.u, hits[0].u);
+    hits[0].v = f_select(m, moved.v, hits[0].v);
+    KEEP_HIT(q, at, edge, hits, v3_select(m, beside, e.p), m);
     KEEP_HIT(q, at, far, hits + 1, e.p, m);
     q->count += m_count(m);
 }
