@@ -1,6 +1,7 @@
 // check_report.c: what `reynolds check` prints.
 #include "check.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <unistd.h>
 
@@ -17,13 +18,21 @@ static void print_titles(FILE *file) {
             "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
 }
 
+// What rounds to 0 at `digits` has no sign.
+static double unsigned_zero(double value, int digits) {
+    return fabs(value) < 0.5 * pow(10, -digits) ? 0 : value;
+}
+
 static void print_row(FILE *file, const Check *check, const char *verdict) {
     const CheckResult *r = &check->result;
-    char block[32];
+    char block[32], fresh[32] = "-"; // of what moves the differences are of fresh paths themselves
+    if (check->replays) {
+        snprintf(fresh, sizeof fresh, "%.2f", unsigned_zero(check->fresh_z, 2));
+    }
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7.2f %9.1e  %s\n", check->spec, r->derivative,
-            r->gradient_standard_error, r->difference, check->step.h, 100 * r->relative_error, r->worst_z, block, r->sum_z,
-            check->fresh_z, check->reverse_error, verdict);
+    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7s %9.1e  %s\n", check->spec, r->derivative + 0.0,
+            r->gradient_standard_error, r->difference + 0.0, check->step.h, 100 * r->relative_error,
+            unsigned_zero(r->worst_z, 2), block, unsigned_zero(r->sum_z, 2), fresh, check->reverse_error, verdict);
 }
 
 // "refused [2]"; *number is the reason's.
@@ -102,11 +111,17 @@ rey_result check_print_table(rey_context *ctx, const Check *checks, int count, d
     rey_result result = print_rows(ctx, checks, count);
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
     int undecided = 0;
+    bool replayed = false;
+    char fresh[32] = "";
     for (int i = 0; i < count; i++) {
         undecided += checks[i].undecided;
+        replayed = replayed || (checks[i].verdict != VERDICT_REFUSED && checks[i].replays);
     }
-    printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3, fresh z up to %d, reverse = forward to %g\n",
-           wrong ? "FAILED" : undecided ? "undecided" : "passed", threshold, CHECK_FRESH_Z, CHECK_REVERSE_TOLERANCE);
+    if (replayed) {
+        snprintf(fresh, sizeof fresh, ", fresh z up to %d", CHECK_FRESH_Z);
+    }
+    printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3%s, reverse = forward to %g\n",
+           wrong ? "FAILED" : undecided ? "undecided" : "passed", threshold, fresh, CHECK_REVERSE_TOLERANCE);
     print_left_out(checks, count);
     if (count_verdicts(checks, count, VERDICT_KINK)) {
         printf("%d of %d stand at a kink: the derivative is that of one side\n", count_verdicts(checks, count, VERDICT_KINK),
@@ -157,7 +172,7 @@ void check_print_json(const Session *session, const rey_stats *stats, const Chec
         json_array_end(&json);
         json_number(&json, "sum_z", r->sum_z);
         json_bool(&json, "replayed", checks[i].replays);
-        json_number(&json, "fresh_z", checks[i].fresh_z);
+        json_number(&json, "fresh_z", checks[i].replays ? checks[i].fresh_z : (double)NAN);
         json_integer(&json, "tests", r->tests);
         json_number(&json, "step", checks[i].step.h);
         json_number(&json, "reverse_error", checks[i].reverse_error);

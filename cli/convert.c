@@ -1,16 +1,11 @@
 // convert.c: `reynolds convert`: a scene written back as one that stands alone.
 #include "cli.h"
 
+#include "io/file.h"
+
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
-
-// Whether both names mean one file.
-static bool same_file(const char *a, const char *b) {
-    struct stat x, y;
-    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
-}
 
 static void print_json(const Session *s) {
     Json json = json_begin(stdout);
@@ -41,7 +36,7 @@ int cli_convert(int argc, char **argv) {
         return status;
     }
     options.output = options.files[1];
-    if (same_file(options.files[0], options.files[1])) {
+    if (rey_file_same(options.files[0], options.files[1])) {
         status = cli_usage_error(&options, "%s is both read and written; name another file for the result", options.files[1]);
         cli_options_free(&options);
         return status;

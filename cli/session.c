@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "base/parallel.h"
 #include "io/file.h"
+#include "io/mitsuba.h"
 #include "render/used.h"
 
 #include <errno.h>
@@ -178,6 +179,23 @@ static rey_result check_output(const Session *s) {
     return rey_file_check_output(s->ctx, path);
 }
 
+// A picture over a texture, a mesh or another input would be the end of the scene.
+static rey_result refuse_inputs(const Session *s) {
+    const Options *o = s->options;
+    bool reads = false;
+    if (!o->output || !strcmp(o->output, "-") || o->reverse) {
+        return REY_OK;
+    }
+    rey_result result = rey_mitsuba_reads_file(s->scene, o->output, &reads);
+    for (int i = 0; i < o->load_count; i++) {
+        const char *equals = strchr(o->loads[i], '=');
+        reads = reads || rey_file_same(equals ? equals + 1 : o->loads[i], o->output);
+    }
+    return result || !reads ? result
+                            : rey_fail(s->ctx, REY_ERROR_ARGUMENT, "%s is both read and written; name another file for the result",
+                                       o->output);
+}
+
 static rey_result load_scene(Session *s) {
     const Options *o = s->options;
     rey_result result = check_output(s);
@@ -188,6 +206,9 @@ static rey_result load_scene(Session *s) {
     result = (o->lenient ? rey_scene_load_lenient : rey_scene_load)(s->ctx, o->files[0], o->defines, o->define_count,
                                                                     &s->scene);
     s->load_seconds = rey_seconds() - start;
+    if (!result) {
+        result = refuse_inputs(s);
+    }
     if (result) {
         return result;
     }

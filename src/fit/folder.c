@@ -76,6 +76,23 @@ static rey_result refuse_former(Fit *fit, const char *path) {
                     fit->output, state.iteration, PLURAL(state.iteration), more ? "--resume continues, " : "");
 }
 
+// Files of these names in a folder without a fit are somebody's own.
+static rey_result refuse_foreign(Fit *fit) {
+    static const char *const names[] = {"metrics.jsonl", "recovered.xml", "report.html"};
+    rey_result result = REY_OK;
+    for (int i = 0; i < COUNT_OF(names) && !result; i++) {
+        char *path = rey_fit_output_path(fit, names[i]);
+        bool written = fit->job.report_spp || strcmp(names[i], "report.html") != 0;
+        result = path ? REY_OK : REY_ERROR_MEMORY;
+        if (path && written && access(path, F_OK) == 0) {
+            result = rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s is there already, and no fit is in this folder that wrote it; "
+                              "--overwrite replaces it, -o writes elsewhere", path);
+        }
+        rey_free(fit->ctx, path);
+    }
+    return result;
+}
+
 static rey_result take_over(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin");
     rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
@@ -83,7 +100,10 @@ static rey_result take_over(Fit *fit) {
         result = fit->def->overwrite ? REY_OK : refuse_former(fit, path);
     }
     rey_free(fit->ctx, path);
-    return !result && rey_former_exists(fit) ? rey_former_remove(fit) : result;
+    if (result || rey_former_exists(fit)) {
+        return result ? result : rey_former_remove(fit);
+    }
+    return fit->def->overwrite ? REY_OK : refuse_foreign(fit);
 }
 
 rey_result rey_fit_folder_open(Fit *fit) {

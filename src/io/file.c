@@ -151,3 +151,8 @@ rey_result rey_file_read_part(rey_context *ctx, const char *path, int file, size
     }
     return REY_OK;
 }
+
+bool rey_file_same(const char *a, const char *b) {
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}

@@ -18,6 +18,9 @@ rey_result rey_file_read_part(rey_context *ctx, const char *path, int file, size
 // Devices and pipes are written as they are. On failure the temporary file is removed.
 rey_result rey_file_write(rey_context *ctx, const char *path, const void *bytes, size_t size);
 
+// Whether both names mean one regular file, links followed.
+bool rey_file_same(const char *a, const char *b);
+
 // Whether rey_file_write could write there now, tried with an empty temporary file: asked before long work. Removes
 // temporary files that a killed process left in the folder.
 rey_result rey_file_check_output(rey_context *ctx, const char *path);

@@ -1,5 +1,6 @@
 // kinds_used.c: which plugins a scene uses, and how often; which files it reads.
 #include "io/build.h"
+#include "io/file.h"
 #include "io/mitsuba.h"
 #include "io/xml_parts.h"
 
@@ -55,6 +56,35 @@ rey_result rey_mitsuba_reads(const rey_scene *scene, const char *beginning, char
             *out = path;
         } else {
             rey_free(scene->ctx, path);
+        }
+    }
+    return REY_OK;
+}
+
+// The file that a property stands in, or that it names.
+static rey_result is_of_property(const rey_scene *scene, const rey_xml_property *p, const char *path, bool *is) {
+    const SceneSource *source = scene->document;
+    bool names = (p->kind == REY_XML_STRING_VALUE && !strcmp(p->name, "filename")) || p->kind == REY_XML_SPECTRUM_VALUE;
+    char *file = NULL;
+    *is = rey_file_same(p->at.file, path);
+    if (*is || !names || !p->string) {
+        return REY_OK;
+    }
+    rey_result result = rey_xml_search(scene->ctx, source->document, NULL, p->string, &file);
+    *is = file && rey_file_same(file, path);
+    rey_free(scene->ctx, file);
+    return result;
+}
+
+rey_result rey_mitsuba_reads_file(const rey_scene *scene, const char *path, bool *reads) {
+    const SceneSource *source = scene->document;
+    const char *own = source ? rey_mitsuba_file(scene) : NULL;
+    *reads = own && rey_file_same(own, path);
+    for (int i = 0; source && i < rey_xml_node_count(source->document) && !*reads; i++) {
+        const rey_xml_node *node = rey_xml_node_at(source->document, i);
+        *reads = rey_file_same(node->at.file, path);
+        for (int k = 0; k < node->property_count && !*reads; k++) {
+            TRY(is_of_property(scene, &node->properties[k], path, reads));
         }
     }
     return REY_OK;

@@ -29,5 +29,8 @@ typedef struct KindCount {
 // none. The caller frees *out with rey_free.
 rey_result rey_mitsuba_reads(const rey_scene *scene, const char *beginning, char **out);
 
+// Whether a scene reads a file: its own one, what it includes, meshes, pictures, spectra and the like.
+rey_result rey_mitsuba_reads_file(const rey_scene *scene, const char *path, bool *reads);
+
 // Of KindCount, ordered by tag; the caller frees it with rey_array_free.
 rey_result rey_mitsuba_kinds(const rey_scene *scene, Array *counts);

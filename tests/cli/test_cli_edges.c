@@ -1,6 +1,8 @@
 // test_cli_edges.c: what users do at the edges: strange outputs, broken options, signals, unequal pictures.
 #include "command.h"
 
+#include <sys/stat.h>
+
 static void outputs_may_be_devices(void **state) {
     Fixture *f = *state;
     expect(f, 0, "render %s -o /dev/null --spp 1");
@@ -177,6 +179,65 @@ static void unequal_pictures(void **state) {
     json_free(node);
 }
 
+// A picture does not replace what the scene reads, under whatever name.
+static void inputs_are_not_written(void **state) {
+    Fixture *f = *state;
+    write_words("lit.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
+                           "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+                           "<emitter type='envmap' id='sky'><string name='filename' value='sky.exr'/></emitter></scene>");
+    expect(f, 0, "render %s -o sky.exr --spp 1");
+    assert_int_equal(system("cp sky.exr before.exr && ln -s sky.exr alias.exr"), 0);
+    expect_words(f, 2, "render lit.xml -o sky.exr --spp 1", "sky.exr is both read and written; name another file");
+    expect_words(f, 2, "render lit.xml -o alias.exr --spp 1", "alias.exr is both read and written");
+    expect_words(f, 2, "grad lit.xml --param sky.scale -o sky.exr --spp 16", "sky.exr is both read and written");
+    expect_words(f, 2, "render lit.xml --load sky.data=before.exr -o before.exr --spp 1", "before.exr is both read");
+    assert_int_equal(system("cmp -s sky.exr before.exr"), 0);
+    expect(f, 0, "render lit.xml -o other.exr --spp 1");
+    // What is included is read, too.
+    write_words("part.xml", "<scene version='3.0.0'><bsdf type='diffuse' id='grey'/></scene>");
+    write_words("whole.xml", "<scene version='3.0.0'><include filename='part.xml'/></scene>");
+    expect_words(f, 2, "convert whole.xml part.xml", "part.xml is both read and written");
+}
+
+// A report of somebody else in a folder without a fit stays.
+static void fits_replace_no_foreign_files(void **state) {
+    Fixture *f = *state;
+    char arguments[2048], fit[2048];
+    snprintf(arguments, sizeof arguments, "render '%s/truth.xml' -o target.exr --spp 16", TEST_JOBS);
+    expect(f, 0, arguments);
+    snprintf(fit, sizeof fit, "fit '%s/job.yaml' --set views.0.target=$PWD/target.exr --set iterations=1 -o mine", TEST_JOBS);
+    assert_int_equal(mkdir("mine", 0777), 0);
+    write_words("mine/report.html", "somebody's");
+    write_words("mine/notes.txt", "somebody's");
+    expect_words(f, 2, fit, "mine/report.html is there already, and no fit is in this folder that wrote it; --overwrite");
+    assert_int_equal(system("grep -q somebody mine/report.html && test ! -e mine/job.resolved.yaml"), 0);
+    snprintf(arguments, sizeof arguments, "%s --set report_spp=0", fit);
+    expect(f, 0, arguments); // writes no report
+    assert_int_equal(system("grep -q somebody mine/report.html && rm -r mine"), 0);
+    assert_int_equal(mkdir("mine", 0777), 0);
+    write_words("mine/report.html", "somebody's");
+    snprintf(arguments, sizeof arguments, "%s --overwrite", fit);
+    expect(f, 0, arguments);
+    assert_int_equal(system("grep -q '<html' mine/report.html && rm -r mine && mkdir mine"), 0);
+    write_words("mine/notes.txt", "somebody's");
+    expect(f, 0, fit);
+}
+
+// Differences of what moves are of fresh paths: there is no second comparison, and no word of one.
+static void fresh_paths_are_compared_where_others_were(void **state) {
+    Fixture *f = *state;
+    const char *check = "check %s --param ball.to_world:translate=1,0,0 --spp 32";
+    expect(f, 0, check);
+    assert_null(strstr(f->out, "fresh z up to"));
+    assert_null(strstr(f->out, "-0.00 "));
+    assert_non_null(strstr(f->out, "      - "));
+    JsonNode *node = run_json(f, 0, "check %s --param ball.to_world:translate=1,0,0 --spp 32 --json");
+    assert_non_null(strstr(f->out, "\"fresh_z\": null"));
+    json_free(node);
+    expect(f, 0, "check %s --param white.reflectance.value --spp 32");
+    assert_non_null(strstr(f->out, "fresh z up to 5"));
+}
+
 // What would compare rounding with rounding is no check.
 static void steps_that_floats_lose_are_refused(void **state) {
     Fixture *f = *state;
@@ -234,6 +295,9 @@ int main(void) {
         cmocka_unit_test(tables_are_aligned),
         cmocka_unit_test(unequal_pictures),
         cmocka_unit_test(steps_that_floats_lose_are_refused), cmocka_unit_test(cancelling_texels_are_no_error),
+        cmocka_unit_test(inputs_are_not_written),
+        cmocka_unit_test(fits_replace_no_foreign_files),
+        cmocka_unit_test(fresh_paths_are_compared_where_others_were),
         cmocka_unit_test(dropped_samples_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
