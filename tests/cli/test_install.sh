@@ -12,6 +12,9 @@ cmake --install "$build" --prefix "$prefix" > /dev/null
 found=$(dirname "$(find "$prefix" -name reynolds.pc)")
 export PKG_CONFIG_PATH="$found"
 libraries=$(dirname "$found")
+for file in "$prefix/bin/reynolds" "$libraries/libreynolds.so" "$libraries/libreynolds.a"; do # without what debuggers read
+    ! objdump -h "$file" | grep -q '\.debug_info' || { echo "$file has debug information"; exit 1; }
+done
 example=$source/examples/c/example.c
 cp "$source/tests/cli/box.xml" "$folder/box.xml"
 
