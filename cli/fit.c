@@ -120,6 +120,9 @@ static void print_json(const FitResult *result) {
     json_object(&json, NULL);
     json_integer(&json, "iterations", result->iterations);
     json_bool(&json, "converged", result->converged);
+    json_bool(&json, "still_falling", result->falling);
+    json_integer(&json, "iterations_before", result->iterations_before);
+    json_number(&json, "seconds_before", result->seconds_before);
     json_number(&json, "loss", result->loss);
     rey_fit_loss_words(result, words, sizeof words);
     json_string(&json, "loss_is", result->iterations ? words : NULL);
@@ -171,9 +174,13 @@ static void print_json(const FitResult *result) {
 static void print_words(const FitResult *result) {
     char words[64];
     print_table(result);
-    printf("\n%lld number%s, %d iteration%s%s, %.1f s (%.1f s in all)", (long long)result->numbers, PLURAL(result->numbers),
-           result->iterations, PLURAL(result->iterations), result->converged ? " (converged)" : "", result->seconds,
-           cli_seconds_total());
+    printf("\n%lld unknown%s, %d iteration%s%s, ", (long long)result->numbers, PLURAL(result->numbers), result->iterations,
+           PLURAL(result->iterations), result->converged ? " (converged)" : "");
+    if (result->seconds_before > 0) {
+        printf("%.1f s in this run, %.1f s in all runs", cli_seconds_total(), result->seconds_before + cli_seconds_total());
+    } else {
+        printf("%.1f s (%.1f s in all)", result->seconds, cli_seconds_total());
+    }
     if (result->iterations) {
         rey_fit_loss_words(result, words, sizeof words);
         printf(", loss %.4g (%s)\n", result->loss, words);
@@ -195,6 +202,23 @@ static void print_words(const FitResult *result) {
         printf("scene   %s\n", result->scene);
     } else if (result->note) {
         cli_note("the recovered scene was not written: %s", result->note);
+    }
+}
+
+// What a user would not guess from the table.
+static void print_end(const FitResult *result, bool resumed) {
+    fflush(stdout); // these words stand below the table
+    int done = result->iterations;
+    if (resumed && done == result->iterations_before && result->converged) {
+        cli_note("nothing was left to do: the stop rule has ended this fit after %d iteration%s; table and report are made again",
+                 done, PLURAL(done));
+    } else if (resumed && done == result->iterations_before) {
+        cli_note("nothing was left to do: %d iteration%s done already, --set iterations=N with a larger N asks for more; table "
+                 "and report are made again", done, done == 1 ? " was" : "s were");
+    }
+    if (result->falling) {
+        cli_note("the loss was still falling when the iterations ended: --resume --set iterations=%lld goes on from there",
+                 2 * (long long)done);
     }
 }
 
@@ -352,6 +376,7 @@ static int run(const Options *options, Session *session, const char *command) {
         } else {
             print_words(&result);
         }
+        print_end(&result, options->resume);
         status = cli_finish_output();
     }
     rey_fit_result_free(&result);

@@ -195,7 +195,10 @@ static void test_foreign_folder(void **state) {
     assert_int_equal(unlink(path), 0);
     path_of(f, "out/job.resolved.yaml", path);
     assert_int_equal(unlink(path) || write_text(f, "out/events.out.tfevents.1.host", "mine"), 0);
-    assert_int_equal(run_fit(f, ANEW, 1, NULL), REY_ERROR_CANCELLED);
+    assert_int_equal(run_fit(f, ANEW, 1, NULL), REY_ERROR_ARGUMENT); // its names are taken
+    assert_non_null(strstr(rey_error(f->ctx), "no fit is in this folder that wrote it"));
+    assert_true(stands(f, "out/metrics.jsonl") && stands(f, "out/recovered.xml") && !stands(f, "out/job.resolved.yaml"));
+    assert_int_equal(run_fit(f, OVERWRITE, 1, NULL), REY_ERROR_CANCELLED);
     assert_true(stands(f, "out/events.out.tfevents.1.host") && stands(f, "out/report.html"));
 }
 

@@ -5,6 +5,7 @@
 #include "fit/inputs.h"
 #include "fit/lbfgs.h"
 #include "fit/report.h"
+#include "fit/rigid.h"
 #include "io/file.h"
 
 #include <locale.h>
@@ -170,6 +171,8 @@ static rey_result open_fit(Fit *fit) {
     if (!result) {
         result = write_resolved(fit);
     }
+    fit->first = fit->state.iteration;
+    fit->earlier = fit->state.seconds;
     fit->start_seconds = rey_seconds() - fit->state.seconds;
     return result ? result : rey_metrics_open(fit);
 }
@@ -221,11 +224,26 @@ void rey_fit_loss_words(const FitResult *result, char *text, size_t size) {
     }
 }
 
+// Rotation, shift and scale are what a pose of 16 entries is free to do.
+static int64_t degrees_of_freedom(const Unknowns *u) {
+    int64_t count = 0;
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        count += p->parameterisation == PARAMETERISATION_RIGID        ? RIGID_VARIABLES
+                 : p->parameterisation == PARAMETERISATION_SIMILARITY ? SIMILAR_VARIABLES
+                                                                      : p->count;
+    }
+    return count;
+}
+
 static rey_result finish(Fit *fit, FitResult *out) {
     out->iterations = fit->state.iteration;
     out->converged = fit->state.converged;
+    out->falling = rey_fit_falling(fit);
+    out->iterations_before = fit->first;
+    out->seconds_before = fit->earlier;
     out->seconds = fit->state.seconds;
-    out->numbers = fit->unknowns.count;
+    out->numbers = degrees_of_freedom(&fit->unknowns);
     out->nonfinite = fit->nonfinite;
     set_loss(fit, out);
     out->output = rey_strdup(fit->ctx, fit->output);

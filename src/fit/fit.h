@@ -53,10 +53,13 @@ typedef struct FitResult {
     rey_context *ctx;
     int iterations;
     bool converged; // by the stop rule
+    bool falling;   // the iterations ended while the loss was still falling: more of them find more
+    int iterations_before; // of those, done by the runs before
+    double seconds_before; // of `seconds`, of the runs before
     double loss;    // of the last iterations, or at the best point: see rey_fit_loss_words; NaN when there was none
     int loss_window; // iterations that it is the mean of; 0 = it is the one at the best point, which L-BFGS ends at
     double seconds; // of all runs
-    int64_t numbers;
+    int64_t numbers; // degrees of freedom: 6 of a rigid pose
     int64_t nonfinite; // samples of this run that were left out because they were not finite; 0 in a healthy fit
     Array rows;                    // FitRow
     Array held_out;                // FitHeldOut; none without a report
@@ -101,6 +104,8 @@ typedef struct Fit {
     void *metrics;        // FILE *
     double start_seconds; // clock at which this run started, less the time of earlier runs
     int lock;             // descriptor of the locked folder + 1, 0 = none
+    int first;            // iteration at which this run started
+    double earlier;       // seconds of the runs before
     int saved;            // iteration of the last checkpoint of this run, -1 = none yet
     bool stop;            // the user asked to stop
     int64_t nonfinite;    // samples of the iterations that were left out because they were not finite
@@ -117,6 +122,8 @@ rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set
 
 // The iterations that are left, with checkpoints; records REY_ERROR_CANCELLED when the user stops it.
 rey_result rey_fit_optimise(Fit *fit);
+// Whether the loss fell from the last tenth but one to the last tenth of the iterations, by more than its noise.
+bool rey_fit_falling(const Fit *fit);
 double rey_fit_mean_loss(const FitState *state, int end, int count); // of the `count` iterations before `end`
 int rey_fit_batches(const Job *job); // iterations in which every view has its turn once
 

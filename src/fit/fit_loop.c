@@ -244,6 +244,27 @@ double rey_fit_mean_loss(const FitState *state, int end, int count) {
     return sum;
 }
 
+// Square of the standard error of the mean of `count` losses before `end`.
+static double loss_variance(const FitState *state, int end, int count) {
+    double mean = rey_fit_mean_loss(state, end, count), sum = 0;
+    for (int i = end - count; i < end; i++) {
+        double off = ARRAY_AT(state->history, double, (size_t)i *(size_t)state->history_width + HISTORY_LOSS) - mean;
+        sum += off * off;
+    }
+    return sum / (count - 1) / count;
+}
+
+bool rey_fit_falling(const Fit *fit) {
+    enum { SHORTEST = 5 };
+    int n = fit->state.iteration, window = n / 10 > SHORTEST ? n / 10 : SHORTEST;
+    if (fit->state.converged || n < 2 * window) {
+        return false;
+    }
+    double now = rey_fit_mean_loss(&fit->state, n, window), before = rey_fit_mean_loss(&fit->state, n - window, window);
+    double noise = sqrt(loss_variance(&fit->state, n, window) + loss_variance(&fit->state, n - window, window));
+    return before - now > fmax(3 * noise, 0.05 * fabs(now));
+}
+
 // Stop rule: the mean loss of the last window is not lower than that of the window before by the tolerance.
 static bool has_converged(const Fit *fit) {
     int n = fit->state.iteration, window = fit->job.stop_window;

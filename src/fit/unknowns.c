@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { SHOWN_NAMES = 3 }; // of what a pattern passes over
+
 static const double LOG_FLOOR = 1e-6; // lower bound where a parameter has none and log needs one
 
 static rey_result fail_at(Job *job, const JobParameter *p, const char *name, const char *why) {
@@ -335,6 +337,20 @@ static rey_result fail_exposure(Job *job, const JobParameter *p, int view) {
     return fail_at(job, p, p->name, why);
 }
 
+// A pattern that passes over all that it matches; passed: the names of some of them, of `count`.
+static rey_result fail_pattern(Job *job, const JobParameter *p, const char *passed, int count) {
+    char why[1024], more[32] = "";
+    if (count == 0) {
+        return fail_at(job, p, p->name, "matches no parameter of the scene; 'reynolds params' lists them");
+    }
+    if (count > SHOWN_NAMES) {
+        snprintf(more, sizeof more, " and %d more", count - SHOWN_NAMES);
+    }
+    snprintf(why, sizeof why, "matches only %s%s, which move%s things or ha%s no derivative: a pattern passes over those; name "
+             "them one by one", passed, more, count == 1 ? "s" : "", count == 1 ? "s" : "ve");
+    return fail_at(job, p, p->name, why);
+}
+
 static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
     const JobParameter *p = &job->parameters[index];
     if (p->parameterisation == PARAMETERISATION_SCATTERING) {
@@ -361,17 +377,22 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
         }
         return add_unknown(job, scene, param, p, index, owners, u);
     }
-    for (int i = 0; i < rey_param_count(scene) && !result; i++) { // a glob passes over what cannot be differentiated
+    char passed[512] = "";
+    int passed_count = 0;
+    for (int i = 0; i < rey_param_count(scene) && !result; i++) { // a glob passes over what moves or cannot be differentiated
         rey_param_info info;
         result = rey_param_get_info(scene, i, &info);
-        if (!result && info.terms == REY_TERM_INTERIOR && rey_name_matches(p->name, info.name)) {
+        if (result || !rey_name_matches(p->name, info.name)) {
+            continue;
+        }
+        if (info.terms == REY_TERM_INTERIOR) {
             result = add_unknown(job, scene, i, p, index, owners, u);
+        } else if (passed_count++ < SHOWN_NAMES) {
+            size_t used = strlen(passed);
+            snprintf(passed + used, sizeof passed - used, "%s%s", used ? ", " : "", info.name);
         }
     }
-    if (!result && u->items.count == before) {
-        return fail_at(job, p, p->name, "matches no differentiable parameter of the scene");
-    }
-    return result;
+    return result || u->items.count > before ? result : fail_pattern(job, p, passed, passed_count);
 }
 
 static rey_result allocate(const Job *job, Unknowns *u) {

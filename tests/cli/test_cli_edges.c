@@ -238,6 +238,56 @@ static void fresh_paths_are_compared_where_others_were(void **state) {
     assert_non_null(strstr(f->out, "fresh z up to 5"));
 }
 
+// A job over the box.
+static void write_job(const char *path, const char *parameters) {
+    char text[1024];
+    snprintf(text, sizeof text, "scene: '%s'\nviews: [{target: target.exr, sensor: 0}]\nspp: 64\nloss: {type: l2}\niterations: 20\n"
+             "optimizer: {learning_rate: 0.02}\nreport_spp: 2\nimage_every: 0\nparameters: %s\n", TEST_SCENE, parameters);
+    write_words(path, text);
+}
+
+// The end says what was done, whether it was enough, and how long this run and all of them took.
+static void ends_of_fits_are_told(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "render %s -o target.exr --spp 16");
+    write_job("end.yaml", "[{name: white.reflectance.value, start: [0.1, 0.2, 0.3]}]");
+    expect_words(f, 0, "fit end.yaml -o end",
+                 "the loss was still falling when the iterations ended: --resume --set iterations=40 goes on");
+    assert_null(strstr(f->out, "all runs"));
+    assert_int_equal(system("grep -q 'loss was still falling' end/report.html"), 0);
+    expect_words(f, 0, "fit end.yaml -o end --resume",
+                 "nothing was left to do: 20 iterations were done already");
+    assert_non_null(strstr(f->out, "in this run, "));
+    expect_words(f, 0, "fit end.yaml -o end --resume --set iterations=6",
+                 "nothing was left to do: 20 iterations were done already");
+    JsonNode *node = run_json(f, 0, "fit end.yaml -o end --resume --set iterations=21 --json");
+    assert_true(json_value(node, "iterations_before", -1) == 20 && json_value(node, "iterations", -1) == 21);
+    assert_true(json_value(node, "seconds_before", -1) > 0);
+    assert_true(json_value(node, "seconds", -1) > json_value(node, "seconds_before", -1));
+    assert_null(strstr(f->words, "nothing was left"));
+    json_free(node);
+    write_job("flat.yaml", "[white.reflectance.value]"); // begins at the truth: nothing to fall to
+    expect(f, 0, "fit flat.yaml -o flat");
+    assert_null(strstr(f->words, "falling"));
+    assert_int_not_equal(system("grep -q 'still falling' flat/report.html"), 0);
+}
+
+// Patterns pass over what moves, and a pose counts as what it is free to do.
+static void poses_are_named(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "render %s -o target.exr --spp 16");
+    write_job("poses.yaml", "['*.to_world']");
+    expect_words(f, 1, "fit poses.yaml -o poses", "parameter '*.to_world': matches only ");
+    assert_non_null(strstr(f->words, "which move things or have no derivative: a pattern passes over those; name them one by one"));
+    write_job("poses.yaml", "['nothing.*']");
+    expect_words(f, 1, "fit poses.yaml -o poses", "matches no parameter of the scene");
+    write_job("poses.yaml", "[{name: ball.to_world, parameterisation: rigid}]");
+    JsonNode *node = run_json(f, 0, "fit poses.yaml -o poses --set iterations=2 --json");
+    assert_true(json_value(node, "numbers", -1) == 6);
+    json_free(node);
+    assert_int_equal(system("grep -q '>6 unknown numbers in 1 parameter,' poses/report.html"), 0);
+}
+
 // What would compare rounding with rounding is no check.
 static void steps_that_floats_lose_are_refused(void **state) {
     Fixture *f = *state;
@@ -298,6 +348,8 @@ int main(void) {
         cmocka_unit_test(inputs_are_not_written),
         cmocka_unit_test(fits_replace_no_foreign_files),
         cmocka_unit_test(fresh_paths_are_compared_where_others_were),
+        cmocka_unit_test(ends_of_fits_are_told),
+        cmocka_unit_test(poses_are_named),
         cmocka_unit_test(dropped_samples_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
