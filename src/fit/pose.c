@@ -59,6 +59,18 @@ static void rotation_vector(double r[3][3], double out[3]) {
     }
 }
 
+void rey_pose_part(const float *pose, PosePart part, double out[3]) {
+    double r[3][3], lengths[3];
+    unit_columns(pose, r, lengths);
+    if (part == POSE_TURN) {
+        rotation_vector(r, out);
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        out[k] = part == POSE_PLACE ? (double)pose[SIDE * k + 3] : lengths[k];
+    }
+}
+
 // Three numbers without the dust of rounding.
 static int put_three(char *text, size_t size, const double *v) {
     double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2]))), x[3];

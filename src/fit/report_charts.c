@@ -1,4 +1,5 @@
 // report_charts.c: curves of the history as inline SVG.
+#include "fit/pose.h"
 #include "fit/report_parts.h"
 
 #include <math.h>
@@ -8,6 +9,8 @@ enum { WIDE = 460, HIGH = 220, LEFT = 58, TOP = 8, BOTTOM = 36, SPARK_WIDE = 150
 typedef struct Chart {
     const Fit *fit;
     int column, count;  // columns of the history; three are red, green and blue
+    bool pose;          // the columns are those of a pose, and the three curves those of `part`
+    PosePart part;
     int reach;          // above 0, the curve is smoothed over 2 reach + 1 points and the raw one is pale
     const float *truth; // of each column, dashed; may be null
     const char *label;  // what the vertical axis shows
@@ -19,12 +22,35 @@ static double cell(const Fit *fit, int64_t row, int column) {
     return ARRAY_AT(fit->state.history, double, (size_t)(row * fit->state.history_width + column));
 }
 
-// Mean of a column over the rows of bin `bin` out of `bins`.
-static double bin_mean(const Fit *fit, int column, int bin, int bins) {
-    int64_t rows = fit->state.iteration, first = bin * rows / bins, last = (bin + 1) * rows / bins;
+// What curve k shows of a row.
+static double value_of(const Chart *c, int64_t row, int k) {
+    if (!c->pose) {
+        return cell(c->fit, row, c->column + k);
+    }
+    float pose[16];
+    double three[3];
+    for (int i = 0; i < COUNT_OF(pose); i++) {
+        pose[i] = (float)cell(c->fit, row, c->column + i);
+    }
+    rey_pose_part(pose, c->part, three);
+    return three[k];
+}
+
+static double truth_of(const Chart *c, int k) {
+    double three[3];
+    if (!c->pose) {
+        return (double)c->truth[k];
+    }
+    rey_pose_part(c->truth, c->part, three);
+    return three[k];
+}
+
+// Mean of a curve over the rows of bin `bin` out of `bins`.
+static double bin_mean(const Chart *c, int k, int bin, int bins) {
+    int64_t rows = c->fit->state.iteration, first = bin * rows / bins, last = (bin + 1) * rows / bins;
     double sum = 0;
     for (int64_t i = first; i < last; i++) {
-        sum += cell(fit, i, column);
+        sum += value_of(c, i, k);
     }
     return sum / (double)(last - first);
 }
@@ -34,12 +60,12 @@ static int bin_count(const Fit *fit, int most) {
 }
 
 // Mean of the bins around one.
-static double smooth(const Chart *c, int column, int bin, int bins, int reach) {
+static double smooth(const Chart *c, int k, int bin, int bins, int reach) {
     double sum = 0;
     int count = 0;
-    for (int k = bin - reach; k <= bin + reach; k++) {
-        if (k >= 0 && k < bins) {
-            sum += bin_mean(c->fit, column, k, bins);
+    for (int b = bin - reach; b <= bin + reach; b++) {
+        if (b >= 0 && b < bins) {
+            sum += bin_mean(c, k, b, bins);
             count++;
         }
     }
@@ -64,10 +90,10 @@ static bool set_range(Chart *c) {
     c->high = -INFINITY;
     for (int k = 0; k < c->count; k++) {
         for (int i = 0; i < bins; i++) {
-            widen(c, bin_mean(c->fit, c->column + k, i, bins));
+            widen(c, bin_mean(c, k, i, bins));
         }
         if (c->truth) {
-            widen(c, (double)c->truth[k]);
+            widen(c, truth_of(c, k));
         }
     }
     if (!(c->high >= c->low)) {
@@ -141,28 +167,44 @@ static void axes(const Chart *c, Text *html) {
                  LEFT + (WIDE - LEFT - 10) / 2, HIGH - 4, LEFT, WIDE - 10, HIGH - BOTTOM, HIGH - BOTTOM);
 }
 
-static const char *colour(int count, int k) {
-    static const char *const names[] = {" c0", " c1", " c2"};
-    return count == 3 ? names[k] : "";
+// One curve has the accent's colour, three those of their channels, others one of as many hues.
+static void put_class(Text *html, const char *name, const char *property, int count, int k) {
+    if (count == 3) {
+        rey_text_add(html, " class=\"%s c%d\"", name, k);
+    } else if (count > 1) {
+        rey_text_add(html, " class=\"%s\" style=\"%s:hsl(%d,60%%,%d%%)\"", name, property, 360 * k / count, k % 2 ? 60 : 40);
+    } else {
+        rey_text_add(html, " class=\"%s\"", name);
+    }
 }
 
-static void curve(const Chart *c, int column, int reach, const char *style, const char *tint, Text *html) {
+static void curve(const Chart *c, int k, int reach, const char *style, Text *html) {
     int bins = bin_count(c->fit, MOST_POINTS);
-    rey_text_add(html, "<polyline class=\"%s%s\" points=\"", style, tint);
+    rey_text_add(html, "<polyline");
+    put_class(html, style, "stroke", c->count, k);
+    rey_text_add(html, " points=\"");
     for (int i = 0; i < bins; i++) {
         rey_text_add(html, "%.1f,%.1f ", x_of(c, c->fit->state.iteration * (i + 0.5) / bins),
-                     y_of(c, smooth(c, column, i, bins, reach)));
+                     y_of(c, smooth(c, k, i, bins, reach)));
     }
     rey_text_add(html, "\"/>\n");
 }
 
 static void legend(const Chart *c, Text *html) {
-    static const char *const channels[] = {"red", "green", "blue"};
+    static const char *const channels[] = {"red", "green", "blue"}, *const axes_names[] = {"x", "y", "z"};
+    static const char *const parts[] = {", position", ", rotation: axis times angle [deg]", ", scale"};
     rey_text_add(html, "<figcaption>");
     rey_text_html(html, c->label);
+    rey_text_add(html, "%s", c->pose ? parts[c->part] : "");
     rey_text_add(html, c->logarithmic ? ", logarithmic scale" : "");
-    for (int k = 0; k < 3 && c->count == 3; k++) {
-        rey_text_add(html, " <b class=\"key%s\"></b>%s", colour(3, k), channels[k]);
+    for (int k = 0; k < c->count && c->count > 1; k++) {
+        rey_text_add(html, " <b");
+        put_class(html, "key", "border-color", c->count, k);
+        if (c->count == 3) {
+            rey_text_add(html, "></b>%s", c->pose ? axes_names[k] : channels[k]);
+        } else {
+            rey_text_add(html, "></b>%d", k);
+        }
     }
     if (c->reach) {
         rey_text_add(html, " <b class=\"key pale\"></b>each iteration <b class=\"key\"></b>running mean");
@@ -183,14 +225,15 @@ static void put_chart(Chart *c, Text *html) {
     axes(c, html);
     for (int k = 0; k < c->count; k++) {
         if (c->truth) {
-            double y = y_of(c, (double)c->truth[k]);
-            rey_text_add(html, "<line class=\"truth%s\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>",
-                         colour(c->count, k), LEFT, WIDE - 10, y, y);
+            double y = y_of(c, truth_of(c, k));
+            rey_text_add(html, "<line");
+            put_class(html, "truth", "stroke", c->count, k);
+            rey_text_add(html, " x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", LEFT, WIDE - 10, y, y);
         }
         if (c->reach) {
-            curve(c, c->column + k, 0, "raw", colour(c->count, k), html);
+            curve(c, k, 0, "raw", html);
         }
-        curve(c, c->column + k, c->reach, "line", colour(c->count, k), html);
+        curve(c, k, c->reach, "line", html);
     }
     rey_text_add(html, "</svg>");
     legend(c, html);
@@ -229,11 +272,28 @@ static bool wants_logarithm(const Chart *c) {
     double low = INFINITY, high = 0;
     for (int k = 0; k < c->count; k++) {
         for (int i = 0; i < c->fit->state.iteration; i++) {
-            low = fmin(low, cell(c->fit, i, c->column + k));
-            high = fmax(high, cell(c->fit, i, c->column + k));
+            low = fmin(low, value_of(c, i, k));
+            high = fmax(high, value_of(c, i, k));
         }
     }
     return low > 0 && high > 8 * low;
+}
+
+// What moves of a pose: a rigid one keeps its scale.
+static void put_pose(Chart *c, Text *html) {
+    c->pose = true;
+    c->count = 3;
+    for (c->part = 0; c->part < POSE_PARTS; c->part++) {
+        double low = INFINITY, high = 0;
+        for (int i = 0; i < c->fit->state.iteration * 3 && c->part == POSE_SCALE; i++) {
+            double first = value_of(c, 0, i % 3), factor = first != 0 ? value_of(c, i / 3, i % 3) / first : 1;
+            low = fmin(low, factor);
+            high = fmax(high, factor);
+        }
+        if (c->part != POSE_SCALE || high - low > 1e-4) {
+            put_chart(c, html);
+        }
+    }
 }
 
 void rey_report_histories(const Fit *fit, const FitResult *out, Text *html) {
@@ -246,16 +306,22 @@ void rey_report_histories(const Fit *fit, const FitResult *out, Text *html) {
         }
         Chart chart = {
             .fit = fit, .column = column, .count = (int)row->count, .truth = row->truth, .label = row->name};
-        chart.logarithmic = wants_logarithm(&chart);
-        put_chart(&chart, html);
+        if (rey_fit_row_is_pose(row)) {
+            put_pose(&chart, html);
+        } else {
+            chart.logarithmic = wants_logarithm(&chart);
+            put_chart(&chart, html);
+        }
         column += (int)row->count;
     }
     rey_text_add(html, "</div>\n");
 }
 
-void rey_report_sparkline(const Fit *fit, int column, int64_t count, const float *truth, Text *html) {
+void rey_report_sparkline(const Fit *fit, int column, const FitRow *row, Text *html) {
     int bins = bin_count(fit, SPARK_WIDE);
-    Chart c = {.fit = fit, .column = column, .count = (int)count, .truth = truth};
+    bool pose = rey_fit_row_is_pose(row); // of which it shows the place
+    const float *truth = row->truth;
+    Chart c = {.fit = fit, .column = column, .count = pose ? 3 : (int)row->count, .truth = truth, .pose = pose};
     if (!set_range(&c)) {
         return;
     }
@@ -263,14 +329,17 @@ void rey_report_sparkline(const Fit *fit, int column, int64_t count, const float
     rey_text_add(html, "<svg width=\"%d\" height=\"%d\" role=\"img\" aria-label=\"history\">", SPARK_WIDE, SPARK_HIGH);
     for (int k = 0; k < c.count; k++) {
         if (truth) {
-            double y = 2 + per_y * (c.high - (double)truth[k]);
-            rey_text_add(html, "<line class=\"truth%s\" x1=\"0\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", colour(c.count, k),
-                         SPARK_WIDE, y, y);
+            double y = 2 + per_y * (c.high - truth_of(&c, k));
+            rey_text_add(html, "<line");
+            put_class(html, "truth", "stroke", c.count, k);
+            rey_text_add(html, " x1=\"0\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", SPARK_WIDE, y, y);
         }
-        rey_text_add(html, "<polyline class=\"line%s\" points=\"", colour(c.count, k));
+        rey_text_add(html, "<polyline");
+        put_class(html, "line", "stroke", c.count, k);
+        rey_text_add(html, " points=\"");
         for (int i = 0; i < bins; i++) {
             rey_text_add(html, "%.1f,%.1f ", SPARK_WIDE * (i + 0.5) / bins,
-                         2 + per_y * (c.high - bin_mean(fit, column + k, i, bins)));
+                         2 + per_y * (c.high - bin_mean(&c, k, i, bins)));
         }
         rey_text_add(html, "\"/>");
     }

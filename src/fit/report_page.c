@@ -63,7 +63,7 @@ const char rey_report_style[] =
     ".line{stroke:var(--accent);stroke-width:1.8;fill:none;stroke-linejoin:round}\n"
     ".truth{stroke:var(--dim);stroke-width:1;stroke-dasharray:3 3;fill:none}\n"
     "svg .c0{stroke:#c8423b}svg .c1{stroke:#3d8f4e}svg .c2{stroke:#3b6fc8}\n"
-    "dd{overflow-wrap:anywhere}td{white-space:nowrap}\n"
+    "dd{overflow-wrap:anywhere}td{white-space:nowrap}td.v,td .note{white-space:normal}td.v{word-spacing:.2em}\n"
     "details summary{cursor:pointer;color:var(--dim);font-size:.9rem}\n"
     "dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.4rem;margin:0;font-size:.9rem}\n"
     "dt{color:var(--dim)}dd{margin:0}\n"

@@ -15,8 +15,8 @@ rey_result rey_report_grids(Fit *fit, const FitResult *out, Text *html);
 // Loss and gradient over the iterations; then every small parameter.
 void rey_report_loss(const Fit *fit, const FitResult *out, Text *html);
 void rey_report_histories(const Fit *fit, const FitResult *out, Text *html);
-// A small curve of `count` columns of the history from `column` on; truth may be null.
-void rey_report_sparkline(const Fit *fit, int column, int64_t count, const float *truth, Text *html);
+// Small curves of a row whose columns of the history begin at `column`.
+void rey_report_sparkline(const Fit *fit, int column, const FitRow *row, Text *html);
 
 // The table of the parameters, and how the report was made.
 void rey_report_table(Fit *fit, const FitResult *out, Text *html);

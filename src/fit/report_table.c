@@ -4,6 +4,7 @@
 #include "io/image.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { SHOWN_ENTRIES = 4 };
 
@@ -21,7 +22,15 @@ static void put_entries(Text *html, const FitRow *row, int column) {
     const float *values = column == COLUMN_TRUTH ? row->truth : column == COLUMN_START ? row->start : row->found;
     char text[128];
     if (rey_fit_row_text(row, column, text, sizeof text)) {
-        rey_text_html(html, text);
+        for (char *at = text, *end; at; at = end) { // place, rotation and scale below each other
+            end = strstr(at, ", ");
+            if (end) {
+                *end = 0;
+                end += 2;
+            }
+            rey_text_html(html, at);
+            rey_text_add(html, end ? ",<br>" : "");
+        }
         return;
     }
     if (!values) {
@@ -39,7 +48,7 @@ static void put_entries(Text *html, const FitRow *row, int column) {
     }
     rey_text_add(html, few ? "" : "mean ");
     for (int64_t i = 0; i < shown; i++) {
-        rey_text_add(html, i ? " &nbsp;%.4g" : "%.4g", mean[i]);
+        rey_text_add(html, i ? " %.4g" : "%.4g", mean[i]);
     }
 }
 
@@ -52,7 +61,7 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
     }
     rey_text_add(html, row->dims && row->count > HISTORY_LARGEST ? "</div></td>" : "</td>");
     for (int i = 0; i < COLUMN_COUNT; i++) {
-        rey_text_add(html, "<td>");
+        rey_text_add(html, "<td class=\"v\">");
         put_entries(html, row, i);
         rey_text_add(html, "</td>");
     }
@@ -67,7 +76,7 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
         rey_text_add(html, "<td class=\"n\">&ndash;</td><td>");
     }
     if (row->count <= HISTORY_LARGEST && !row->derived) {
-        rey_report_sparkline(fit, column, row->count, row->truth, html);
+        rey_report_sparkline(fit, column, row, html);
     }
     rey_text_add(html, "</td></tr>\n");
 }

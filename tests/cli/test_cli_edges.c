@@ -286,6 +286,24 @@ static void poses_are_named(void **state) {
     assert_true(json_value(node, "numbers", -1) == 6);
     json_free(node);
     assert_int_equal(system("grep -q '>6 unknown numbers in 1 parameter,' poses/report.html"), 0);
+    // In the report place and rotation stand below each other, and are charts of three colours; the scale stays.
+    assert_int_equal(system("grep -q ',<br>turned ' poses/report.html && grep -q 'position <b class=\"key c0\"></b>x' "
+                            "poses/report.html && grep -q 'rotation: axis times angle' poses/report.html && "
+                            "! grep -q ', scale <b' poses/report.html"), 0);
+    write_job("poses.yaml", "[{name: ball.to_world, parameterisation: similarity}]");
+    expect(f, 0, "fit poses.yaml -o similar --set iterations=2");
+    assert_int_equal(system("grep -q '>7 unknown numbers in 1 parameter,' similar/report.html && "
+                            "grep -q ', scale <b' similar/report.html"), 0);
+    // Curves of four numbers and more have a colour each.
+    write_pfm("four.pfm", 2, 1);
+    write_words("wide.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
+                            "<integer name='width' value='32'/><integer name='height' value='24'/></film><transform "
+                            "name='to_world'><lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform></sensor>"
+                            "<emitter type='constant'/><shape type='rectangle'><bsdf type='diffuse' id='b'><texture "
+                            "type='bitmap' name='reflectance'><string name='filename' value='four.pfm'/></texture></bsdf></shape>"
+                            "</scene>");
+    expect(f, 0, "fit poses.yaml -o wide --set iterations=2 --set scene=wide.xml --set parameters.0=b.reflectance.data");
+    assert_int_equal(system("test $(grep -o 'stroke:hsl([0-9]*,60%,[0-9]*%)' wide/report.html | sort -u | wc -l) -eq 6"), 0);
 }
 
 // What would compare rounding with rounding is no check.
