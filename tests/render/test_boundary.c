@@ -37,6 +37,7 @@ static const Motion motions[] = {
     {"boundary_near.xml", "ball.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.02, 1},
     {"boundary_plan.xml", "tube.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1},
     {"boundary_plan.xml", "ball.to_world", GROW, {0.8f, -0.3f, 0.3f}, 0.02, 1},
+    {"boundary_stand.xml", "crate.to_world", SHIFT, {1, 0.3f, 0}, 0.02, 1},
     {"boundary_view.xml", "camera.to_world", TURN, {0.3f, 0.2f, 1}, 1, 1},
     {"boundary_view.xml", "camera.x_fov", ADD, {0, 0, 0}, 1, 1},
     {"boundary_view.xml", "camera.principal_point_offset_x", ADD, {0, 0, 0}, 0.01, 1},

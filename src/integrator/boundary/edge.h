@@ -367,10 +367,22 @@ static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, con
     return silhouette;
 }
 
+// Lanes of m in which nothing hides the edge's point itself.
+static Mask edge_is_seen(Tracer *t, const EdgePoint *e, const Ray rays[2], Mask m) {
+    Vec3 o = v3_scale(v3_add(rays[0].o, rays[1].o), f_set((real)0.5)), to = v3_sub(e->p, o);
+    Float reach = v3_length(to);
+    Ray ray = {o, v3_scale(to, f_safe_rcp(reach)), f_set(INFINITY)};
+    Hit hit = trace_closest(t->scene, &ray, m, false);
+    t->job->rays += m_count(m);
+    Mask own = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance) &
+               (e->round | mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other));
+    return m & (mi_lt(hit.shape, i_set(0)) | own | m_gt(v3_dot(v3_sub(hit.p, o), ray.d), reach * (1.0f - 1e-4f)));
+}
+
 // Lanes of m in which two rays, the second one on the side of n, pass an edge between the surfaces that meet or end there. Next
 // to a corner a path may miss them; what it meets instead belongs to another edge's jump.
 static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
-    Mask own[2], clear[2], above = m_gt(v3_dot(e->side[0], n), f_set(0));
+    Mask own[2], clear[2], grazed[2], above = m_gt(v3_dot(e->side[0], n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
         Hit hit = trace_closest(t->scene, &ray, m, false);
@@ -389,8 +401,16 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n,
         }
         own[side] = (silhouette & own[side]) | faces;
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
+        grazed[side] = ~clear[side] & m_gt(found, reach * (1.0f - 2e-2f));
     }
     t->job->rays += 2 * m_count(m);
+    // What the edge stands on is met just before it.
+    Mask open = m & silhouette & ((above & own[1] & grazed[0]) | (~above & own[0] & grazed[1]));
+    if (m_any(open)) {
+        Mask seen = edge_is_seen(t, e, rays, open);
+        clear[0] = clear[0] | (seen & grazed[0]);
+        clear[1] = clear[1] | (seen & grazed[1]);
+    }
     Mask inside = (above & own[1] & clear[0]) | (~above & own[0] & clear[1]);
     return m & ((silhouette & inside) | (~silhouette & own[0] & own[1]));
 }
