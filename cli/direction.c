@@ -395,7 +395,6 @@ int cli_direction_terms(const rey_scene *scene, const Direction *direction) {
 
 rey_result cli_direction_check_terms(rey_context *ctx, const rey_scene *scene, const Direction *direction, int asked) {
     int terms = cli_direction_terms(scene, direction);
-    terms |= terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // shadows of what chains turn
     if (!asked || !terms || (asked & terms)) {
         return REY_OK;
     }

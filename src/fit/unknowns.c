@@ -162,13 +162,12 @@ static GridSize grid_size(const rey_scene *scene, int param) {
 
 // Terms that the gradient of a parameter does not have would fit nothing.
 static rey_result check_terms(Job *job, const rey_param_info *info) {
-    int terms = info->terms | (info->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0); // shadows of what chains turn
-    if (!job->terms || (job->terms & terms)) {
+    if (!job->terms || (job->terms & info->terms)) {
         return REY_OK;
     }
     char asked[128], expected[128];
     rey_job_terms_text(job->terms, asked, sizeof asked);
-    rey_job_terms_text(terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR), expected, sizeof expected);
+    rey_job_terms_text(info->terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR), expected, sizeof expected);
     return rey_job_fail_at(job, job->terms_at, REY_ERROR_PARAM,
                            "terms %s: the gradient of %s has no such term, expected some of %s", asked, info->name, expected);
 }

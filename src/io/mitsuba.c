@@ -212,6 +212,7 @@ static void name_further_terms(Builder *b) {
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
+        p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them
         p->terms = moves_border(scene, p) ? REY_TERM_INTERIOR : p->terms;
     }
 }

@@ -40,7 +40,7 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     if (p->normals >= 0) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     }
-    return p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_INDIRECT | chains : still | chains;
+    return (p->emitter >= 0 ? REY_TERM_INTERIOR : still) | REY_TERM_INDIRECT | chains;
 }
 
 // Whether some medium's extinction jumps from voxel to voxel.
@@ -204,8 +204,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             info.why);
         }
-        // What chains turn moves shadows of what lies behind them.
-        *needed |= info.terms | (info.terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0);
+        *needed |= info.terms;
     }
     return check_asked(scene, def, chains, selection);
 }

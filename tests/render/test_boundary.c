@@ -273,6 +273,21 @@ static void test_motion(void **state) {
     assert_true(fabs(sum) / sqrt(BLOCKS) < 3);
 }
 
+// The terms that a parameter names are all that its gradient has.
+static void test_named(Room room, const Motion *m, int param, const float *tangent) {
+    static float images[2][NUMBERS];
+    rey_param_info info;
+    ok(room, rey_param_get_info(room.scene, param, &info));
+    for (int i = 0; i < 2; i++) {
+        rey_render_def def = def_make(16, 5, 2);
+        def.terms = i ? info.terms & ~(REY_TERM_TERMINATOR | REY_TERM_MEDIUM) : 0;
+        ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, images[i], NULL, NULL));
+    }
+    if (memcmp(images[0], images[1], sizeof images[0]) != 0) {
+        fail_msg("%s of %s: what the terms that it names bring is not its gradient", m->param, m->room);
+    }
+}
+
 // Sum over the picture of a ramp times the derivative, in both modes, and what each term contributes.
 static void test_modes(void **state) {
     const Motion *m = *state;
@@ -306,6 +321,7 @@ static void test_modes(void **state) {
         sizes[0] = term == REY_TERM_INTERIOR ? size : sizes[0];
         sizes[1] = term == REY_TERM_INTERIOR ? 0 : sizes[1] + size;
     }
+    test_named(room, m, param, tangent);
     room_close(room);
     assert_true(begins_with(m->room, "media_") ? sizes[0] > 0 && sizes[1] == 0 : sizes[1] > 0.1 * sizes[0]);
 }
