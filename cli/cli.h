@@ -50,6 +50,7 @@ typedef struct Options {
     uint32_t seed;       // default 0
     bool seed_given;     // --seed was on the command line
     int sensor;          // default 0
+    const char *sensor_id; // --sensor was no number; else null
     int threads;         // 0 = as many as there are
     int lanes;           // 0 = the widest
     int sampler;         // REY_SAMPLER_*
@@ -118,6 +119,7 @@ typedef struct Session {
     rey_context *ctx;
     rey_scene *scene;
     rey_render_def def; // spp, seed, sensor, sampler, terms and progress filled in
+    int sensor;
     int width, height;  // of the picture of the sensor
     double load_seconds; // from the file to a scene that can be rendered
     Progress progress;

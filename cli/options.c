@@ -77,7 +77,7 @@ static const OptionRow option_rows[] = {
     {OPTION_SPP, 0, "spp", "N", FITS, "samples per pixel of an iteration (default: the job's)"},
     {OPTION_SEED, 0, "seed", "N", RENDERS, "seed of the random numbers (default 0)"},
     {OPTION_SEED, 0, "seed", "N", FITS, "seed of the random numbers (default: the job's)"},
-    {OPTION_SENSOR, 0, "sensor", "K", RENDERS, "which sensor, from 0"},
+    {OPTION_SENSOR, 0, "sensor", "K|ID", RENDERS, "which sensor: its number, from 0, or its id"},
     {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default sobol)"},
     {OPTION_DEFINE, 'D', NULL, "key=value", RENDERS | READS | FITS, "value of $key in the scene; may be repeated"},
     {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR, "worker threads (default: all that are allowed)"},
@@ -309,7 +309,8 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_SEED:
         return parse_seed(o, value);
     case OPTION_SENSOR:
-        return parse_count(o, "--sensor", value, 0, INT32_MAX, &o->sensor);
+        o->sensor_id = value[0] && !strchr("+-.0123456789", value[0]) ? value : NULL;
+        return o->sensor_id || parse_count(o, "--sensor", value, 0, INT32_MAX, &o->sensor);
     case OPTION_DEFINE:
         return parse_define(o, value);
     case OPTION_THREADS:

@@ -196,6 +196,27 @@ static rey_result refuse_inputs(const Session *s) {
                                        o->output);
 }
 
+// By number or by id; the message lists what there is.
+static rey_result find_sensor(Session *s, int count) {
+    const Options *o = s->options;
+    char list[512] = "";
+    s->sensor = o->sensor_id ? rey_mitsuba_sensor(s->scene, o->sensor_id) : o->sensor;
+    if (count == 0) {
+        s->sensor = 0; // that there is none, the size of the film tells
+    }
+    if (count == 0 || (s->sensor >= 0 && s->sensor < count)) {
+        return REY_OK;
+    }
+    for (int i = 0; i < count; i++) {
+        size_t used = strlen(list);
+        const char *id = rey_mitsuba_sensor_id(s->scene, i);
+        snprintf(list + used, sizeof list - used, id ? "%s%d is '%s'" : "%s%d has no id", i ? ", " : "", i, id);
+    }
+    return o->sensor_id ? rey_fail(s->ctx, REY_ERROR_ARGUMENT, "--sensor: the scene has no sensor '%s': %s", o->sensor_id, list)
+                        : rey_fail(s->ctx, REY_ERROR_ARGUMENT, "--sensor: the scene has %d sensor%s, counted from 0, got %d: %s",
+                                   count, PLURAL(count), o->sensor, list);
+}
+
 static rey_result load_scene(Session *s) {
     const Options *o = s->options;
     rey_result result = check_output(s);
@@ -228,7 +249,8 @@ static rey_result load_scene(Session *s) {
         return rey_fail(s->ctx, REY_ERROR_SCENE,
                         "%s: the scene has no integrator, expected one such as <integrator type=\"path\"/>", o->files[0]);
     }
-    return rey_scene_film_size(s->scene, o->sensor, &s->width, &s->height);
+    result = find_sensor(s, (int)info.sensors);
+    return result ? result : rey_scene_film_size(s->scene, s->sensor, &s->width, &s->height);
 }
 
 int cli_session_open(const Options *options, const char *label, Session *session) {
@@ -238,13 +260,8 @@ int cli_session_open(const Options *options, const char *label, Session *session
     }
     rey_result result = load_scene(session);
     if (result || cli_interrupted()) {
-        rey_scene_info info = {0};
-        rey_scene_get_info(session->scene, &info);
         status = cli_interrupted() ? cli_report_failure(options, session->ctx, REY_ERROR_CANCELLED)
-                 : info.sensors > 0 && options->sensor >= info.sensors
-                     ? cli_usage_error(options, "--sensor: the scene has %d sensor%s, counted from 0, got %d", (int)info.sensors,
-                                       PLURAL(info.sensors), options->sensor)
-                     : cli_report(options, session->ctx, result);
+                                   : cli_report(options, session->ctx, result);
         cli_session_close(session);
         return status;
     }
@@ -252,7 +269,7 @@ int cli_session_open(const Options *options, const char *label, Session *session
     rey_render_def def = rey_default_render_def();
     def.spp = options->spp;
     def.seed = options->seed;
-    def.sensor = options->sensor;
+    def.sensor = session->sensor;
     def.sampler = options->sampler;
     def.terms = options->terms;
     def.progress = cli_progress_step;

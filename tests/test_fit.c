@@ -116,6 +116,7 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: expected a number");
     expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: unknown value 'l3', did you mean");
     expect_error(f, HEAD "loss: l2\nloss: l1\n", NULL, "job.yaml:5: key 'loss' is given twice");
+    expect_error(f, HEAD "spp: [1, 2]\n", NULL, "expected a number, or a list of {from: ITERATION, spp: NUMBER}");
     expect_error(f, HEAD "spp: [{from: 0, spp: 4}, {from: 0, spp: 8}]\n", NULL, "'from' must rise");
     expect_error(f, HEAD "views_per_iteration: 2\n", NULL, "the job has 1 view");
     expect_error(f, HEAD "defines: {'a b': 1}\n", NULL, "is not a name");

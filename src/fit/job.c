@@ -55,6 +55,13 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
         job->spp_count = 1;
         return *steps ? rey_job_read_field(job, &fields[1], node, (char *)*steps) : REY_ERROR_MEMORY;
     }
+    bool steps_alone = node->kind == YAML_LIST;
+    for (const YamlNode *entry = node->child; entry && steps_alone; entry = entry->next) {
+        steps_alone = entry->kind == YAML_MAP;
+    }
+    if (!steps_alone) {
+        return rey_job_fail(job, node, "'spp': expected a number, or a list of {from: ITERATION, spp: NUMBER}");
+    }
     void *items;
     rey_result result = rey_job_open_list(job, node, sizeof **steps, &items, &job->spp_count);
     if (result) {

@@ -89,3 +89,20 @@ rey_result rey_mitsuba_reads_file(const rey_scene *scene, const char *path, bool
     }
     return REY_OK;
 }
+
+int rey_mitsuba_sensor(const rey_scene *scene, const char *id) {
+    const SceneSource *source = scene->document;
+    const rey_xml_node *node = source ? rey_xml_find_id(source->document, id) : NULL;
+    return node && node->tag == REY_XML_SENSOR && node->built >= 0 ? node->built : -1;
+}
+
+const char *rey_mitsuba_sensor_id(const rey_scene *scene, int index) {
+    const SceneSource *source = scene->document;
+    for (int i = 0; source && i < rey_xml_node_count(source->document); i++) {
+        const rey_xml_node *node = rey_xml_node_at(source->document, i);
+        if (node->tag == REY_XML_SENSOR && node->built == index) {
+            return node->id;
+        }
+    }
+    return NULL;
+}

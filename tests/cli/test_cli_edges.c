@@ -103,7 +103,10 @@ static void words_help(void **state) {
     expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint inf", "not a finite number");
     expect_words(f, 2, "grad %s --param red.reflectance.value --mode reverse --adjoint 1 -o d.exr", "folder");
     expect_words(f, 1, "render %s -o a.exr -D ball=", "attribute 'id' of <ref> is empty");
-    expect_words(f, 2, "render %s -o a.exr --sensor 3", "--sensor: the scene has 1 sensor, counted from 0, got 3");
+    expect_words(f, 2, "render %s -o a.exr --sensor 3", "--sensor: the scene has 1 sensor, counted from 0, got 3: 0 is 'camera'");
+    expect_words(f, 2, "render %s -o a.exr --sensor cam", "--sensor: the scene has no sensor 'cam': 0 is 'camera'");
+    expect_words(f, 2, "render %s -o a.exr --sensor ball", "--sensor: the scene has no sensor 'ball'");
+    expect(f, 0, "render %s -o a.exr --sensor camera --spp 1");
     write_words("endless.xml", "<scene version='3.0.0'><bsdf type='plastic'><float name='int_ior' value='inf'/></bsdf></scene>");
     expect_words(f, 1, "info endless.xml", "bad value 'inf': numbers are finite, expected a number up to 3.4e38");
     write_words("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
