@@ -120,7 +120,7 @@ static void test_terms(void **state) {
     assert_int_equal(terms_of(scene, "shared.color0.value"), TURNS);
     assert_int_equal(terms_of(scene, "alone.color0.value"), REY_TERM_INTERIOR);
     assert_int_equal(terms_of(scene, "bumpy.scale.value"), TURNS);
-    assert_int_equal(terms_of(scene, "turned.normalmap.value"), TURNS | REY_TERM_SPECULAR); // over glass
+    assert_int_equal(terms_of(scene, "turned.normalmap.value"), TURNS | REY_TERM_INDIRECT | REY_TERM_SPECULAR); // over glass
     assert_int_equal(terms_of(scene, "inner.reflectance.value"), REY_TERM_INTERIOR);
     assert_int_equal(terms_of(scene, "glass.eta.value"), REY_TERM_INTERIOR);
     rey_scene_destroy(scene);
