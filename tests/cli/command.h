@@ -64,6 +64,29 @@ static inline void expect(Fixture *f, int status, const char *arguments) {
     assert_int_equal(found, status);
 }
 
+// The same, with words on standard error.
+static inline void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words)) {
+        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
+    }
+}
+
+// The same, with words on either.
+static inline void expect_said(Fixture *f, int status, const char *arguments, const char *words) {
+    expect(f, status, arguments);
+    if (!strstr(f->words, words) && !strstr(f->out, words)) {
+        fail_msg("reynolds %s: '%s%s', expected '%s'", arguments, f->out, f->words, words);
+    }
+}
+
+static inline void write_words(const char *path, const char *words) {
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(words, file);
+    assert_int_equal(fclose(file), 0);
+}
+
 static inline JsonNode *run_json(Fixture *f, int status, const char *arguments) {
     expect(f, status, arguments);
     JsonNode *node = json_read("out.txt");

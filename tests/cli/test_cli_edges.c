@@ -59,13 +59,6 @@ static void saved_values_load_by_name(void **state) {
     assert_int_equal(system(command), 0);
 }
 
-static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
-    expect(f, status, arguments);
-    if (!strstr(f->words, words)) {
-        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
-    }
-}
-
 static void usage_errors_are_json_too(void **state) {
     Fixture *f = *state;
     static const char *const wrong[] = {"render --json", "rendr %s --json", "render %s -o a.exr --json --spp 0",
@@ -87,13 +80,6 @@ static void loaded_values_have_shapes(void **state) {
                  "no parameter 're.reflectance.value', did you mean 'red.reflectance.value'?");
     expect_words(f, 1, "params %s --load nowhere.xml", "nowhere.xml");
     expect_words(f, 2, "fit job.yaml --load a=b.npy", "a fit takes one saved scene");
-}
-
-static void write_words(const char *path, const char *words) {
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(words, file);
-    assert_int_equal(fclose(file), 0);
 }
 
 static void words_help(void **state) {

@@ -3,13 +3,6 @@
 
 #include <math.h>
 
-static void write_words(const char *path, const char *words) {
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(words, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 // A job in the test's folder for the scenes of the test jobs; lines follow it.
 static void write_job(Fixture *f, const char *lines) {
     char text[2048];
@@ -74,13 +67,6 @@ static void losses_are_explained(void **state) {
     write_job(f, "iterations: 1\n");
     expect(f, 0, "fit job.yaml -o out --overwrite");
     assert_non_null(strstr(f->out, "(of the last iteration)"));
-}
-
-static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
-    expect(f, status, arguments);
-    if (!strstr(f->words, words)) {
-        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
-    }
 }
 
 // What would be found out at the end, or in the first iteration, is told before it.

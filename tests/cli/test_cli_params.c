@@ -1,13 +1,6 @@
 // test_cli_params.c: which parameters there are: names, patterns, those that nothing uses, and reasons said once.
 #include "command.h"
 
-static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
-    expect(f, status, arguments);
-    if (!strstr(f->words, words) && !strstr(f->out, words)) {
-        fail_msg("reynolds %s: '%s%s', expected '%s'", arguments, f->out, f->words, words);
-    }
-}
-
 static int count_words(const char *text, const char *words) {
     int count = 0;
     while ((text = strstr(text, words)) != NULL) {
@@ -41,8 +34,8 @@ static void unused_objects_are_told(void **state) {
         }
         json_free(node);
     }
-    expect_words(f, 0, "params %s -D ball=glass --param metal.alpha.value", "unused: nothing in the scene refers to it");
-    expect_words(f, 0, "grad %s -D ball=glass --param metal.alpha.value --spp 1", "nothing in the scene uses metal.alpha.value");
+    expect_said(f, 0, "params %s -D ball=glass --param metal.alpha.value", "unused: nothing in the scene refers to it");
+    expect_said(f, 0, "grad %s -D ball=glass --param metal.alpha.value --spp 1", "nothing in the scene uses metal.alpha.value");
     expect(f, 0, "grad %s --param metal.alpha.value --spp 1");
     assert_string_equal(f->words, "");
 }
@@ -107,9 +100,9 @@ static void refusals_name_objects(void **state) {
         assert_non_null(file);
         fprintf(file, "%s%s</scene>", head, scenes[i][0]);
         assert_int_equal(fclose(file), 0);
-        expect_words(f, 1, "grad objects.xml --param box.to_world:translate=1,0,0 --spp 1", scenes[i][1]);
+        expect_said(f, 1, "grad objects.xml --param box.to_world:translate=1,0,0 --spp 1", scenes[i][1]);
     }
-    expect_words(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16", "as 'floor' and 'wall' do");
+    expect_said(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16", "as 'floor' and 'wall' do");
 }
 
 // Patterns stand for the parameters that move nothing, with an operation for those that it fits.
@@ -136,29 +129,29 @@ static void patterns_choose(void **state) {
     assert_non_null(find_param(node, "red.reflectance.value"));
     assert_null(find_param(node, "white.reflectance.value"));
     json_free(node);
-    expect_words(f, 2, "grad %s --param \"grey.*\"", "no parameter matches 'grey.*'");
-    expect_words(f, 2, "check %s --param \"grey.*\"", "no parameter matches 'grey.*'");
-    expect_words(f, 2, "params %s --param \"grey.*\"", "no parameter matches 'grey.*'");
-    expect_words(f, 2, "grad %s --param \"ball.*\"", "'ball.*' matches only ball.to_world, which move things");
-    expect_words(f, 2, "grad %s --param \"red.*:translate=1,0,0\"", "which this operation does not fit");
-    expect_words(f, 2, "params %s --param \"red.*:add=1\"", "expected a name or a pattern");
+    expect_said(f, 2, "grad %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_said(f, 2, "check %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_said(f, 2, "params %s --param \"grey.*\"", "no parameter matches 'grey.*'");
+    expect_said(f, 2, "grad %s --param \"ball.*\"", "'ball.*' matches only ball.to_world, which move things");
+    expect_said(f, 2, "grad %s --param \"red.*:translate=1,0,0\"", "which this operation does not fit");
+    expect_said(f, 2, "params %s --param \"red.*:add=1\"", "expected a name or a pattern");
 }
 
 // What is suggested is what `params` lists, whatever alias the word is nearest to.
 static void suggestions_are_listed(void **state) {
     Fixture *f = *state;
-    expect_words(f, 2, "grad %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
-    expect_words(f, 2, "check %s --param metal.bsdf", "unknown parameter 'metal.bsdf'");
-    expect_words(f, 2, "params %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
+    expect_said(f, 2, "grad %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
+    expect_said(f, 2, "check %s --param metal.bsdf", "unknown parameter 'metal.bsdf'");
+    expect_said(f, 2, "params %s --param metal.alpa", "did you mean 'metal.alpha.value'?");
 }
 
 // A term that a parameter's derivative does not have is no 0.
 static void terms_that_do_not_exist_are_errors(void **state) {
     Fixture *f = *state;
-    expect_words(f, 2, "grad %s --param red.reflectance.value --terms primary",
+    expect_said(f, 2, "grad %s --param red.reflectance.value --terms primary",
                  "--terms primary: the gradient of red.reflectance.value has no such term, expected some of interior");
-    expect_words(f, 2, "check %s --param red.reflectance.value --terms indirect", "expected some of interior");
-    expect_words(f, 2, "grad %s --param red.reflectance.value --terms terminator", "expected some of interior,primary,");
+    expect_said(f, 2, "check %s --param red.reflectance.value --terms indirect", "expected some of interior");
+    expect_said(f, 2, "grad %s --param red.reflectance.value --terms terminator", "expected some of interior,primary,");
     expect(f, 0, "grad %s --param red.reflectance.value --terms interior,primary --spp 1");
     expect(f, 0, "grad %s --param ball.to_world:translate=1,0,0 --param red.reflectance.value --terms primary --spp 4");
     JsonNode *node = run_json(f, 0, "check %s --all --terms primary --spp 16 --json");

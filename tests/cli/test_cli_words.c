@@ -1,20 +1,6 @@
 // test_cli_words.c: what the command says where something is wrong or cannot be had.
 #include "command.h"
 
-static void write_words(const char *path, const char *words) {
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(words, file);
-    assert_int_equal(fclose(file), 0);
-}
-
-static void expect_words(Fixture *f, int status, const char *arguments, const char *words) {
-    expect(f, status, arguments);
-    if (!strstr(f->words, words) && !strstr(f->out, words)) {
-        fail_msg("reynolds %s: '%s', expected '%s'", arguments, f->words, words);
-    }
-}
-
 // A job in the test's folder for the scenes of the test jobs; lines follow it.
 static void write_job(Fixture *f, const char *lines) {
     static char text[2048];
@@ -50,7 +36,7 @@ static void refusals_are_the_same(void **state) {
         json_free(node);
     }
     assert_true(refused > 0);
-    expect_words(f, 0, "params %s -D ball=glass", "  refused [1]\n");
+    expect_said(f, 0, "params %s -D ball=glass", "  refused [1]\n");
 }
 
 // A jump that paths may not meet is told apart from the terms that are needed, in words and in JSON.
@@ -62,7 +48,7 @@ static void what_may_be_needed_is_told(void **state) {
                 "<texture type='bitmap'><string name='filename' value='height.npy'/></texture><bsdf type='diffuse'/></bsdf>"
                 "<shape type='rectangle'><ref id='b'/></shape><emitter type='constant'/></scene>");
     expect(f, 0, "render %s -o height.npy --spp 1");
-    expect_words(f, 0, "params bump.xml", "interior,primary,indirect  complete, unless paths meet the jump of 'terminator'");
+    expect_said(f, 0, "params bump.xml", "interior,primary,indirect  complete, unless paths meet the jump of 'terminator'");
     JsonNode *node = run_json(f, 0, "params bump.xml --json");
     bool found = false;
     for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
@@ -88,7 +74,7 @@ static void fits_show_what_the_job_says(void **state) {
     assert_true(json_get(node, "loss")->kind == JSON_NULL);
     assert_true(json_value(json_get(node, "parameters")->first->next, "angle", 1) == 0);
     json_free(node);
-    expect_words(f, 0, "fit job.yaml -o fit --overwrite --set views.0.target=$PWD/target.exr", "no loss");
+    expect_said(f, 0, "fit job.yaml -o fit --overwrite --set views.0.target=$PWD/target.exr", "no loss");
     assert_non_null(strstr(f->out, "0 0 0.6, turned 0 0 0 deg, scale 0.6"));
     char page[OUTPUT_BYTES];
     read_text("fit/report.html", page);
@@ -104,28 +90,28 @@ static void fits_show_what_the_job_says(void **state) {
 static void places_of_jobs_are_told(void **state) {
     Fixture *f = *state;
     write_job(f, "views:\n  - sensor: 0\n    target: none.exr\nparameters: [red.reflectance]\n");
-    expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:7: " TEST_JOBS "/none.exr: cannot open");
-    expect_words(f, 1, "fit job.yaml -o fit --set views.0.target=no.exr", "--set views.0.target=no.exr: " TEST_JOBS "/no.exr");
-    expect_words(f, 2, "fit job.yaml -o fit --set views.0.target=start.xml", "--set views.0.target=start.xml: " TEST_JOBS);
-    expect_words(f, 1, "fit job.yaml -o fit --set scene=no.xml", "--set scene=no.xml: " TEST_JOBS "/no.xml: cannot open the scene");
-    expect_words(f, 2, "fit job.yaml -o fit --spp 1", "--spp 1: spp = 1, expected 2 to 65536");
-    expect_words(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
-    expect_words(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
-    expect_words(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
-    expect_words(f, 2, "fit job.yaml -o fit -D nothing=1", "the scene never uses '$nothing'");
+    expect_said(f, 1, "fit job.yaml -o fit", "job.yaml:7: " TEST_JOBS "/none.exr: cannot open");
+    expect_said(f, 1, "fit job.yaml -o fit --set views.0.target=no.exr", "--set views.0.target=no.exr: " TEST_JOBS "/no.exr");
+    expect_said(f, 2, "fit job.yaml -o fit --set views.0.target=start.xml", "--set views.0.target=start.xml: " TEST_JOBS);
+    expect_said(f, 1, "fit job.yaml -o fit --set scene=no.xml", "--set scene=no.xml: " TEST_JOBS "/no.xml: cannot open the scene");
+    expect_said(f, 2, "fit job.yaml -o fit --spp 1", "--spp 1: spp = 1, expected 2 to 65536");
+    expect_said(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
+    expect_said(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
+    expect_said(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
+    expect_said(f, 2, "fit job.yaml -o fit -D nothing=1", "the scene never uses '$nothing'");
     write_job(f, "defines: {nothing: 1}\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
-    expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/start.xml:1:1: the parameter 'nothing' was given");
+    expect_said(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/start.xml:1:1: the parameter 'nothing' was given");
     write_job(f, "views: [{target: none.exr}]\nparameters:\n  - {name: red.reflectance, parameterisation: log, start: 0}\n");
-    expect_words(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr",
+    expect_said(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr",
                  "job.yaml:7: parameter 'red.reflectance': entry 0 starts at 0");
     write_job(f, "load: none.xml\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
-    expect_words(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/none.xml: cannot open the scene");
+    expect_said(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/none.xml: cannot open the scene");
     write_job(f, "views: [{target: none.exr}]\nparameters: [red.reflectance]\n");
     JsonNode *node = fit_json(f, 2, "--set parameters.0=nothing");
     assert_string_equal(json_text(node, "kind", ""), "usage");
     json_free(node);
-    expect_words(f, 1, "fit none.yaml", "none.yaml: cannot open");
-    expect_words(f, 1, "render none.xml -o a.exr", "none.xml: cannot open the scene: No such file");
+    expect_said(f, 1, "fit none.yaml", "none.yaml: cannot open");
+    expect_said(f, 1, "render none.xml -o a.exr", "none.xml: cannot open the scene: No such file");
 }
 
 // Rows of a check are shown as they come, and once more in the table.
@@ -137,10 +123,10 @@ static void checks_show_their_rows(void **state) {
     assert_non_null(strstr(titles, "red.reflectance.value"));
     assert_non_null(strstr(titles, "metal.alpha.value"));
     assert_non_null(strstr(f->out, "passed"));
-    expect_words(f, 1, "check %s --param glass.eta.value", "the term 'specular' does not know");
+    expect_said(f, 1, "check %s --param glass.eta.value", "the term 'specular' does not know");
     expect(f, 0, "check %s --param red.reflectance.value --spp 16");
     assert_null(strstr(f->words, "worst z"));
-    expect_words(f, 2, "render %s -o=a.exr", "-o=a.exr: a name follows without '='");
+    expect_said(f, 2, "render %s -o=a.exr", "-o=a.exr: a name follows without '='");
 }
 
 int main(void) {
