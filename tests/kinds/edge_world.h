@@ -29,6 +29,27 @@ typedef struct World {
     int32_t triangles[6];
 } World;
 
+// Which shapes move.
+static inline const int32_t *world_live(void) {
+    static const int32_t live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
+    return live;
+}
+
+// A reverse sink of all numbers of theta; instance_at: where the instance's begin, or -1.
+static inline Sink world_sink(double *gradient, const int32_t *instance_at) {
+    static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1};
+    static const int32_t normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1}, pose_at[SHAPES] = {-1, -1, POSE, -1, -1};
+    static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
+    return (Sink){.gradient = gradient,
+                  .points_at = points_at,
+                  .normals_at = normals_at,
+                  .pose_at = pose_at,
+                  .instance_at = instance_at,
+                  .camera_at = camera_at,
+                  .any_motion = true,
+                  .any_camera = true};
+}
+
 // Probability of the edge.
 #define EDGE_SHARE 0.6f
 

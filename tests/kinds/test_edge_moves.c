@@ -6,10 +6,7 @@
 
 #include <stdlib.h>
 
-static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1}, normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1};
-static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {INSTANCE},
-                     live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
-static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
+static const int32_t instance_at[1] = {INSTANCE};
 
 // A sample of an edge, as the camera of a world sees it.
 typedef struct Sample {
@@ -50,20 +47,13 @@ static Sample sample_make(World *w, bool terminator, bool parallel, int32_t shap
 }
 
 static void gradient_of(const World *w, const Sample *x, float worth, bool parallel, double *gradient) {
-    PathJob job = {.live = live};
+    PathJob job = {.live = world_live()};
     Tracer *t = calloc(1, sizeof *t);
     assert_non_null(t);
     t->job = &job;
     t->scene = &w->scene;
     t->sensor = &w->sensor;
-    Sink sink = {.gradient = gradient,
-                 .points_at = points_at,
-                 .normals_at = normals_at,
-                 .pose_at = pose_at,
-                 .instance_at = instance_at,
-                 .camera_at = camera_at,
-                 .any_motion = true,
-                 .any_camera = true};
+    Sink sink = world_sink(gradient, instance_at);
     primary_move_adj(t, &x->s, worth, parallel, &sink);
     free(t);
 }

@@ -9,10 +9,7 @@
 // Edge, near and far points lie on these.
 enum { EDGE_SHAPE = MESH, NEAR_SHAPE = INSTANCED, FAR_SHAPE = DISK };
 
-static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1}, normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1};
-static const int32_t pose_at[SHAPES] = {-1, -1, POSE, -1, -1}, instance_at[1] = {-1},
-                     live[SHAPES] = {LIVE_MOTION, LIVE_MOTION, LIVE_MOTION};
-static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
+static const int32_t instance_at[1] = {-1};
 
 typedef struct Sample {
     World w;
@@ -96,7 +93,7 @@ static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) 
     s->job = s->w.job;
     s->job.kind = kind;
     s->job.job.mode = MODE_REVERSE;
-    s->job.job.live = live;
+    s->job.job.live = world_live();
     s->t.job = &s->job.job;
     s->t.scene = &s->w.scene;
     s->t.sensor = &s->w.sensor;
@@ -105,14 +102,7 @@ static void sample_make(Sample *s, int32_t kind, char *block, uint64_t *random) 
 
 static void gradient_of(Sample *s, double *gradient) {
     Indirect in = {.t = &s->t, .b = &s->job, .pinhole = &s->pinhole, .q = s->q, .upstream = s->job.kind == BOUNDARY_CHAINED};
-    Sink sink = {.gradient = gradient,
-                 .points_at = points_at,
-                 .normals_at = normals_at,
-                 .pose_at = pose_at,
-                 .instance_at = instance_at,
-                 .camera_at = camera_at,
-                 .any_motion = true,
-                 .any_camera = true};
+    Sink sink = world_sink(gradient, instance_at);
     moves_adj(&in, 0, &sink);
 }
 
