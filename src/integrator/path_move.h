@@ -69,20 +69,31 @@ KFN Vec3 segment_adj(Vec3 w, Float distance, Vec3 n, Float c, Vec3 dw, Vec3 *dar
     return v3_scale(v3_madd(v3_madd(across, facing, n), -3.0f * c, w), rcp);
 }
 
+// Takes the lanes of the group that the first of *left belongs to out of it, and returns them. *of: their hits, in other lanes safe
+// ones.
+KFN Mask take_group(const SceneView *scene, const Hit *hit, Mask *left, int32_t *group, Hit *of) {
+    int32_t first = i_lane(hit->shape, m_first(*left));
+    *group = scene->shapes[first].group;
+    Mask mine = *left & mi_eq(SHAPE_FIELD(scene, i_select(*left, hit->shape, i_set(first)), group), i_set(*group));
+    *of = *hit;
+    of->shape = i_select(mine, hit->shape, i_set(first));
+    of->prim = i_select(mine, hit->prim, i_set(0));
+    of->instance = i_select(mine, hit->instance, i_set(0));
+    *left = *left & ~mine;
+    return mine;
+}
+
 // Adds the adjoint d of attached points of any surfaces.
 static NOINLINE void surfaces_move_adj(const Tracer *t, const Hit *hit, const SurfaceAdj *d, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_select(left, hit->shape, i_set(first)), group), i_set(id));
         if (!(t->job->live[id] & LIVE_MOTION)) {
             continue;
         }
-        Hit h = *hit;
-        h.shape = i_select(mine, hit->shape, i_set(first));
-        h.prim = i_select(mine, hit->prim, i_set(0));
-        h.instance = i_select(mine, hit->instance, i_set(0));
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, d, sink, mine);
     }

@@ -113,11 +113,11 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
 static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
     Miss out = {.edge = *own, .n = v3_zero(), .inside = f_set(1), .normal = v3_zero(), .du = v3_zero(), .dv = v3_zero()};
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(own->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, own, &left, &id, &h);
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(own->shape, i_set(0)), group), i_set(id));
-        Hit h = hit_of_lanes(own, first, mine);
         Miss one = {.edge = h, .n = v3_zero(), .inside = f_set(1)};
         switch (group->shape_kind) {
         case SHAPE_MESH:

@@ -27,11 +27,11 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
     bool ends = scene->max_depth >= 0 && i + 1 >= scene->max_depth;
     Mask turned = m_set(false);
     s->through[i + 1] = spec_zero();
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
-        Hit h = hit_of_lanes(hit, first, mine);
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Vec3 wi = frame_to_local(&si.sh, v3_neg(s->d[i])), dp_dv;
         BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &h), t->floor, NULL, NULL};

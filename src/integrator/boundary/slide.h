@@ -16,18 +16,15 @@ static void surfaces_slide_adj(const Indirect *in, const Hit *hit, const Surface
     const Tracer *t = in->t;
     const SceneView *scene = t->scene;
     View view = view_make(scene, in->pinhole, t->sensor, lens);
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_select(left, hit->shape, i_set(first)), group), i_set(id));
         bool moves = t->job->live[id] & LIVE_MOTION;
         if (!moves && !sink->any_camera) {
             continue;
         }
-        Hit h = *hit;
-        h.shape = i_select(mine, hit->shape, i_set(first));
-        h.prim = i_select(mine, hit->prim, i_set(0));
-        h.instance = i_select(mine, hit->instance, i_set(0));
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Seen seen = view_see(&view, si.p);
         Slide slide[2];

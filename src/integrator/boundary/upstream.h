@@ -114,23 +114,15 @@ KFN real *upstream_row(const Segments *q, int32_t slot, int32_t bounce) {
 
 // ---- motion ------------------------------------------------------------------------------------------------------
 
-KFN Hit hit_of_lanes(const Hit *hit, int32_t first, Mask m) {
-    Hit h = *hit;
-    h.shape = i_select(m, hit->shape, i_set(first));
-    h.prim = i_select(m, hit->prim, i_set(0));
-    h.instance = i_select(m, hit->instance, i_set(0));
-    return h;
-}
-
 // Points where a ray along d meets their surfaces, with the adjoint dp of their positions: returns that of the ray's.
 static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     Vec3 drag = v3_zero();
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
         const Group *group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
-        Hit h = hit_of_lanes(hit, first, mine);
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Slide slide[2];
         SurfaceAdj a = surface_adj_zero();
@@ -152,12 +144,11 @@ static Carried rays_turn_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 wo, I
                              const Carried *ahead, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     Carried back = {v3_zero(), v3_zero()};
-    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t first = i_lane(hit->shape, m_first(left)), id = scene->shapes[first].group;
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
         SurfaceSweep s = {.m = m_set(false)};
+        Mask mine = take_group(scene, hit, &left, &id, &s.hit);
         s.group = scene->groups + id;
-        mine = left & mi_eq(SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group), i_set(id));
-        s.hit = hit_of_lanes(hit, first, mine);
         s.si = shape_interaction(scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
         s.m = mine;
         s.d = d;
