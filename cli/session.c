@@ -33,7 +33,8 @@ void cli_catch_interrupts(void) {
 
 void cli_catch_terminations(void) {
     static const int numbers[] = {SIGTERM, SIGHUP}; // a batch system takes the machine away; a terminal is closed
-    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND}, former;
+    // Whoever ends a job may say so to it and to its group: the second one is the same request.
+    struct sigaction action = {.sa_handler = on_interrupt}, former;
     sigemptyset(&action.sa_mask);
     for (int i = 0; i < COUNT_OF(numbers); i++) {
         if (!sigaction(numbers[i], NULL, &former) && former.sa_handler != SIG_IGN) { // nohup has it ignored
