@@ -48,14 +48,16 @@ static void xyz_squares(const double *rgb, double *out) {
     }
 }
 
+// Whether a sample brings nothing for having met only surfaces that let it pass (SceneView.drops).
+KFN bool film_drops(const Tracer *t, int32_t i) { return t->scene->drops && t->ws.coverage[i] <= 0; }
+
 // Adds the chunk's radiances (or derivatives) to the tile's film.
 static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     PathJob *job = t->job;
     for (int32_t i = 0; i < count; i++) {
         double l[SPEC_N], sum = 0;
         for (int c = 0; c < SPEC_N; c++) {
-            bool dropped = t->scene->drops && t->ws.coverage[i] <= 0;
-            l[c] = dropped ? 0 : (double)t->ws.radiance[c][i];
+            l[c] = film_drops(t, i) ? 0 : (double)t->ws.radiance[c][i];
             sum += l[c];
         }
         if (!(sum - sum == 0)) {
@@ -99,7 +101,7 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
         film_worth(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i],
                    t->ws.pixel[i] % stride - margin, t->ws.pixel[i] / stride - margin, delta);
         for (int c = 0; c < SPEC_N; c++) {
-            t->ws.adjoint[c][i] = delta[c];
+            t->ws.adjoint[c][i] = film_drops(t, i) ? 0 : delta[c];
         }
     }
 }

@@ -66,11 +66,17 @@ enum {
     }                                                                                                                  \
     slot++;
 
+// With hidden emitters `path` drops a path by what it chose where surfaces let light pass: derivatives must choose as pictures do.
+KFN real bsdf_floor(const BsdfCall *call, const BsdfNode *node) {
+    bool chooses = node->kind == BSDF_MASK || node->kind == BSDF_BLENDBSDF || node->kind == BSDF_THINDIELECTRIC;
+    return call->scene->drops && chooses ? 0 : call->floor;
+}
+
 #define DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)                                                                   \
     KFN Record prefix##_fetch(const BsdfCall *call) {                                                                  \
         const BsdfNode *node = call->scene->bsdfs + call->node;                                                        \
         int slot = 0, config = 0;                                                                                      \
-        Record record = {.floor = call->floor};                                                                        \
+        Record record = {.floor = bsdf_floor(call, node)};                                                             \
         record.table = node->table >= 0 ? call->scene->tables + node->table : NULL;                                    \
         PARAMS(FETCH_FIELD) CONFIG(FETCH_CONFIG) UNUSED(slot), UNUSED(config);                                         \
         return record;                                                                                                 \

@@ -50,6 +50,8 @@ bool rey_bsdf_bends(int kind) {
 
 bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
+bool rey_bsdf_shares(int kind) { return kind == BSDF_THINDIELECTRIC || kind == BSDF_MASK || kind == BSDF_BLENDBSDF; }
+
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 
 // Of TURNED_CONFIG the second switch.

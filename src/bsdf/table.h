@@ -27,6 +27,8 @@ int rey_bsdf_kind_find(const char *name); // -1 when unknown
 bool rey_bsdf_bends(int kind);
 // Kinds that let a part of the light pass undeviated.
 bool rey_bsdf_opens(int kind);
+// Kinds that choose between light that passes undeviated and other light, or between children that may.
+bool rey_bsdf_shares(int kind);
 // Whether light passes it undeviated and undimmed.
 bool rey_bsdf_passes(int kind);
 // Whether a kind turns the shading normal of the function inside it.

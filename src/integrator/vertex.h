@@ -95,7 +95,7 @@ KFN Float scattered_weight(const Tracer *t, const Vertex *v, Float light_pdf) {
 }
 
 // Alpha of a path is 1 where an environment shows, and where the path meets a surface that does not merely let it pass.
-KFN bool keeps_coverage(const Tracer *t) { return t->job->coverage || (t->scene->drops && !t->derivative); }
+KFN bool keeps_coverage(const Tracer *t) { return t->job->coverage || t->scene->drops; }
 
 KFN void cover(Tracer *t, Int slot, Mask m) { f_scatter(t->ws.coverage, slot, f_set(1), m); }
 

@@ -132,6 +132,31 @@ static bool surfaces_read_volumes(const SceneView *view) {
     return false;
 }
 
+// Whether a parameter is, or is read by, a texture.
+static bool texture_reads(const SceneView *view, int32_t id, const Param *p) {
+    if (id < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + id;
+    return p->texture == id || p->to_uv == id || (t->kind == TEXTURE_ATTRIBUTE && p->attribute >= 0) ||
+           (t->kind == TEXTURE_VOLUME && p->theta == view->volumes[t->volume].theta) ||
+           texture_reads(view, t->child[0], p) || texture_reads(view, t->child[1], p);
+}
+
+// What of a parameter's derivative is not known where light is dropped (SceneView.drops): what changes which paths pass
+// surfaces, and what moves.
+static bool gap_of_drops(const SceneView *view, const Param *p, int terms) {
+    bool chooses = p->normals >= 0 || (terms & (REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR));
+    for (int64_t i = 0; i < view->bsdfs_count && !chooses; i++) {
+        const BsdfNode *bsdf = view->bsdfs + i;
+        bool turns = rey_bsdf_turns(bsdf->kind), shares = rey_bsdf_shares(bsdf->kind);
+        for (int k = 0; k < (turns ? MAX_SLOTS : shares); k++) {
+            chooses = chooses || texture_reads(view, bsdf->slot[k], p);
+        }
+    }
+    return view->drops && chooses;
+}
+
 static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
     char object[OBJECT_NAME];
     const char *gap = rey_cuts_gap(scene, sensor, p, object);
@@ -156,11 +181,6 @@ static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int c
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
-    if (scene->view.drops) {
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                        "with hide_emitters, 'path' drops light of a surface that lets a part of it pass, and what it "
-                        "drops has no derivative: 'volpath' drops none");
-    }
     const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
     const bool volumes = surfaces_read_volumes(&scene->view);
     for (int i = 0; i < selection.count; i++) {
@@ -173,6 +193,11 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
+        if (gap_of_drops(&scene->view, p, info.terms)) {
+            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                            "no term of the gradient of %s exists yet: with hide_emitters, 'path' drops light of surfaces that "
+                            "let a part of it pass, and this parameter decides how much. 'volpath' drops none", info.name);
+        }
         const char *gap = gap_in_media(&scene->view, p);
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
