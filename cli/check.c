@@ -285,13 +285,22 @@ static rey_result check_direction(Work *w, Check *check) {
     return result ? result : try_again(w, check);
 }
 
-// Of --all: a parameter without a complete derivative is listed and not checked.
+// Whether a parameter is checked because it was asked for by name, not by --all or a pattern.
+static bool is_named(const Options *o, const char *spec) {
+    bool named = false;
+    for (int i = 0; i < o->param_count; i++) {
+        named = named || strcmp(o->params[i], spec) == 0;
+    }
+    return named;
+}
+
+// A parameter that was not asked for by name is listed where it cannot be checked, and the others are.
 static rey_result check_or_refuse(Work *w, Check *check) {
     const Options *o = w->session.options;
     rey_result result = cli_direction_check_terms(w->session.ctx, w->session.scene, &check->direction, o->terms);
     bool lacking = result != REY_OK;
     result = lacking ? result : check_direction(w, check);
-    if (!o->all || (!lacking && result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
+    if (is_named(o, check->spec) || (!lacking && result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
         return result;
     }
     check->verdict = VERDICT_REFUSED;

@@ -130,6 +130,9 @@ typedef struct Session {
 // *session is closed, and the exit status is returned; EXIT_OK otherwise.
 int cli_context_open(const Options *options, Session *session);
 int cli_session_open(const Options *options, const char *label, Session *session);
+// REY_ERROR_ARGUMENT where the command reads `path`: a result over a texture, a mesh, a tangent or another input would be
+// the end of it.
+rey_result cli_refuse_input(const Session *session, const char *path);
 void cli_session_close(Session *session);
 // What --load asks for.
 rey_result cli_load_values(const Options *options, rey_context *ctx, rey_scene *scene);
@@ -179,6 +182,7 @@ bool cli_direction_bare_pose(const rey_scene *scene, const char *spec);
 // Length of the NAME part of a spec, and whether the operation behind it can be had of a parameter: without one, of what
 // moves nothing.
 size_t cli_direction_name_length(const char *spec);
+const char *cli_direction_file(const char *spec); // the tangent that a spec reads, or null
 bool cli_direction_fits(const rey_param_info *info, const char *spec);
 // REY_ERROR_ARGUMENT where a direction has none of the terms that are asked for (0 = of all), which it names.
 rey_result cli_direction_check_terms(rey_context *ctx, const rey_scene *scene, const Direction *direction, int asked);

@@ -94,6 +94,11 @@ static bool parse_values(const char *text, Op *op) {
     return op->value_count > 0 && (!at || cli_parse_list(at + 1, 3, op->centre) == 3);
 }
 
+const char *cli_direction_file(const char *spec) {
+    const char *op = spec + cli_direction_name_length(spec);
+    return strncmp(op, ":file=", 6) == 0 ? op + 6 : NULL;
+}
+
 static rey_result parse_op(rey_context *ctx, const char *spec, const char *text, Op *op) {
     *op = (Op){.id = OP_COUNT};
     for (int i = 0; i < OP_COUNT; i++) {

@@ -215,7 +215,8 @@ static rey_result check_gradient_paths(const Grad *g) {
     rey_result result = REY_OK;
     for (int k = 0; k < g->direction.count && g->session.options->output && !result; k++) {
         gradient_path(g, k, path);
-        result = rey_file_check_output(g->session.ctx, path);
+        result = cli_refuse_input(&g->session, path);
+        result = result ? result : rey_file_check_output(g->session.ctx, path);
     }
     return result;
 }
@@ -348,7 +349,7 @@ int cli_grad(int argc, char **argv) {
         }
         rey_result result = status ? REY_OK : differentiate(&g);
         if (result) {
-            status = cli_report_failure(&options, g.session.ctx, result);
+            status = cli_report(&options, g.session.ctx, result);
         } else if (!status) {
             print_result(&g);
             status = cli_finish_output();

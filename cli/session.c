@@ -180,21 +180,22 @@ static rey_result check_output(const Session *s) {
     return rey_file_check_output(s->ctx, path);
 }
 
-// A picture over a texture, a mesh or another input would be the end of the scene.
-static rey_result refuse_inputs(const Session *s) {
+rey_result cli_refuse_input(const Session *s, const char *path) {
     const Options *o = s->options;
     bool reads = false;
-    if (!o->output || !strcmp(o->output, "-") || o->reverse) {
-        return REY_OK;
-    }
-    rey_result result = rey_mitsuba_reads_file(s->scene, o->output, &reads);
+    rey_result result = rey_mitsuba_reads_file(s->scene, path, &reads);
     for (int i = 0; i < o->load_count; i++) {
         const char *equals = strchr(o->loads[i], '=');
-        reads = reads || rey_file_same(equals ? equals + 1 : o->loads[i], o->output);
+        reads = reads || rey_file_same(equals ? equals + 1 : o->loads[i], path);
     }
+    for (int i = 0; i < o->param_count; i++) {
+        const char *tangent = cli_direction_file(o->params[i]);
+        reads = reads || (tangent && rey_file_same(tangent, path));
+    }
+    reads = reads || (o->adjoint && rey_file_same(o->adjoint, path));
     return result || !reads ? result
                             : rey_fail(s->ctx, REY_ERROR_ARGUMENT, "%s is both read and written; name another file for the result",
-                                       o->output);
+                                       path);
 }
 
 // By number or by id; the message lists what there is.
@@ -228,8 +229,8 @@ static rey_result load_scene(Session *s) {
     result = (o->lenient ? rey_scene_load_lenient : rey_scene_load)(s->ctx, o->files[0], o->defines, o->define_count,
                                                                     &s->scene);
     s->load_seconds = rey_seconds() - start;
-    if (!result) {
-        result = refuse_inputs(s);
+    if (!result && o->output && strcmp(o->output, "-") != 0 && !o->reverse) {
+        result = cli_refuse_input(s, o->output);
     }
     if (result) {
         return result;

@@ -181,11 +181,32 @@ static void inputs_are_not_written(void **state) {
     expect_words(f, 2, "grad lit.xml --param sky.scale -o sky.exr --spp 16", "sky.exr is both read and written");
     expect_words(f, 2, "render lit.xml --load sky.data=before.exr -o before.exr --spp 1", "before.exr is both read");
     assert_int_equal(system("cmp -s sky.exr before.exr"), 0);
+    // Tangents are read as well.
+    expect(f, 0, "grad lit.xml --param sky.scale --mode reverse --adjoint 1 -o slopes --spp 16");
+    expect_words(f, 2, "grad lit.xml --param sky.scale:file=slopes/sky.scale.npy -o slopes/sky.scale.npy --spp 16",
+                 "slopes/sky.scale.npy is both read and written");
+    expect_words(f, 2, "grad lit.xml --param sky.scale:file=slopes/sky.scale.npy --mode reverse --adjoint 1 -o slopes --spp 16",
+                 "slopes/sky.scale.npy is both read and written");
     expect(f, 0, "render lit.xml -o other.exr --spp 1");
     // What is included is read, too.
     write_words("part.xml", "<scene version='3.0.0'><bsdf type='diffuse' id='grey'/></scene>");
     write_words("whole.xml", "<scene version='3.0.0'><include filename='part.xml'/></scene>");
     expect_words(f, 2, "convert whole.xml part.xml", "part.xml is both read and written");
+}
+
+// What a pattern fits and cannot move is listed; what is asked for by name must be there.
+static void patterns_pass_over_bounds(void **state) {
+    Fixture *f = *state;
+    write_words("bounds.xml", "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
+                              "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/>"
+                              "<integer name='height' value='8'/></film></sensor><emitter type='constant'/><shape type='sphere'>"
+                              "<point name='center' x='0' y='0' z='4'/><bsdf type='diffuse' id='pure'><rgb name='reflectance' "
+                              "value='0, 1, 0.5'/></bsdf></shape></scene>");
+    expect_words(f, 1, "check bounds.xml --param pure.reflectance.value --spp 16", "the bounds leave no room to move");
+    JsonNode *node = run_json(f, 0, "check bounds.xml --param '*' --spp 16 --json");
+    const JsonNode *first = json_get(node, "directions")->first;
+    assert_true(first && first->next && strstr(f->out, "the bounds leave no room to move"));
+    json_free(node);
 }
 
 // A report of somebody else in a folder without a fit stays.
@@ -352,7 +373,7 @@ int main(void) {
         cmocka_unit_test(tables_are_aligned),
         cmocka_unit_test(unequal_pictures),
         cmocka_unit_test(steps_that_floats_lose_are_refused), cmocka_unit_test(cancelling_texels_are_no_error),
-        cmocka_unit_test(inputs_are_not_written),
+        cmocka_unit_test(inputs_are_not_written), cmocka_unit_test(patterns_pass_over_bounds),
         cmocka_unit_test(fits_replace_no_foreign_files),
         cmocka_unit_test(fresh_paths_are_compared_where_others_were),
         cmocka_unit_test(ends_of_fits_are_told),
