@@ -139,6 +139,7 @@ static void print_json(const FitResult *result) {
         json_object(&json, NULL);
         json_string(&json, "name", row->name);
         json_integer(&json, "count", row->count);
+        json_integer(&json, "carved", row->carved);
         json_values(&json, "truth", row, row->truth);
         json_values(&json, "start", row, row->start);
         json_values(&json, "found", row, row->found);
@@ -190,6 +191,13 @@ static void print_words(const FitResult *result) {
     if (result->nonfinite) {
         cli_note("warning: %lld sample%s not finite and left out of losses and gradients", (long long)result->nonfinite,
                  result->nonfinite == 1 ? " was" : "s were");
+    }
+    for (size_t i = 0; i < result->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(result->rows, FitRow, i);
+        if (row->carved) {
+            printf("%s: %lld of %lld numbers lie outside of a silhouette and stay empty\n", row->name, (long long)row->carved,
+                   (long long)row->count);
+        }
     }
     for (size_t i = 0; i < result->held_out.count; i++) {
         const FitHeldOut *held = &ARRAY_AT(result->held_out, FitHeldOut, i);

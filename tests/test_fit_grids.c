@@ -207,6 +207,65 @@ static void test_held_out_does_not_count(void **state) {
     rey_fit_result_free(&b);
 }
 
+// A silhouette of the left half of the picture, one row at the bottom excepted: (x, y from the top).
+static bool is_inside(int x, int y) { return x < SIZE / 2 && y < SIZE - 1; }
+
+static int write_silhouette(const Fixture *f) {
+    char path[128];
+    float rgb[SIZE * SIZE * 3];
+    for (int i = 0; i < SIZE * SIZE; i++) { // from the bottom up
+        rgb[3 * i] = rgb[3 * i + 1] = rgb[3 * i + 2] = (float)is_inside(i % SIZE, SIZE - 1 - i / SIZE);
+    }
+    path_of(f, "half.pfm", path);
+    FILE *file = fopen(path, "wb");
+    if (!file || fprintf(file, "PF\n%d %d\n-1.0\n", SIZE, SIZE) < 0 || fwrite(rgb, sizeof rgb, 1, file) != 1) {
+        return -1;
+    }
+    return fclose(file);
+}
+
+// Voxels of which the silhouette's view sees nothing inside of it stay empty, also those of the finer level, and no others are:
+// where a dense voxel by itself changes that view's picture says which.
+static void test_carving(void **state) {
+    Fixture *f = *state;
+    const char *sets[] = {"views.0.silhouette=half.pfm", "parameters.0.carve=true", "iterations=22", "report_spp=0"};
+    char job[128], folder[128];
+    float picture[SIZE * SIZE * 3], empty[SIZE * SIZE * 3], values[FINE * FINE * FINE] = {0};
+    FitResult result;
+    path_of(f, "job.yaml", job);
+    path_of(f, "g", folder);
+    FitDef def = {.job_path = job, .overrides = sets, .override_count = 4, .output = folder};
+    assert_int_equal(write_silhouette(f), 0);
+    if (rey_fit(f->ctx, &def, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    const FitRow *row = &ARRAY_AT(result.rows, FitRow, 0);
+    rey_scene *scene = NULL;
+    assert_int_equal(rey_scene_load(f->ctx, result.scene, NULL, 0, &scene), REY_OK);
+    int param = rey_param_find(scene, row->name), kept = 0;
+    rey_render_def of = rey_default_render_def();
+    of.spp = 64;
+    assert_int_equal(rey_param_set(scene, param, values, row->count), REY_OK);
+    assert_int_equal(rey_render(scene, &of, empty, NULL), REY_OK);
+    for (int64_t i = 0; i < row->count; i++) {
+        bool carved = row->found[i] < 1e-5f, inside = false;
+        values[i] = 1e4f;
+        assert_int_equal(rey_param_set(scene, param, values, row->count), REY_OK);
+        assert_int_equal(rey_render(scene, &of, picture, NULL), REY_OK);
+        values[i] = 0;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            inside |= is_inside(k % SIZE, k / SIZE) && fabsf(picture[3 * k] - empty[3 * k]) > 1e-4f;
+        }
+        assert_false(carved && inside);
+        kept += !carved && !inside;
+    }
+    // Rectangles of pixels around voxels keep some more.
+    assert_in_range(row->carved, FINE * FINE, FINE * FINE * FINE / 2);
+    assert_in_range(kept, 0, FINE);
+    rey_scene_destroy(scene);
+    rey_fit_result_free(&result);
+}
+
 static void test_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
@@ -215,6 +274,9 @@ static void test_errors(void **state) {
         {"parameters.0={name: air.interior_medium.albedo.value.value, regularisers: {sparsity: 1}}", "are for grids of voxels"},
         {"parameters.0.regularisers.normals=1", "normals is for 'parameterisation: laplacian'"},
         {"views=[{target: target_0.exr, held_out: true}]", "all are held out"},
+        {"parameters.0.carve=true", "carve needs views with a 'silhouette'"},
+        {"parameters=[{name: air.interior_medium.albedo.value.value, carve: true}]", "carve is for grids of voxels"},
+        {"views.0.silhouette=half.exr", "half.exr"},
         {"views.0.held_out=maybe", "unknown value 'maybe'"},
         {"views_per_iteration=3", "the job has 2 views that are not held out"},
         {"parameters.1.name=views.2.exposure", "view 2 is held out"},
@@ -236,6 +298,7 @@ int main(void) {
         cmocka_unit_test(test_resampling),
         cmocka_unit_test(test_fit_grows),
         cmocka_unit_test(test_held_out_does_not_count),
+        cmocka_unit_test(test_carving),
         cmocka_unit_test(test_errors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -1,5 +1,5 @@
 // fit.c: a fit from the job to the report: opening, optimising, finishing, closing.
-#include "fit/fit.h"
+#include "fit/carve.h"
 
 #include "base/parallel.h"
 #include "fit/inputs.h"
@@ -141,6 +141,9 @@ static rey_result open_fit(Fit *fit) {
     }
     if (!result) {
         result = rey_unknowns_create(&fit->job, fit->scene, fit->state.meshed != 0, &fit->unknowns);
+    }
+    if (!result) {
+        result = rey_carve(fit, fit->scene, &fit->unknowns);
     }
     if (!result) {
         result = hash_inputs(fit);

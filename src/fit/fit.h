@@ -3,6 +3,7 @@
 
 #include "fit/checkpoint.h"
 #include "fit/loss.h"
+#include "io/image.h"
 #include "scene/scene.h"
 
 typedef struct FitProgress {
@@ -38,6 +39,7 @@ typedef struct FitRow { // one unknown, in the final table
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
     int grid;                     // numbers of each voxel; 0 = no grid
+    int64_t carved;               // numbers of voxels that were carved (carve.h)
     bool derived;                 // from other rows: absorption and reduced scattering of a medium; these rows stand last
     int64_t points[COLUMN_COUNT]; // of meshes whose vertices move as a surface, else 0; 0 also where a column has none
     double chamfer[COLUMN_COUNT]; // their mean distances from the truth, over the diagonal of its bounding box
@@ -81,6 +83,7 @@ typedef struct FitView {
     double mask_sum, weight;
     int full_width, full_height;
     float *full_target, *full_mask;
+    int32_t *silhouette; // of the full size (carve.h), null = none
     SensorRecord full_sensor;
 } FitView;
 
@@ -134,6 +137,8 @@ rey_result rey_frame_write(Fit *fit, int view, const float *image);
 rey_result rey_frame_read(const Fit *fit, int view, int iteration, unsigned char **bytes, size_t *size);
 
 rey_result rey_views_load(Fit *fit);
+// A picture of a view's size, as R G B.
+rey_result rey_view_picture(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image);
 void rey_views_free(Fit *fit);
 
 // Levels (levels.c): whether a view can be reduced as the job says; the pictures and films of a level.

@@ -224,6 +224,7 @@ static rey_result iterate(Fit *fit, int *order) {
         loss += part;
     }
     loss += rey_unknowns_regularise(&fit->unknowns);
+    rey_unknowns_hold(&fit->unknowns);
     double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration, loss);
     rey_result result = check_finite(fit, loss, norm);
     if (!result) {

@@ -45,6 +45,10 @@ static void put_views(Fit *fit, Text *t) {
         if (view->full_mask) {
             put_line(t, hash_of(view->full_mask, pixels * sizeof(float)), "mask ", job->mask);
         }
+        if (view->silhouette) {
+            size_t sums = (size_t)(view->full_width + 1) * (size_t)(view->full_height + 1);
+            put_line(t, hash_of(view->silhouette, sums * sizeof *view->silhouette), "silhouette ", job->silhouette);
+        }
     }
 }
 

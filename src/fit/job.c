@@ -107,6 +107,7 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
         {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
         {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
         {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
+        {.key = "silhouette", .type = FIELD_TEXT, .offset = offsetof(JobView, silhouette)},
         {.key = "weight", .type = FIELD_REAL, .offset = offsetof(JobView, weight), .low = 1e-9, .high = 1e9},
         {.key = "exposure", .type = FIELD_REAL, .offset = offsetof(JobView, exposure), .low = 1e-9, .high = 1e9},
         {.key = "held_out", .type = FIELD_CHOICE, .offset = offsetof(JobView, held_out), .names = truths},
@@ -128,6 +129,7 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
             const YamlNode *sensor = rey_yaml_find(entry, "sensor");
             view->sensor_at = sensor ? rey_job_place(sensor) : view->at;
             view->mask_at = rey_job_place(rey_yaml_find(entry, "mask"));
+            view->silhouette_at = rey_job_place(rey_yaml_find(entry, "silhouette"));
             job->fitted_count += !view->held_out;
         }
     }

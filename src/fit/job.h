@@ -37,10 +37,11 @@ typedef struct JobView {
     int sensor;         // of the scene
     const char *target; // picture file
     const char *mask;   // picture file of weights, null = 1 everywhere
+    const char *silhouette; // picture file that is above 0 where something is seen, null = none (carve.h)
     double weight;      // of this view in the loss
     double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
     int held_out;       // not fitted: the report says how well it is predicted
-    JobPlace at, sensor_at, target_at, mask_at;
+    JobPlace at, sensor_at, target_at, mask_at, silhouette_at;
 } JobView;
 
 typedef struct JobParameter {
@@ -52,6 +53,7 @@ typedef struct JobParameter {
     double smoothness;         // of laplacian: lambda
     Regularisers regularisers; // of laplacian
     GridRegularisers grid_regularisers; // of the others, which must be grids if any is above 0
+    int carve;              // of grids: what some silhouette sees nothing of stays empty
     int known_g;            // of scattering: the mean cosine stays what it is
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry

@@ -58,6 +58,9 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
     if (p->grid_regularisers.sparsity > 0) {
         line_real(t, KEY("regularisers.sparsity"), p->grid_regularisers.sparsity);
     }
+    if (p->carve) {
+        line_text(t, KEY("carve"), "true");
+    }
     if (p->known_g) {
         line_text(t, KEY("g"), "known");
     }
@@ -112,6 +115,10 @@ static void flat_views(Text *t, const Job *job) {
         if (v->mask) {
             snprintf(key, sizeof key, "views.%d.mask", i);
             line_text(t, key, v->mask);
+        }
+        if (v->silhouette) {
+            snprintf(key, sizeof key, "views.%d.silhouette", i);
+            line_text(t, key, v->silhouette);
         }
         if (v->held_out) {
             snprintf(key, sizeof key, "views.%d.held_out", i);

@@ -119,7 +119,7 @@ static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter 
 }
 
 rey_result rey_job_read_parameters(Job *job, const YamlNode *node, void *target) {
-    static const char *const of_g[] = {"free", "known", NULL};
+    static const char *const of_g[] = {"free", "known", NULL}, *const truths[] = {"false", "true", NULL};
     static const Field fields[] = {
         {.key = "name", .type = FIELD_TEXT, .offset = offsetof(JobParameter, name), .required = true},
         {.key = "learning_rate",
@@ -137,6 +137,7 @@ rey_result rey_job_read_parameters(Job *job, const YamlNode *node, void *target)
          .offset = offsetof(JobParameter, moment),
          .names = rey_moment_name_list},
         {.key = "start", .type = FIELD_READER, .offset = 0, .read = read_start},
+        {.key = "carve", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, carve), .names = truths},
         {.key = "g", .type = FIELD_CHOICE, .offset = offsetof(JobParameter, known_g), .names = of_g},
         {.key = "smoothness", .type = FIELD_REAL, .offset = offsetof(JobParameter, smoothness), .high = 1e9},
         {.key = "regularisers",

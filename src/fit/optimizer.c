@@ -262,6 +262,15 @@ double rey_unknowns_regularise(Unknowns *u) {
     return sum;
 }
 
+void rey_unknowns_hold(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        const Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = 0; p->carved && i < p->count; i++) {
+            u->gradient[p->offset + i] *= !p->carved[i];
+        }
+    }
+}
+
 static double rate_of(const JobOptimizer *o, const Unknown *p) {
     return p->learning_rate > 0 ? p->learning_rate : o->learning_rate;
 }

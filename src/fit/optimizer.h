@@ -19,6 +19,7 @@ typedef struct Unknown { // one parameter of the scene, or of a view
     Vertices *vertices; // of laplacian, owned; else null
     GridSize grid;      // of grids, else all 0
     GridRegularisers regularisers;
+    unsigned char *carved; // 1 for entries that stay what they are (carve.h), owned; null = none do
 } Unknown;
 
 typedef struct Unknowns {
@@ -50,6 +51,8 @@ double rey_schedule_factor(const JobSchedule *schedule, int iteration);
 
 // Adds the regularisers' gradients to u->gradient; returns their sum.
 double rey_unknowns_regularise(Unknowns *u);
+// What was carved has no gradient.
+void rey_unknowns_hold(Unknowns *u);
 // One step along u->gradient at iteration i (from 0); loss: where the gradient was taken.
 // Returns the gradient's Euclidean norm in the variables.
 double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration, double loss);

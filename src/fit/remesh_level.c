@@ -1,6 +1,6 @@
 // remesh_level.c: levels with meshes and grids of another fineness. What the scene's arrays hold cannot grow: the scene is saved
 // with the new ones, and the fit goes on in what that file loads as; a resumed fit begins there.
-#include "fit/fit.h"
+#include "fit/carve.h"
 #include "fit/remesh.h"
 #include "io/mitsuba.h"
 #include "io/save.h"
@@ -42,7 +42,10 @@ rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out) {
 
 rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns) {
     rey_result result = rey_fit_load_scene(fit, 0, scene);
-    return result ? result : rey_unknowns_create(&fit->job, *scene, false, unknowns);
+    if (!result) {
+        result = rey_unknowns_create(&fit->job, *scene, false, unknowns);
+    }
+    return result ? result : rey_carve(fit, *scene, unknowns);
 }
 
 static rey_result remesh_all(Fit *fit, double edge_length, Array *meshes) {
@@ -113,6 +116,9 @@ static rey_result change_scene(Fit *fit, int level) {
     rey_result result = rey_fit_load_scene(fit, level + 1, &scene);
     if (!result) {
         result = rey_unknowns_create(&fit->job, scene, true, &unknowns);
+    }
+    if (!result) {
+        result = rey_carve(fit, scene, &unknowns);
     }
     double *gradient = result ? NULL : rey_alloc_array(fit->ctx, (size_t)unknowns.count, sizeof *gradient);
     if (!gradient) {

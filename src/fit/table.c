@@ -79,6 +79,9 @@ rey_result rey_fit_table(Fit *fit, FitResult *result) {
                         .weighted = p->count > LARGEST_SMALL && !p->vertices};
         row->points[COLUMN_FOUND] = p->vertices ? p->vertices->mesh.point_count : 0;
         row->grid = p->grid.channels;
+        for (int64_t i = 0; p->carved && i < p->count; i++) {
+            row->carved += p->carved[i];
+        }
         bool other = fit->state.meshed && (p->vertices || was_resampled(fit, p)); // the start had other vertices or voxels
         row->name = rey_strdup(fit->ctx, p->name);
         row->start = other ? NULL : copy_floats(fit->ctx, u->start + p->offset, p->count);

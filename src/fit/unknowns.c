@@ -451,6 +451,7 @@ void rey_unknowns_free(Unknowns *u) {
         }
         for (size_t i = 0; i < u->items.count; i++) {
             rey_vertices_free(u->ctx, ARRAY_AT(u->items, Unknown, i).vertices);
+            rey_free(u->ctx, ARRAY_AT(u->items, Unknown, i).carved);
         }
         rey_array_free(u->ctx, &u->items);
         rey_array_free(u->ctx, &u->media);

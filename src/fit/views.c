@@ -1,10 +1,10 @@
 // views.c: target pictures and masks, and what they must agree with.
-#include "fit/fit.h"
+#include "fit/carve.h"
 #include "io/image.h"
 
 #include <math.h>
 
-static rey_result load_picture(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image) {
+rey_result rey_view_picture(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image) {
     const char *path = rey_job_path(&fit->job, name);
     rey_result result = path ? rey_image_read(fit->ctx, path, image) : REY_ERROR_MEMORY;
     if (result) {
@@ -24,7 +24,7 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
         return REY_OK;
     }
     rey_image image = {0};
-    rey_result result = load_picture(fit, job_view->mask_at, view, job_view->mask, &image); // of weights: never decoded
+    rey_result result = rey_view_picture(fit, job_view->mask_at, view, job_view->mask, &image); // of weights: never decoded
     if (!result) {
         view->mask = rey_alloc_array(fit->ctx, (size_t)pixels, sizeof *view->mask);
         result = view->mask ? REY_OK : REY_ERROR_MEMORY;
@@ -66,9 +66,12 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
         return rey_job_fail_at(&fit->job, job_view->sensor_at, REY_ERROR_FORMAT, "%s", rey_error(fit->ctx));
     }
     rey_image image = {0};
-    result = load_picture(fit, job_view->target_at, view, job_view->target, &image);
+    result = rey_view_picture(fit, job_view->target_at, view, job_view->target, &image);
     if (!result) {
         result = load_mask(fit, job_view, view);
+    }
+    if (!result) {
+        result = rey_silhouette_load(fit, job_view, view);
     }
     int64_t floats = (int64_t)view->width * view->height * 3;
     if (!result && image.srgb) {
@@ -109,6 +112,7 @@ void rey_views_free(Fit *fit) {
         rey_free(fit->ctx, fit->views[i].mask);
         rey_free(fit->ctx, fit->views[i].full_target);
         rey_free(fit->ctx, fit->views[i].full_mask);
+        rey_free(fit->ctx, fit->views[i].silhouette);
     }
     rey_free(fit->ctx, fit->views);
     fit->views = NULL;
