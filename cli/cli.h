@@ -54,6 +54,7 @@ typedef struct Options {
     int threads;         // 0 = as many as there are
     int lanes;           // 0 = the widest
     int sampler;         // REY_SAMPLER_*
+    int estimator;       // REY_ESTIMATOR_*
     int terms;           // REY_TERM_* bits, 0 = all that are needed
     int primary_spp, indirect_spp; // 0 = as fits spp
     bool reverse;        // --mode reverse

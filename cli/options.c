@@ -33,6 +33,7 @@ typedef enum OptionId {
     OPTION_SAMPLER,
     OPTION_PARAM,
     OPTION_MODE,
+    OPTION_ESTIMATOR,
     OPTION_ADJOINT,
     OPTION_TERMS,
     OPTION_SPP_TERMS,
@@ -68,6 +69,7 @@ static const OptionRow option_rows[] = {
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior,primary,indirect,specular)"},
     {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
     {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
+    {OPTION_ESTIMATOR, 0, "estimator", "probe|score", GRADS | CHECKS, "how extinctions are differentiated (default probe)"},
     {OPTION_STEP, 0, "step", "H", CHECKS, "step of the differences along the direction (default: found by itself)"},
     {OPTION_VARIANCE, 0, "variance", NULL, GRADS, "forward mode: also write the variance of each pixel, to OUT_variance"},
     {OPTION_SET, 0, "set", "key=value", FITS, "change an entry of the job; may be repeated"},
@@ -263,7 +265,7 @@ static bool parse_lanes(Options *o, const char *value) {
     static const int width_values[] = {1, 8, 16};
     int choice = 0;
     bool known = parse_choice(o, "--lanes", value, widths, &choice);
-    o->lanes = known ? width_values[choice] : o->lanes;
+    o->lanes = width_values[choice];
     return known;
 }
 
@@ -294,9 +296,10 @@ static void apply_switch(Options *o, OptionId id) {
 }
 
 static bool apply_option(Options *o, const OptionRow *row, const char *value) {
-    static const char *const samplers[] = {"independent", "sobol", NULL};
-    static const char *const modes[] = {"forward", "reverse", NULL};
+    static const char *const samplers[] = {"independent", "sobol", NULL}, *const modes[] = {"forward", "reverse", NULL};
+    static const char *const estimators[] = {"probe", "score", NULL}; // in the order of REY_ESTIMATOR_*
     int choice = 0;
+    bool known;
     switch (row->id) {
     case OPTION_OUTPUT:
         o->output = value;
@@ -318,20 +321,18 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_LANES:
         return parse_lanes(o, value);
     case OPTION_SAMPLER:
-        if (!parse_choice(o, "--sampler", value, samplers, &choice)) {
-            return false;
-        }
+        known = parse_choice(o, "--sampler", value, samplers, &choice);
         o->sampler = choice == 0 ? REY_SAMPLER_INDEPENDENT : REY_SAMPLER_SOBOL;
-        return true;
+        return known;
+    case OPTION_ESTIMATOR:
+        return parse_choice(o, "--estimator", value, estimators, &o->estimator);
     case OPTION_PARAM:
         o->params[o->param_count++] = value;
         return true;
     case OPTION_MODE:
-        if (!parse_choice(o, "--mode", value, modes, &choice)) {
-            return false;
-        }
+        known = parse_choice(o, "--mode", value, modes, &choice);
         o->reverse = choice == 1;
-        return true;
+        return known;
     case OPTION_ADJOINT:
         o->adjoint = value;
         return true;

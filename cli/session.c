@@ -273,6 +273,7 @@ int cli_session_open(const Options *options, const char *label, Session *session
     def.seed = options->seed;
     def.sensor = session->sensor;
     def.sampler = options->sampler;
+    def.estimator = options->estimator;
     def.terms = options->terms;
     def.progress = cli_progress_step;
     def.user = &session->progress;

@@ -170,6 +170,10 @@ REY_API rey_result rey_param_set(rey_scene *scene, int param, const float *value
 /* ---- rendering ----------------------------------------------------------------------------------------- */
 
 enum { REY_SAMPLER_DEFAULT, REY_SAMPLER_INDEPENDENT, REY_SAMPLER_SOBOL };
+/* Derivatives with respect to the extinction of media. PROBE: also where nothing collides, by a path from a uniform point.
+ * SCORE: the score function, the sum over the path of d log f, which lives on the path's own collisions: cheaper, refused
+ * where an extinction is 0, and of large variance where it is nearly so. */
+enum { REY_ESTIMATOR_PROBE, REY_ESTIMATOR_SCORE };
 
 typedef struct rey_render_def {
     size_t size;       /* sizeof(rey_render_def), set by rey_default_render_def */
@@ -180,6 +184,7 @@ typedef struct rey_render_def {
     int sampler;       /* REY_SAMPLER_*; default: Sobol. A scene's `independent` asks for any unbiased sampler, and
                           scrambled Sobol points are that with less noise */
     int terms;         /* derivative terms to estimate, 0 (default) = all that the parameters need, else a refusal */
+    int estimator;     /* derivatives: REY_ESTIMATOR_*; default: PROBE */
     int sets;          /* derivatives: spp is split over this many independent sets (default 16, at least 1) */
     bool (*progress)(void *user, double fraction); /* may be null; false cancels. Called from one thread at a time */
     void *user;

@@ -20,7 +20,8 @@ rey_result rey_silhouette_load(Fit *fit, const JobView *job_view, FitView *view)
     rey_image image = {0};
     if (s->kind != SENSOR_PERSPECTIVE && s->kind != SENSOR_ORTHOGRAPHIC) {
         return rey_job_fail_at(&fit->job, job_view->silhouette_at, REY_ERROR_UNSUPPORTED,
-                               "silhouettes are of perspective and orthographic sensors, and sensor %d is another one", view->sensor);
+                               "silhouettes are of perspective and orthographic sensors, and sensor %d is another one",
+                               view->sensor);
     }
     rey_result result = rey_view_picture(fit, job_view->silhouette_at, view, job_view->silhouette, &image);
     if (result) {

@@ -23,6 +23,7 @@ typedef struct PathJob {
     int32_t spp;
     uint32_t scramble;            // hash of (seed, set, sensor, term)
     bool sobol;
+    bool score;                   // extinctions are differentiated by collisions alone (probe.h)
     // Film of the tile: (width + 2 border) x (height + 2 border) x 3, sums of filter weight times radiance.
     double *film;
     double *squares;              // the same of the squares of the radiance in XYZ; may be null

@@ -5,6 +5,8 @@
 // the medium is empty, with the transmittance alone, since that is the expectation of the reach [nimier2022; yu2026].
 // A path of its own finds the light there, which is not differentiated itself; one flight of each path gets one, the more
 // likely the more that may bring.
+// The score function, the sum over the path of d log f, is what is left without probes: collisions have all the weight, and
+// points where the extinction is 0 have no part.
 #pragma once
 
 #include "integrator/sweep.h"
@@ -34,7 +36,7 @@ KFN FlightSweep flight_load(const Tracer *t, const RecordBatch *batch) {
     Float end = f_load(r->ldist + batch->first), far = f_load(r->sw + batch->first);
     f.low = f_set(0);
     medium_span(t->scene, medium, t->scene->volumes + medium->sigma_t, f.o, f.d, &f.low, &far);
-    f.sparse = SPARSE_DEPTH * f_safe_rcp(far - f.low);
+    f.sparse = (t->job->score ? 0 : SPARSE_DEPTH) * f_safe_rcp(far - f.low);
     f.high = f_min(far, end);
     f.m = f.m & m_finite(f.high) & m_gt(f.high, f.low);
     SampleKey key = stream_key(t, f.slot, batch->bounce, STREAM_PROBE);

@@ -102,8 +102,8 @@ static rey_result render_plan(Render *r, rey_scene *scene, const rey_render_def 
     }
     r->plan = rey_film_plan(sensor, channels);
     r->tiles = r->plan.columns * r->plan.rows;
-    r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border};
-    r->job.sobol = def->sampler != REY_SAMPLER_INDEPENDENT;
+    r->job = (PathJob){.scene = &scene->view, .sensor = def->sensor, .mode = mode, .border = r->plan.border,
+                       .sobol = def->sampler != REY_SAMPLER_INDEPENDENT, .score = def->estimator == REY_ESTIMATOR_SCORE};
     return REY_OK;
 }
 

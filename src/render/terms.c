@@ -132,6 +132,28 @@ static bool surfaces_read_volumes(const SceneView *view) {
     return false;
 }
 
+// What the score function cannot do for a parameter's derivative, null where it can (REY_ESTIMATOR_SCORE).
+static const char *gap_of_score(const SceneView *view, const Param *p) {
+    if (view->has_media && (p->volume >= 0 || rey_moves_border(view, p) || p->camera >= 0)) {
+        return "the score function has none of media that move, nor of cameras in them; the default estimator has it";
+    }
+    for (int64_t i = 0; i < view->media_count; i++) {
+        const MediumNode *medium = view->media + i;
+        const VolumeNode *v = view->volumes + medium->sigma_t;
+        bool read = p->theta == v->theta || p->theta == medium->scale;
+        bool empty = read && view->theta[medium->scale] <= 0;
+        int64_t count = v->kind == VOLUME_GRID ? (int64_t)v->nx * v->ny * v->nz * v->channels : v->channels;
+        for (int64_t k = 0; k < count && read && !empty; k++) {
+            empty = view->theta[v->theta + k] <= 0;
+        }
+        if (empty) {
+            return "the score function has none where an extinction is 0, because nothing collides there; the default "
+                   "estimator has it";
+        }
+    }
+    return NULL;
+}
+
 // Whether a parameter is, or is read by, a texture.
 static bool texture_reads(const SceneView *view, int32_t id, const Param *p) {
     if (id < 0) {
@@ -179,8 +201,24 @@ static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int c
     return wrong ? rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit)) : REY_OK;
 }
 
+// What is not known of a parameter's derivative whatever terms are asked for, null where there is no such thing.
+static const char *find_gap(const SceneView *view, const rey_render_def *def, const Param *p, int terms, bool volumes) {
+    if (gap_of_drops(view, p, terms)) {
+        return "with hide_emitters, 'path' drops light of surfaces that let a part of it pass, and this parameter decides how "
+               "much. 'volpath' drops none";
+    }
+    const char *gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
+    gap = gap ? gap : gap_in_media(view, p);
+    bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
+    bool elsewhere = volumes && points && !rey_moves_border(view, p);
+    return gap || !elsewhere ? gap : "surfaces have volumes as textures, which points that move look up elsewhere";
+}
+
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed) {
+    if (def->estimator != REY_ESTIMATOR_PROBE && def->estimator != REY_ESTIMATOR_SCORE) {
+        return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "estimator = %d is none of REY_ESTIMATOR_*", def->estimator);
+    }
     const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
     const bool volumes = surfaces_read_volumes(&scene->view);
     for (int i = 0; i < selection.count; i++) {
@@ -193,22 +231,9 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
-        if (gap_of_drops(&scene->view, p, info.terms)) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "no term of the gradient of %s exists yet: with hide_emitters, 'path' drops light of surfaces that "
-                            "let a part of it pass, and this parameter decides how much. 'volpath' drops none", info.name);
-        }
-        const char *gap = gap_in_media(&scene->view, p);
+        const char *gap = find_gap(&scene->view, def, p, info.terms, volumes);
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
-        }
-        bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
-                      (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
-        points = points && !rey_moves_border(&scene->view, p);
-        if (points && volumes) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "no term of the gradient of %s exists yet where surfaces have volumes as textures: points that "
-                            "move look them up elsewhere", info.name);
         }
         result = def->terms ? REY_OK : check_cuts(scene, scene->view.sensors + def->sensor, p);
         if (result != REY_OK) {

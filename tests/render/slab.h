@@ -5,6 +5,8 @@
 
 enum { PIXELS = 16, SETS = 16, MOST_DEFINES = 10 };
 
+static int slab_estimator = REY_ESTIMATOR_PROBE;
+
 static const double pi = 3.14159265358979323846;
 
 typedef struct Case {
@@ -37,6 +39,7 @@ static inline void mean_of(Room room, int param, const float *tangent, int spp, 
     for (int s = 0; s < SETS; s++) {
         float image[3 * PIXELS];
         rey_render_def def = def_make(spp, (uint32_t)s, 1);
+        def.estimator = slab_estimator;
         ok(room, tangent ? rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL)
                          : rey_render(room.scene, &def, image, NULL));
         for (int c = 0; c < 3; c++) {

@@ -173,11 +173,33 @@ static void refused(const rey_define *defines, const char *param, const char *wh
     int id = rey_param_find(room.scene, param);
     rey_render_def def = def_make(1, 0, 1);
     def.terms = 0;
+    def.estimator = slab_estimator;
     assert_true(id >= 0);
     assert_int_not_equal(rey_jvp(room.scene, &def, (rey_selection){&id, 1}, tangent, image, NULL, NULL), REY_OK);
     if (!strstr(rey_error(room.ctx), why)) {
         fail_msg("%s", rey_error(room.ctx));
     }
+    room_close(room);
+}
+
+// The same by the score function, which is another estimate, and none where the slab is empty.
+static void test_score(void **state) {
+    const float along[3] = {1, 1, 1};
+    const rey_define air[MOST_DEFINES] = {{"sky", "1"}, {"scale", "0"}}, fog[MOST_DEFINES] = {{"sun", "5"}, {"albedo", "1, 1, 1"}};
+    double mean[2][3], error[3];
+    slab_estimator = REY_ESTIMATOR_SCORE;
+    test_transmittance(state);
+    test_single_scattering(state);
+    test_furnace(state);
+    refused(air, "fog.scale.value", "the score function has none where an extinction is 0");
+    refused(fog, "slab.to_world", "the score function has none of media that move");
+    Room room = slab_open(fog, 2);
+    for (int k = 0; k < 2; k++) {
+        slab_estimator = k ? REY_ESTIMATOR_SCORE : REY_ESTIMATOR_PROBE;
+        mean_of(room, rey_param_find(room.scene, "fog.sigma_t.value.value"), along, 64, mean[k], error);
+    }
+    assert_true(mean[0][0] != mean[1][0]);
+    slab_estimator = REY_ESTIMATOR_PROBE;
     room_close(room);
 }
 
@@ -216,6 +238,7 @@ int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_score),
                                        cmocka_unit_test(test_borders),
                                        cmocka_unit_test(test_outline)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
