@@ -121,6 +121,7 @@ static void print_json(const FitResult *result) {
     json_integer(&json, "iterations", result->iterations);
     json_bool(&json, "converged", result->converged);
     json_bool(&json, "still_falling", result->falling);
+    json_bool(&json, "rose", result->rose);
     json_integer(&json, "iterations_before", result->iterations_before);
     json_number(&json, "seconds_before", result->seconds_before);
     json_number(&json, "loss", result->loss);
@@ -223,6 +224,9 @@ static void print_end(const FitResult *result, bool resumed) {
     } else if (resumed && done == result->iterations_before) {
         cli_note("nothing was left to do: %d iteration%s done already, --set iterations=N with a larger N asks for more; table "
                  "and report are made again", done, done == 1 ? " was" : "s were");
+    }
+    if (result->rose) {
+        cli_note("warning: the loss rose to more than twice what it began with: lower the learning rate");
     }
     if (result->falling) {
         cli_note("the loss was still falling when the iterations ended: --resume --set iterations=%lld goes on from there",

@@ -152,9 +152,6 @@ static rey_result open_fit(Fit *fit) {
         result = rey_fit_check_derivatives(fit);
     }
     if (!result) {
-        result = rey_fit_check_truth(fit);
-    }
-    if (!result) {
         result = allocate(fit);
     }
     if (!result) {
@@ -243,6 +240,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
     out->iterations = fit->state.iteration;
     out->converged = fit->state.converged;
     out->falling = rey_fit_falling(fit);
+    out->rose = rey_fit_rose(fit);
     out->iterations_before = fit->first;
     out->seconds_before = fit->earlier;
     out->seconds = fit->state.seconds;

@@ -56,6 +56,7 @@ typedef struct FitResult {
     int iterations;
     bool converged; // by the stop rule
     bool falling;   // the iterations ended while the loss was still falling: more of them find more
+    bool rose;      // the loss ended well above where it began: lower the learning rate
     int iterations_before; // of those, done by the runs before
     double seconds_before; // of `seconds`, of the runs before
     double loss;    // of the last iterations, or at the best point: see rey_fit_loss_words; NaN when there was none
@@ -127,6 +128,8 @@ rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set
 rey_result rey_fit_optimise(Fit *fit);
 // Whether the loss fell from the last tenth but one to the last tenth of the iterations, by more than its noise.
 bool rey_fit_falling(const Fit *fit);
+// Whether the last losses are more than twice the first one, as they are of steps that are too long.
+bool rey_fit_rose(const Fit *fit);
 double rey_fit_mean_loss(const FitState *state, int end, int count); // of the `count` iterations before `end`
 int rey_fit_batches(const Job *job); // iterations in which every view has its turn once
 
@@ -174,7 +177,5 @@ bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size);
 bool rey_fit_row_is_pose(const FitRow *row);
 // The scene and the values that the fit began with.
 rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns);
-// Whether the films of the truth, where the job names one that can be read, are those of the views; nothing else is looked at.
-rey_result rey_fit_check_truth(Fit *fit);
 // Adds truths and errors to the rows: opens the truth when the job names one, whose values nothing sees before.
 rey_result rey_fit_judge(Fit *fit, FitResult *result);

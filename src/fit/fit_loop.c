@@ -255,8 +255,21 @@ static double loss_variance(const FitState *state, int end, int count) {
     return sum / (count - 1) / count;
 }
 
+enum { SHORTEST = 5 }; // of windows of losses
+
+// By so many standard errors.
+static bool rose_by(const Fit *fit, double errors) {
+    int n = fit->state.iteration, window = n / 10 > SHORTEST ? n / 10 : SHORTEST;
+    if (n < 2 * window || fit->job.level_count) { // levels have losses of their own
+        return false;
+    }
+    double now = rey_fit_mean_loss(&fit->state, n, window), first = rey_fit_mean_loss(&fit->state, 1, 1);
+    return now > fmax(2 * first, 0) + errors * sqrt(loss_variance(&fit->state, n, window));
+}
+
+bool rey_fit_rose(const Fit *fit) { return rose_by(fit, 3); }
+
 bool rey_fit_falling(const Fit *fit) {
-    enum { SHORTEST = 5 };
     int n = fit->state.iteration, window = n / 10 > SHORTEST ? n / 10 : SHORTEST;
     if (fit->state.converged || n < 2 * window) {
         return false;
@@ -273,7 +286,7 @@ static bool has_converged(const Fit *fit) {
         return false;
     }
     double now = rey_fit_mean_loss(&fit->state, n, window), before = rey_fit_mean_loss(&fit->state, n - window, window);
-    return before - now < fit->job.stop_tolerance * fabs(before);
+    return before - now < fit->job.stop_tolerance * fabs(before) && !rose_by(fit, 1);
 }
 
 static rey_result save(Fit *fit) {

@@ -31,6 +31,10 @@ static void put_head(Fit *fit, const FitResult *out, Text *html) {
                  out->seconds, out->converged ? ", ended by the stop rule" : "");
     rey_text_html(html, slash ? slash + 1 : fit->job.path);
     rey_text_add(html, ".</p>\n");
+    if (out->rose) {
+        rey_text_add(html, "<p class=\"lead\"><b>The loss rose</b>, to more than twice what it began with: lower the learning "
+                           "rate.</p>\n");
+    }
     if (out->falling) {
         rey_text_add(html, "<p class=\"lead\"><b>The loss was still falling</b> when the iterations ended: <code>--resume --set "
                            "iterations=%lld</code> goes on from there.</p>\n", 2 * (long long)out->iterations);

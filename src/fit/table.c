@@ -332,17 +332,6 @@ static rey_result load_truth(Fit *fit, rey_scene **out) {
     return rey_job_named_scene(&fit->job, fit->job.truth_at, defines, result);
 }
 
-rey_result rey_fit_check_truth(Fit *fit) {
-    rey_scene *truth = NULL;
-    rey_result result = fit->job.truth_scene ? load_truth(fit, &truth) : REY_OK;
-    if (truth) {
-        result = check_films(fit, truth);
-    }
-    rey_scene_destroy(truth);
-    // A file that is missing is told at the end: until then it may come, and nothing that is found depends on it.
-    return result == REY_ERROR_IO ? REY_OK : result;
-}
-
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {
     if (!fit->job.truth_scene) {
         return REY_OK;
