@@ -255,6 +255,25 @@ static rey_result try_again(Work *w, Check *check) {
     return result;
 }
 
+// A parameter with entries on both of its bounds cannot move as a whole: those in the upper half of the range move down.
+static bool turn_inwards(const Work *w, Check *check) {
+    const Direction *d = &check->direction;
+    rey_param_info info;
+    bool bare = !check->spec[cli_direction_name_length(check->spec)];
+    if (!bare || d->count != 1 || rey_param_get_info(w->session.scene, d->params[0], &info) ||
+        !isfinite(info.low) || !isfinite(info.high)) {
+        return false;
+    }
+    for (int64_t i = 0; i < info.count; i++) {
+        d->tangent[i] = w->original[i] > 0.5f * (info.low + info.high) ? -1 : 1;
+    }
+    check->step = check_choose_step(w->session.scene, w->original, check, w->session.options->step);
+    if (check->step.h > 0) {
+        cli_note("%s has entries on both of its bounds: those in the upper half of its range move down, the others up", info.name);
+    }
+    return check->step.h > 0;
+}
+
 static rey_result choose_step(Work *w, Check *check) {
     rey_context *ctx = w->session.ctx;
     double asked = w->session.options->step, least = check_least_step(w->original, &check->direction);
@@ -262,7 +281,7 @@ static rey_result choose_step(Work *w, Check *check) {
         return rey_fail(ctx, REY_ERROR_PARAM, "%s: the direction is zero, expected one that moves the parameter", check->spec);
     }
     check->step = check_choose_step(w->session.scene, w->original, check, asked);
-    if (!(check->step.h > 0)) {
+    if (!(check->step.h > 0) && !turn_inwards(w, check)) {
         return rey_fail(ctx, REY_ERROR_PARAM, "%s: the bounds leave no room to move along this direction", check->spec);
     }
     if (asked > 0 && asked < least) {

@@ -242,6 +242,12 @@ static rey_result load_scene(Session *s) {
     for (int i = 0; i < rey_scene_ignored_count(s->scene); i++) {
         cli_note("ignored: %s", rey_scene_ignored(s->scene, i));
     }
+    for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
+        const char *note = rey_scene_note(s->scene, i);
+        if (o->command != COMMAND_INFO && !strncmp(note, "warning: ", 9)) {
+            cli_note("%s", note);
+        }
+    }
     rey_scene_info info;
     rey_scene_get_info(s->scene, &info);
     if (o->command != COMMAND_RENDER && o->command != COMMAND_GRAD && o->command != COMMAND_CHECK) {

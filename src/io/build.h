@@ -156,6 +156,8 @@ rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_
 rey_result build_medium_slot(Builder *b, rey_xml_node *node, const char *name, const char *path, int32_t *out);
 // Whether paths go through media.
 rey_result build_media_use(Builder *b);
+// Notes of pictures with numbers out of their slots' ranges, which begin with "warning: "; of a scene that is frozen.
+rey_result build_note_ranges(Builder *b);
 rey_result build_sdfgrid(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape);
 bool build_is_curve(const char *plugin);
 int build_curve_order(const char *plugin); // control points per segment

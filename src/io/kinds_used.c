@@ -5,6 +5,7 @@
 #include "io/xml_parts.h"
 
 #include <limits.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -93,7 +94,17 @@ rey_result rey_mitsuba_reads_file(const rey_scene *scene, const char *path, bool
 int rey_mitsuba_sensor(const rey_scene *scene, const char *id) {
     const SceneSource *source = scene->document;
     const rey_xml_node *node = source ? rey_xml_find_id(source->document, id) : NULL;
-    return node && node->tag == REY_XML_SENSOR && node->built >= 0 ? node->built : -1;
+    if (node) {
+        return node->tag == REY_XML_SENSOR && node->built >= 0 ? node->built : -1;
+    }
+    for (int i = 0; i < (int)scene->view.sensors_count; i++) { // by the name that its parameters have
+        char name[32];
+        snprintf(name, sizeof name, "sensor_%d", i);
+        if (!rey_mitsuba_sensor_id(scene, i) && strcmp(id, name) == 0) {
+            return i;
+        }
+    }
+    return -1;
 }
 
 const char *rey_mitsuba_sensor_id(const rey_scene *scene, int index) {

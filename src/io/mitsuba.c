@@ -4,6 +4,7 @@
 #include "io/lenient.h"
 #include "io/load.h"
 #include "io/mitsuba.h"
+#include "io/xml_parts.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -256,6 +257,19 @@ const char *rey_mitsuba_file(const rey_scene *scene) {
     return file ? file : "scene";
 }
 
+// <alias>: parameters under the further names of what they belong to.
+static rey_result name_aliases(Builder *b) {
+    const XmlIds *ids = &b->source->document->ids;
+    for (size_t i = 0; i < ids->capacity; i++) {
+        const XmlId *id = &ids->slots[i];
+        const char *path = id->id ? ARRAY_AT(b->source->paths, char *, id->node->index) : NULL;
+        if (path && id->node->id && strcmp(id->id, id->node->id) != 0) {
+            TRY(alias_prefix(b, id->node, path, id->id));
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result build_scene(Builder *b) {
     rey_xml_node *root = rey_xml_root(b->source->document);
     int counts[REY_XML_TAG_COUNT] = {0};
@@ -274,6 +288,7 @@ static rey_result build_scene(Builder *b) {
         TRY(rey_scene_add_note(b->scene, "%s", note));
     }
     TRY(build_check_unused(b, root));
+    TRY(name_aliases(b));
     TRY(build_attribute_tables(b));
     find_drops(b);
     TRY(build_media_use(b));
@@ -281,7 +296,8 @@ static rey_result build_scene(Builder *b) {
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);
-    return rey_scene_freeze(b->scene);
+    TRY(rey_scene_freeze(b->scene));
+    return build_note_ranges(b);
 }
 
 static void source_free(void *document) {

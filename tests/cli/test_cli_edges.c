@@ -1,6 +1,7 @@
 // test_cli_edges.c: what users do at the edges: strange outputs, broken options, signals, unequal pictures.
 #include "command.h"
 
+#include <math.h>
 #include <sys/stat.h>
 
 static void outputs_may_be_devices(void **state) {
@@ -194,6 +195,35 @@ static void inputs_are_not_written(void **state) {
     expect_words(f, 2, "convert whole.xml part.xml", "part.xml is both read and written");
 }
 
+// Pictures that reach out of their slot's range are used as they are, and said.
+static void pictures_out_of_range_are_told(void **state) {
+    Fixture *f = *state;
+    write_pfm("below.pfm", 2, -5);
+    write_pfm("within.pfm", 2, 0.5f);
+    write_words("picture.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective' id='eye'><film "
+                               "type='hdrfilm'><integer name='width' value='4'/><integer name='height' value='4'/></film></sensor>"
+                               "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='2'/><integer "
+                               "name='height' value='2'/></film></sensor><emitter type='constant'/><shape type='rectangle'><bsdf "
+                               "type='diffuse' id='floor'><texture type='bitmap' name='reflectance'><string name='filename' "
+                               "value='$file'/><boolean name='raw' value='true'/></texture></bsdf></shape></scene>");
+    expect_words(f, 0, "render picture.xml -D file=below.pfm -o out.exr --spp 1",
+                 "warning: 1 of the 6 numbers of shape_0.bsdf.reflectance.data lie outside of 0 to 1, and go from -5 to 1");
+    expect(f, 0, "render picture.xml -D file=within.pfm -o out.exr --spp 1 --sensor sensor_1");
+    assert_null(strstr(f->words, "warning"));
+    expect_words(f, 2, "render picture.xml -D file=within.pfm -o out.exr --spp 1 --sensor sensor_0", "no sensor 'sensor_0'");
+}
+
+// Parameters have the further names of what they belong to.
+static void aliases_name_parameters(void **state) {
+    Fixture *f = *state;
+    write_words("alias.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
+                             "<integer name='width' value='2'/><integer name='height' value='2'/></film></sensor><bsdf "
+                             "type='twosided' id='white'><bsdf type='diffuse'/></bsdf><alias id='white' as='blanc'/><shape "
+                             "type='rectangle'><ref id='blanc'/></shape></scene>");
+    expect(f, 0, "grad alias.xml --param white.brdf_0.reflectance.value --spp 16");
+    expect(f, 0, "grad alias.xml --param blanc.brdf_0.reflectance.value --spp 16");
+}
+
 // What a pattern fits and cannot move is listed; what is asked for by name must be there.
 static void patterns_pass_over_bounds(void **state) {
     Fixture *f = *state;
@@ -202,10 +232,16 @@ static void patterns_pass_over_bounds(void **state) {
                               "<integer name='height' value='8'/></film></sensor><emitter type='constant'/><shape type='sphere'>"
                               "<point name='center' x='0' y='0' z='4'/><bsdf type='diffuse' id='pure'><rgb name='reflectance' "
                               "value='0, 1, 0.5'/></bsdf></shape></scene>");
-    expect_words(f, 1, "check bounds.xml --param pure.reflectance.value --spp 16", "the bounds leave no room to move");
-    JsonNode *node = run_json(f, 0, "check bounds.xml --param '*' --spp 16 --json");
+    expect_words(f, 1, "check bounds.xml --param pure.reflectance.value:add=1 --spp 16", "the bounds leave no room to move");
+    JsonNode *node = run_json(f, 0, "check bounds.xml --param '*:add=1' --spp 16 --json");
     const JsonNode *first = json_get(node, "directions")->first;
     assert_true(first && first->next && strstr(f->out, "the bounds leave no room to move"));
+    json_free(node);
+    // By itself it finds a way inwards.
+    node = run_json(f, 0, "check bounds.xml --param pure.reflectance.value --spp 64 --json");
+    assert_string_equal(json_text(json_get(node, "directions")->first, "verdict", ""), "ok");
+    assert_true(fabs(json_value(json_get(node, "directions")->first, "derivative", 0)) > 1e-3);
+    assert_non_null(strstr(f->words, "on both of its bounds"));
     json_free(node);
 }
 
@@ -280,6 +316,13 @@ static void ends_of_fits_are_told(void **state) {
     expect(f, 0, "fit flat.yaml -o flat");
     assert_null(strstr(f->words, "falling"));
     assert_int_not_equal(system("grep -q 'still falling' flat/report.html"), 0);
+    // Steps that are too long end where losses no longer change, too, but have not converged.
+    node = run_json(f, 0, "fit flat.yaml -o far --set \"optimizer={type: sgd, learning_rate: 1000}\" --set \"stop={window: 5}\" "
+                          "--set iterations=100 --spp 8 --json");
+    assert_true(json_value(node, "iterations", 0) == 100);
+    assert_true(strstr(f->out, "\"converged\": false") && strstr(f->out, "\"rose\": true"));
+    assert_non_null(strstr(f->words, "warning: the loss rose to more than twice"));
+    json_free(node);
 }
 
 // Patterns pass over what moves, and a pose counts as what it is free to do.
@@ -374,6 +417,8 @@ int main(void) {
         cmocka_unit_test(unequal_pictures),
         cmocka_unit_test(steps_that_floats_lose_are_refused), cmocka_unit_test(cancelling_texels_are_no_error),
         cmocka_unit_test(inputs_are_not_written), cmocka_unit_test(patterns_pass_over_bounds),
+        cmocka_unit_test(aliases_name_parameters),
+        cmocka_unit_test(pictures_out_of_range_are_told),
         cmocka_unit_test(fits_replace_no_foreign_files),
         cmocka_unit_test(fresh_paths_are_compared_where_others_were),
         cmocka_unit_test(ends_of_fits_are_told),

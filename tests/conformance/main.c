@@ -128,6 +128,10 @@ int main(int argc, char **argv) {
     run_facts(&suite);
     run_converts(&suite);
     rey_context_destroy(suite.ctx);
+    if (suite.only && suite.passed + suite.failed + suite.skipped == 0) {
+        fprintf(stderr, "conformance: --only %s fits no case, expected a pattern such as '*/test_spot'\n", suite.only);
+        return 2;
+    }
     printf("%d passed, %d failed, %d skipped\n", suite.passed, suite.failed, suite.skipped);
     return suite.failed ? 1 : 0;
 }
