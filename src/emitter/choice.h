@@ -17,6 +17,9 @@ KFN Int emitter_choose(const SceneView *scene, Float u, Float *probability) {
 
 // Delta lights cannot be met by scattering, so their samples count whole.
 KFN Mask light_is_delta(const SceneView *scene, Int light) {
+    if (scene->emitters_count == 1) {
+        return m_set(emitter_is_delta(scene->emitters));
+    }
     return mi_eq((i_set(EMITTER_DELTA_KINDS) >> EMITTER_FIELD(scene, light, kind)) & 1, i_set(1));
 }
 

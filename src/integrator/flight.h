@@ -173,7 +173,7 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
                              int32_t record) {
     const SceneView *scene = t->scene;
     Float choice;
-    Int light = emitter_choose(scene, rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), &choice);
+    Int light = light_choose(scene, key, bounce, &choice);
     Spec radiance;
     LightSample s = lights_sample(scene, light, v->m, v->hit.p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
     Float scatter_pdf = phase_pdf(&c->call, c->wi, s.d), value = phase_eval(&c->call, c->wi, s.d), pdf = s.pdf * choice;

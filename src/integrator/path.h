@@ -50,7 +50,7 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
         light_key.sample = split.light_sample;
         key = &light_key;
     }
-    Int light = emitter_choose(scene, rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), &choice);
+    Int light = light_choose(scene, key, bounce, &choice);
     Spec radiance;
     LightSample s = lights_sample(scene, light, v->m, si->p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
     Vec3 wo = frame_to_local(&si->sh, s.d);

@@ -106,18 +106,31 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     spec_store(t->ws.suffix, i, spec_zero());
 }
 
+// Which pixels and samples `count` paths from `first` on are.
+static void number_samples(Tracer *t, int64_t first, int32_t count, int32_t margin) {
+    const PathJob *job = t->job;
+    int32_t pixel = (int32_t)(first / job->spp), sample = (int32_t)(first % job->spp);
+    for (int32_t i = 0, number = -1; i < count; i++) {
+        if (number < 0) {
+            // Numbers of pixels of the whole film with room for a border, so that they do not depend on the tiles.
+            int32_t x = job->x + pixel % job->width + margin, y = job->y + pixel / job->width + margin;
+            number = y * (t->sensor->width + 2 * margin) + x;
+        }
+        t->ws.pixel[i] = number;
+        t->ws.sample[i] = sample++;
+        if (sample == job->spp) {
+            sample = 0;
+            pixel++;
+            number = -1;
+        }
+    }
+}
+
 // Starts `count` paths: samples `first`... of the tile, pixel by pixel, so that packets are coherent.
 static void camera_stage(Tracer *t, int64_t first, int32_t count) {
     PathJob *job = t->job;
     const int32_t margin = filter_margin(t->sensor);
-    for (int32_t i = 0; i < count; i++) {
-        int64_t at = first + i;
-        int32_t pixel = (int32_t)(at / job->spp);
-        // Numbers of pixels of the whole film with room for a border, so that they do not depend on the tiles.
-        int32_t x = job->x + pixel % job->width + margin, y = job->y + pixel / job->width + margin;
-        t->ws.pixel[i] = y * (t->sensor->width + 2 * margin) + x;
-        t->ws.sample[i] = (int32_t)(at % job->spp);
-    }
+    number_samples(t, first, count, margin);
     for (int32_t i = 0; i < count; i += LANES) {
         Int slot = i_iota() + i;
         SampleKey key = slot_key(t, slot);

@@ -19,30 +19,54 @@ typedef struct Vertex {
     Int medium;      // that the ray came through
 } Vertex;
 
+// Entries of per-path arrays. near (uniform): they lie close to each other, from `first` on.
+typedef struct Entries {
+    Int at;
+    int32_t first;
+    bool near;
+} Entries;
+
+KFN Float entries_f(const real *base, Entries e) { return e.near ? f_near(base, e.first, e.at) : real_gather(base, e.at); }
+KFN Int entries_i(const int32_t *base, Entries e) { return e.near ? i_near(base, e.first, e.at) : i_gather(base, e.at); }
+KFN Vec3 entries_v3(const real *x, const real *y, const real *z, Entries e) {
+    return v3(entries_f(x, e), entries_f(y, e), entries_f(z, e));
+}
+
 KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int32_t bounce) {
     const Workspace *ws = &t->ws;
     const Paths *p = &ws->paths[t->current];
     Vertex v;
     v.m = m_first_n(count);
     v.at = i_select(v.m, i_load(order), i_set(order[0]));
-    v.slot = i_gather(p->slot, v.at);
-    v.hit.shape = i_max(i_gather(ws->hit_shape, v.at), i_set(0));
-    v.hit.prim = i_gather(ws->hit_prim, v.at);
-    v.hit.instance = i_gather(ws->hit_instance, v.at);
-    v.hit.u = real_gather(ws->hit_u, v.at);
-    v.hit.v = real_gather(ws->hit_v, v.at);
-    v.hit.p = LOAD_V3(*ws, hit_x, hit_y, hit_z, v.at);
-    v.d = LOAD_V3(*p, dx, dy, dz, v.at);
-    v.origin = LOAD_V3(*p, px, py, pz, v.at);
-    v.beta = spec_gather(p->beta, v.at);
-    v.pdf = real_gather(p->pdf, v.at);
-    v.depth = t->scene->through ? i_gather(p->depth, v.at) : i_set(bounce);
-    v.medium = t->scene->has_media ? i_gather(p->medium, v.at) : i_set(-1);
+    // Sorting keeps the order within groups, so that those of many paths are read nearly in a row.
+    Mask near = mi_lt(v.at, i_set(order[0] + NEAR_LANES)) & mi_lt(i_set(order[0] - 1), v.at);
+    const Entries e = {v.at, order[0], m_all(near)};
+    v.slot = entries_i(p->slot, e);
+    v.hit.shape = i_max(entries_i(ws->hit_shape, e), i_set(0));
+    v.hit.prim = entries_i(ws->hit_prim, e);
+    v.hit.instance = t->scene->instances_count ? entries_i(ws->hit_instance, e) : i_set(0);
+    v.hit.u = entries_f(ws->hit_u, e);
+    v.hit.v = entries_f(ws->hit_v, e);
+    v.hit.p = entries_v3(ws->hit_x, ws->hit_y, ws->hit_z, e);
+    v.d = entries_v3(p->dx, p->dy, p->dz, e);
+    v.origin = entries_v3(p->px, p->py, p->pz, e);
+    for (int c = 0; c < SPEC_N; c++) {
+        v.beta.c[c] = entries_f(p->beta[c], e);
+    }
+    v.pdf = entries_f(p->pdf, e);
+    v.depth = t->scene->through ? entries_i(p->depth, e) : i_set(bounce);
+    v.medium = t->scene->has_media ? entries_i(p->medium, e) : i_set(-1);
     return v;
 }
 
 // Adds radiance to the slots' sums. Slots are distinct within a batch.
 KFN void slot_add(Tracer *t, Int slot, Spec l, Mask m) { spec_scatter_add(t->ws.radiance, slot, l, m); }
+
+// Chooses a light per lane, with a random number of its own where there is a choice.
+KFN Int light_choose(const SceneView *scene, const SampleKey *key, int32_t bounce, Float *probability) {
+    Float u = scene->emitters_count > 1 ? rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)) : f_set(0);
+    return emitter_choose(scene, u, probability);
+}
 
 // Claims LANES record entries for a batch; -1 when there is no room.
 KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count, int32_t bounce) {

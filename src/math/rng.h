@@ -53,14 +53,6 @@ KFN uint32_t rng_scramble(uint32_t seed, uint32_t set, uint32_t sensor, uint32_t
     return rng_mix(rng_mix(rng_mix(rng_mix(0, seed), set), sensor), term);
 }
 
-KFN UInt rng_reverse_bits(UInt x) {
-    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
-    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
-    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
-    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
-    return (x >> 16) | (x << 16);
-}
-
 // A permutation in which every bit depends on itself and the lower bits only; on bit-reversed input this is a nested
 // uniform scramble [laine2011 section 3.1, constants of vegdahl2021]. The seed must be well mixed.
 KFN UInt rng_owen_reversed(UInt x, UInt seed) {
@@ -91,7 +83,7 @@ KFN UInt4 rng_seeds(const SampleKey *key, UInt sample, uint32_t dimension) {
 }
 
 KFN UInt rng_shuffled_index(UInt sample, UInt seed) {
-    return rng_reverse_bits(rng_owen_reversed(rng_reverse_bits(sample), seed));
+    return u_reverse_bits(rng_owen_reversed(u_reverse_bits(sample), seed));
 }
 
 // Two numbers in [0, 1). Different dimensions, pixels and scrambles are independent of each other.
@@ -102,8 +94,8 @@ KFN Vec2 rng_2d(const SampleKey *key, uint32_t dimension) {
     }
     UInt4 h = rng_seeds(key, u_set(0), dimension);
     UInt index = rng_shuffled_index(key->sample, h.z);
-    UInt x = rng_reverse_bits(rng_owen_reversed(index, h.x));
-    UInt y = rng_reverse_bits(rng_owen_reversed(rng_sobol1_reversed(index), h.y));
+    UInt x = u_reverse_bits(rng_owen_reversed(index, h.x));
+    UInt y = u_reverse_bits(rng_owen_reversed(rng_sobol1_reversed(index), h.y));
     return (Vec2){rng_unit(x), rng_unit(y)};
 }
 
@@ -114,5 +106,5 @@ KFN Float rng_1d(const SampleKey *key, uint32_t dimension) {
     }
     UInt4 h = rng_seeds(key, u_set(0), dimension);
     UInt index = rng_shuffled_index(key->sample, h.z);
-    return rng_unit(rng_reverse_bits(rng_owen_reversed(index, h.x)));
+    return rng_unit(u_reverse_bits(rng_owen_reversed(index, h.x)));
 }

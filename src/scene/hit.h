@@ -23,8 +23,8 @@ typedef struct TexCoord {
 KFN TexCoord texcoord(Vec2 uv, const Hit *hit) { return (TexCoord){uv.x, uv.y, hit}; }
 
 #define SHAPE_FIELD(scene, id, field)                                                                                  \
-    i_gather((const int32_t *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                             \
-                                                   (int32_t)(offsetof(ShapeRecord, field) / 4))
+    i_gather_shared((const int32_t *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                      \
+                                                          (int32_t)(offsetof(ShapeRecord, field) / 4))
 
 // A float among the numbers of shapes (the tests compile these headers with wider ones).
 #ifdef REAL_DOUBLE
@@ -43,6 +43,24 @@ KFN Float theta_at(const SceneView *scene, Int index) {
 #endif
 }
 
+// Three numbers in a row.
+KFN Vec3 numbers_v3(const float *numbers, Int at) {
+    Float n[3];
+    f_gather3(numbers, at, n);
+    return v3(n[0], n[1], n[2]);
+}
+
+// The same where all lanes often read in one place.
+KFN Vec3 numbers_v3_shared(const float *numbers, Int at) {
+    if (i_uniform(at)) {
+        const float *n = numbers + i_lane(at, 0);
+        return v3(f_set(n[0]), f_set(n[1]), f_set(n[2]));
+    }
+    return numbers_v3(numbers, at);
+}
+
+KFN Vec3 theta_v3(const SceneView *scene, Int at) { return numbers_v3(scene->theta, at); }
+
 // The three vertex numbers of a triangle, relative to the shape.
 typedef struct Corners {
     Int i[3];
@@ -51,8 +69,6 @@ typedef struct Corners {
 KFN Corners mesh_corners(const SceneView *scene, Int shape, Int prim) {
     Int at = (SHAPE_FIELD(scene, shape, triangle) + prim) * 3;
     Corners c;
-    for (int k = 0; k < 3; k++) {
-        c.i[k] = i_gather(scene->triangles, at + k);
-    }
+    i_gather3(scene->triangles, at, c.i);
     return c;
 }

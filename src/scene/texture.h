@@ -105,8 +105,13 @@ KFN Spec bitmap_texel(const SceneView *scene, const TextureNode *t, Int at) {
         return spec_set(texel_number(scene, t, index));
     }
     Spec s;
+    if (t->storage == TEXELS_FLOAT) {
+        static_assert(SPEC_N == 3, "colours are read as three numbers");
+        f_gather3(scene->theta, index + t->theta, s.c);
+        return s;
+    }
     for (int c = 0; c < SPEC_N; c++) {
-        s.c[c] = texel_number(scene, t, index + c);
+        s.c[c] = packed_texel(scene, t, index + c);
     }
     return s;
 }

@@ -14,10 +14,6 @@ typedef struct Interaction {
     Vec3 dp_dv;
 } Interaction;
 
-KFN Vec3 theta_v3(const SceneView *scene, Int at) {
-    return v3(theta_at(scene, at), theta_at(scene, at + 1), theta_at(scene, at + 2));
-}
-
 // Frame with normal n and s along dp_du [Gram-Schmidt].
 KFN Frame frame_from_tangent(Vec3 n, Vec3 dp_du) {
     Frame f;

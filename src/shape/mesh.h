@@ -22,8 +22,9 @@ KFN Interaction mesh_interaction(const SceneView *scene, int32_t flags, const Hi
         Int uvs = SHAPE_FIELD(scene, hit->shape, uvs);
         Float u[3], v[3];
         for (int k = 0; k < 3; k++) {
-            u[k] = theta_at(scene, uvs + c.i[k] * 2);
-            v[k] = theta_at(scene, uvs + c.i[k] * 2 + 1);
+            Vec3 uv = theta_v3(scene, uvs + c.i[k] * 2); // and one number more
+            u[k] = uv.x;
+            v[k] = uv.y;
         }
         si.uv.x = w * u[0] + hit->u * u[1] + hit->v * u[2];
         si.uv.y = w * v[0] + hit->u * v[1] + hit->v * v[2];

@@ -37,7 +37,7 @@ KFN Interaction sphere_interaction(const SceneView *scene, int32_t flags, const 
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     Vec3 centre = table_v3(scene, at);
-    Float radius = table_at(scene, at + 3);
+    Float radius = table_v3(scene, at + 3).x;
     si.ng = v3_normalize(v3_sub(hit->p, centre));
     si.p = v3_madd(centre, radius, si.ng);
     Vec3 local = v3(v3_dot(table_v3(scene, at + 4), si.ng), v3_dot(table_v3(scene, at + 7), si.ng),
