@@ -1,6 +1,9 @@
 // envmap.h: radiance by direction from a picture in latitude and longitude. Sampled from the luminance of its cells, and within
-// a cell from the bilinear interpolation of its corners' luminance, as it is read: suns are single texels. The table is the
-// inverse pose, the luminance that every direction has in addition, then that distribution (distribution.h).
+// a cell from the bilinear interpolation of its corners' luminance, as it is read: suns are single texels. So the density at
+// a point is the interpolated luminance there times the sine of the row's latitude, and is found without the table of cells
+// (the rounding of whose sums to 2^-24 it leaves out).
+// The table is the inverse pose, the luminance that every direction has in addition, the factor of the density, the sines of
+// the rows' latitudes, then the distribution of cells (distribution.h).
 #pragma once
 
 #include "emitter/distribution.h"
@@ -12,7 +15,7 @@
     P(SKY, to_world, 0, -INFINITY, INFINITY, "from the image's space", "")
 EMITTER_SLOTS(Envmap, ENVMAP_PARAMS)
 
-enum { ENVMAP_FLOOR = 12, ENVMAP_DISTRIBUTION = 13 };
+enum { ENVMAP_FLOOR = 12, ENVMAP_SCALE = 13, ENVMAP_SINES = 14 };
 
 // ---- host --------------------------------------------------------------------------------------------------------
 
@@ -60,7 +63,8 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
     const TextureNode *t = view->textures + e->slot[SLOT(Envmap, data)];
     const float *texels = view->theta + t->theta;
     int64_t width = t->width, rows = t->height - 1;
-    float *row_cdf = view->tables + e->table + ENVMAP_DISTRIBUTION, *cells = row_cdf + rows;
+    float *table_sines = view->tables + e->table + ENVMAP_SINES, *row_cdf = table_sines + rows;
+    float *cells = grid_cells(row_cdf, (int32_t)width, (int32_t)rows);
     double sines = 0, row_sum = 0;
     for (int64_t i = 0; i < rows * width; i++) {
         cells[i] = (float)envmap_luminance(texels + 3 * i);
@@ -68,10 +72,12 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
     double total = envmap_cell_masses(texels + 3 * rows * width, width, rows, cells);
     for (int64_t y = 0; y < rows; y++) {
         sines += envmap_row_sine(y, rows) * (double)width;
+        table_sines[y] = (float)envmap_row_sine(y, rows);
     }
     double floor = total > 0 ? uniform_share * total / sines : 1;
     double all = total > 0 ? total * (1 + uniform_share) : sines;
     view->tables[e->table + ENVMAP_FLOOR] = (float)floor;
+    view->tables[e->table + ENVMAP_SCALE] = (float)((double)(rows * width) / all);
     for (int64_t y = 0; y < rows; y++) {
         float *row = cells + y * width;
         double mass = 0, sum = 0;
@@ -85,12 +91,12 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
         row_sum += mass * envmap_row_sine(y, rows);
         row_cdf[y] = y + 1 == rows ? 1 : (float)(row_sum / all);
     }
+    grid_finish(row_cdf, (int32_t)width, (int32_t)rows);
 }
 
-// Inverse pose, floor, row masses, masses within rows.
 static inline int64_t envmap_size(const TextureNode *textures, const EmitterRecord *e) {
     const TextureNode *t = textures + e->slot[SLOT(Envmap, data)];
-    return ENVMAP_DISTRIBUTION + (int64_t)(t->height - 1) * (t->width + 1);
+    return ENVMAP_SINES + t->height - 1 + grid_size(t->width, t->height - 1);
 }
 
 static inline bool envmap_follow(const SceneView *view, const EmitterRecord *e) {
@@ -193,26 +199,26 @@ KFN void envmap_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec3 
     move->d = v3_add(move->d, light_direction_to_local_adj(scene, l, SLOT(Envmap, to_world), y, dy, sink, m));
 }
 
-// Luminance at the corners of a cell, as sampling counts it.
+// A cell as sampling counts it: luminance at its corners, and what makes that a density per unit square.
 typedef struct EnvmapCell {
     Float corner[4];
-    Float mean;
+    Float scale;
 } EnvmapCell;
 
-KFN EnvmapCell envmap_cell(const SceneView *scene, const EmitterRecord *e, const Footprint *f) {
+KFN EnvmapCell envmap_cell(const SceneView *scene, const EmitterRecord *e, const Footprint *f, Int row) {
     const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
     const real floor = (real)scene->tables[e->table + ENVMAP_FLOOR];
     EnvmapCell cell;
     for (int k = 0; k < 4; k++) {
         cell.corner[k] = f_max(luminance(bitmap_texel(scene, t, f->at[k])), f_set(0)) + floor;
     }
-    cell.mean = 0.25f * (cell.corner[0] + cell.corner[1] + cell.corner[2] + cell.corner[3]);
+    cell.scale = table_at(scene, row + (e->table + ENVMAP_SINES)) * (real)scene->tables[e->table + ENVMAP_SCALE];
     return cell;
 }
 
-// Density within the cell at (x, y), relative to a uniform one.
+// Density per unit square at (x, y) in the cell.
 KFN Float envmap_cell_density(const EnvmapCell *c, Float x, Float y) {
-    return f_lerp(f_lerp(c->corner[0], c->corner[1], x), f_lerp(c->corner[2], c->corner[3], x), y) * f_safe_rcp(c->mean);
+    return f_lerp(f_lerp(c->corner[0], c->corner[1], x), f_lerp(c->corner[2], c->corner[3], x), y) * c->scale;
 }
 
 // Sample of the density that goes from a at 0 to b at 1 linearly.
@@ -220,26 +226,29 @@ KFN Float envmap_sample_linear(Float a, Float b, Float u) {
     return f_min(u * (a + b) * f_safe_rcp(a + f_safe_sqrt(f_lerp(a * a, b * b, u))), f_set(1));
 }
 
-// Moves a uniform sample of the cell at uv to one of its density, which multiplies *density.
-KFN Vec2 envmap_within_cell(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Float *density) {
-    const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
-    Footprint f = envmap_footprint(t, uv);
-    EnvmapCell c = envmap_cell(scene, e, &f);
-    Float y = envmap_sample_linear(c.corner[0] + c.corner[1], c.corner[2] + c.corner[3], f.fy);
-    Float x = envmap_sample_linear(f_lerp(c.corner[0], c.corner[2], y), f_lerp(c.corner[1], c.corner[3], y), f.fx);
-    *density = *density * envmap_cell_density(&c, x, y);
-    return (Vec2){uv.x + (x - f.fx) * (1 / (real)t->width), uv.y + (y - f.fy) * (1 / (real)(t->height - 1))};
+// The footprint of cell (column, row): column i is the span between the texel centres i and i + 1.
+KFN Footprint envmap_cell_footprint(const TextureNode *t, Int column, Int row) {
+    Footprint f = {.fx = f_set(0), .fy = f_set(0)};
+    Int left = row * t->width + column, right = i_select(mi_lt(column, i_set(t->width - 1)), left + 1, row * t->width);
+    f.at[0] = left;
+    f.at[1] = right;
+    f.at[2] = left + t->width;
+    f.at[3] = right + t->width;
+    return f;
 }
 
 KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {
     UNUSED(ref);
     const TextureNode *t = scene->textures + l->e->slot[SLOT(Envmap, data)];
     LightSample s;
-    Float density;
-    s.uv = grid_sample(scene, l->e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, u, &density);
-    // Cell column i covers [i + 1/2, i + 3/2] of the image, the span between two texel centres.
-    s.uv.x = s.uv.x + 0.5f / (real)t->width;
-    s.uv = envmap_within_cell(scene, l->e, s.uv, &density);
+    GridCell at = grid_sample(scene, l->e->table + ENVMAP_SINES + t->height - 1, t->width, t->height - 1, u);
+    Footprint f = envmap_cell_footprint(t, at.column, at.row);
+    EnvmapCell c = envmap_cell(scene, l->e, &f, at.row);
+    Float y = envmap_sample_linear(c.corner[0] + c.corner[1], c.corner[2] + c.corner[3], at.fy);
+    Float x = envmap_sample_linear(f_lerp(c.corner[0], c.corner[2], y), f_lerp(c.corner[1], c.corner[3], y), at.fx);
+    Float density = envmap_cell_density(&c, x, y);
+    s.uv.x = (f_from_i(at.column) + x + 0.5f) * (1.0f / (real)t->width);
+    s.uv.y = (f_from_i(at.row) + y) * (1.0f / (real)(t->height - 1));
     s.uv.x = s.uv.x - f_floor(s.uv.x);
     Float sin_theta, cos_theta, sin_phi, cos_phi;
     f_sincos(s.uv.y * PI, &sin_theta, &cos_theta);
@@ -267,10 +276,8 @@ KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec
     Vec3 y = light_direction_to_local(scene, &l, d);
     Float ring2 = y.x * y.x + y.z * y.z;
     Footprint f = envmap_footprint(t, uv);
-    EnvmapCell cell = envmap_cell(scene, e, &f);
-    uv.x = uv.x - 0.5f / (real)t->width;
-    uv.x = uv.x - f_floor(uv.x);
-    return grid_pdf(scene, e->table + ENVMAP_DISTRIBUTION, t->width, t->height - 1, uv) *
-           envmap_cell_density(&cell, f.fx, f.fy) * envmap_shrinking(scene, e) *
+    Int row = i_max(i_min(i_from_f(uv.y * (real)(t->height - 1)), i_set(t->height - 2)), i_set(0));
+    EnvmapCell cell = envmap_cell(scene, e, &f, row);
+    return envmap_cell_density(&cell, f.fx, f.fy) * envmap_shrinking(scene, e) *
            f_safe_rcp(2.0f * PI * PI * f_sqrt(ring2) * (ring2 + y.y * y.y));
 }

@@ -172,7 +172,9 @@ static int32_t add_sky_pose(KindCase *c, Random *r, const double rotation[9]) {
 }
 
 static int32_t add_image(KindCase *c, Random *r, int owner) {
-    int width = 3 + below(r, 6), height = 2 + below(r, 5), id = c->texture_count++;
+    // Some rows have several blocks of the distribution, and a part of one.
+    bool wide = below(r, 6) == 0;
+    int width = wide ? 17 + below(r, 30) : 3 + below(r, 6), height = 2 + below(r, wide ? 2 : 5), id = c->texture_count++;
     c->textures[id] = (TextureNode){.kind = TEXTURE_BITMAP, .width = width, .height = height, .channels = 3,
                                     .filter = FILTER_BILINEAR, .to_uv = -1};
     c->textures[id].theta = case_values(c, r, &radiance, 3 * width * height, owner);
