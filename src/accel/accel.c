@@ -228,6 +228,30 @@ static rey_result set_surface(rey_scene *scene, int32_t id, RTCGeometry geometry
 
 static bool is_seen(const ShapeRecord *shape) { return !(shape->flags & SHAPE_UNSEEN); }
 
+static bool stands_alone(const ShapeRecord *shape) {
+    return shape->kind == SHAPE_SPHERE && shape->collection < 0 && is_seen(shape);
+}
+
+// Kernels meet the scene's own spheres themselves where these are few.
+static void find_own_spheres(SceneView *view) {
+    view->own_spheres_count = 0;
+    for (int32_t i = 0; i < view->shapes_count; i++) {
+        if (!stands_alone(view->shapes + i)) {
+            continue;
+        }
+        if (view->own_spheres_count == MOST_OWN_SPHERES) {
+            view->own_spheres_count = 0;
+            return;
+        }
+        view->own_spheres[view->own_spheres_count++] = i;
+    }
+}
+
+// Shapes that Embree knows.
+static bool is_embrees(const SceneView *view, const ShapeRecord *shape) {
+    return is_seen(shape) && !(view->own_spheres_count && stands_alone(shape));
+}
+
 static rey_result add_shape(rey_scene *scene, int32_t id) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
@@ -248,6 +272,15 @@ static void set_bounds(rey_scene *scene) {
     SceneView *view = &scene->view;
     struct RTCBounds b = {0};
     rtcGetSceneBounds(view->embree, &b);
+    for (int32_t i = 0; i < view->own_spheres_count; i++) {
+        const float *s = view->tables + view->shapes[view->own_spheres[i]].table;
+        b.lower_x = fminf(b.lower_x, s[0] - s[3]);
+        b.lower_y = fminf(b.lower_y, s[1] - s[3]);
+        b.lower_z = fminf(b.lower_z, s[2] - s[3]);
+        b.upper_x = fmaxf(b.upper_x, s[0] + s[3]);
+        b.upper_y = fmaxf(b.upper_y, s[1] + s[3]);
+        b.upper_z = fmaxf(b.upper_z, s[2] + s[3]);
+    }
     if (view->shapes_count == 0 || !(b.lower_x <= b.upper_x)) {
         b = (struct RTCBounds){-1, -1, -1, 0, 1, 1, 1, 0};
     }
@@ -275,6 +308,7 @@ static rey_result accel_create(rey_scene *scene) {
     if (!scene->view.embree) {
         return check_device(scene);
     }
+    find_own_spheres(&scene->view);
     // One structure over all boxes is better than a fast one where there are many instances.
     rtcSetSceneBuildQuality(scene->view.embree,
                             scene->view.instances_count ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
@@ -321,7 +355,8 @@ static rey_result update_shapes(rey_scene *scene, bool fresh, bool *groups_chang
     rey_result result = REY_OK;
     for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
         const ShapeRecord *shape = scene->view.shapes + i;
-        if (!is_seen(shape)) {
+        if (!is_embrees(&scene->view, shape)) {
+            *changed |= scene->dirty_shapes[i];
             continue;
         }
         if (fresh) {

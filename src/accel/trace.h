@@ -2,8 +2,7 @@
 // asserts on non-finite input, and non-finite rays are dropped before they get there.
 #pragma once
 
-#include "scene/ray.h"
-#include "shape/shape.h"
+#include "accel/spheres.h"
 
 #include <embree3/rtcore.h>
 
@@ -46,8 +45,13 @@ KFN Mask packet_set(RayPacket *packet, const Ray *ray, Mask m) {
 }
 
 // Closest hits. Lanes without one have shape -1.
-KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coherent) {
+KFN Hit trace_closest(const SceneView *scene, const Ray *given, Mask m, bool coherent) {
     RayHitPacket ALIGNED(64) packet;
+    Ray range = *given, *ray = &range;
+    Int sphere = i_set(-1);
+    if (scene->own_spheres_count) {
+        range.tmax = spheres_meet(scene, given, m, &sphere);
+    }
     m = packet_set(&packet.ray, ray, m);
     i_store(PACKET_I(packet.hit.geomID), i_set(-1));
     i_store(PACKET_I(packet.hit.instID[0]), i_set(-1));
@@ -68,8 +72,9 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
 #endif
 #endif
     Hit hit;
-    hit.shape = i_select(m, i_load(PACKET_I(packet.hit.geomID)), i_set(-1));
-    Mask found = mi_lt(i_set(-1), hit.shape);
+    Int shape = i_select(m, i_load(PACKET_I(packet.hit.geomID)), i_set(-1));
+    Mask found = mi_lt(i_set(-1), shape);
+    hit.shape = i_select(m & ~found, sphere, shape);
     hit.prim = i_select(found, i_load(PACKET_I(packet.hit.primID)), i_set(0));
     hit.u = f_zero_unless(found, f_load(PACKET_F(packet.hit.u)));
     hit.v = f_zero_unless(found, f_load(PACKET_F(packet.hit.v)));
@@ -80,6 +85,7 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
         Mask inside = found & mi_lt(i_set(-1), number);
         hit.instance = i_select(inside, number - (int32_t)scene->shapes_count, i_set(0));
     }
+    found = mi_lt(i_set(-1), hit.shape);
     hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
     return hit;
 }
@@ -88,6 +94,9 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
 // media will attenuate segment by segment.
 KFN Spec trace_transmittance(const SceneView *scene, const Ray *ray, Mask m) {
     RayPacket ALIGNED(64) packet;
+    if (scene->own_spheres_count) {
+        m = m & ~spheres_block(scene, ray, m);
+    }
     m = packet_set(&packet, ray, m);
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);

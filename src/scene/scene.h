@@ -194,6 +194,8 @@ typedef struct Group {
     int32_t interior, exterior;
 } Group;
 
+enum { MOST_OWN_SPHERES = 32 };
+
 // What a kernel sees: the arrays, and uniform facts.
 typedef struct SceneView {
 #define ARRAY(type, name, comment) type *name;
@@ -215,6 +217,8 @@ typedef struct SceneView {
     bool colour_is_depth, moments; // integrators `depth` and `moment`
     float bounds_centre[3], bounds_half[3], bounds_radius;
     void *embree;             // RTCScene
+    // Spheres that stand in the scene by themselves and that kernels meet instead of Embree: all of them, or none.
+    int32_t own_spheres[MOST_OWN_SPHERES], own_spheres_count;
     int32_t collections;      // number of shapegroups
     bool uniform_emitters;    // every emitter is chosen with the same probability
     int32_t emitter_cdf;      // tables offset of cumulative emitter weights
