@@ -62,7 +62,7 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
 }
 
 static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, const FilterTable *filter, Sink *sink,
-                        int32_t *kept, int32_t *begin) {
+                        Segments *q, int32_t *kept, int32_t *begin) {
     const int32_t most = t->ws.chunk / 2;
     for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
         int64_t left = b->count - at;
@@ -70,9 +70,10 @@ static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole,
         int32_t found = primary_find(t, b, pinhole, b->first + at, count, kept, 0);
         half = (found + LANES - 1) / LANES * LANES;
         primary_start(t, b, pinhole, b->first + at, kept, found, half);
-        primary_look(t, b, pinhole, found, half);
+        primary_look(t, b, pinhole, q, found, half);
         path_forward(t, begin);
         t->placed = false;
+        t->nudge[0] = NULL;
         pairs_adjoint(t, b, filter, found);
         primary_finish(t, b, pinhole, sink, found, half);
         pairs_splat(t, b, found);
@@ -97,7 +98,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Sink sink = sink_of(&b->job);
     in.pinhole = &pinhole;
     in.filter = &filter;
-    in.glimpses = in.upstream && b->mirrored;
+    in.glimpses = (in.upstream || b->kind == BOUNDARY_LINES) && b->mirrored;
     in.sink = &sink;
     double unused = 0;
     PathJob still = b->job;
@@ -109,7 +110,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     if (b->kind == BOUNDARY_MIRRORED) {
         run_mirrored(&t, b, &filter, &sink, &in.q, kept, begin);
     } else if (b->kind == BOUNDARY_PRIMARY) {
-        run_primary(&t, b, &pinhole, &filter, &sink, kept, begin);
+        run_primary(&t, b, &pinhole, &filter, &sink, &in.q, kept, begin);
     } else {
         run_indirect(&in, &sink, begin);
     }

@@ -148,6 +148,10 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
     const SceneView *scene = t->scene;
     Vertex v = vertex_load(t, order, count, bounce);
     Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &v.hit);
+    if (t->nudge[0] && bounce == t->first_bounce) {
+        si.uv.x = si.uv.x + real_gather(t->nudge[0], v.slot);
+        si.uv.y = si.uv.y + real_gather(t->nudge[1], v.slot);
+    }
     Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
     Float mis = f_set(0);
     Spec emission = spec_zero();

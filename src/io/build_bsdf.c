@@ -135,8 +135,8 @@ static rey_result height_slot(Builder *b, rey_xml_node *node, const ParamDesc *p
     Param *param;
     for (int i = 0; (param = build_param_of(b, *out, i)); i++) {
         if (param->to_uv == *out) {
-            param->terms |= REY_TERM_PRIMARY;
-            param->why = "the slope of the heights jumps where uv moves from texel to texel";
+            param->terms |= REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+            param->why = "the lines along which the slope of the heights jumps, from texel to texel, move over their surfaces";
         }
     }
     return REY_OK;

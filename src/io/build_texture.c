@@ -89,7 +89,7 @@ rey_result build_number(Builder *b, float value, int32_t *out) {
 }
 
 static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path, int32_t texture, bool smooth) {
-    static const char *const why = "nearest texels and clamped borders jump where uv moves across them";
+    static const char *const why = "the lines along which nearest texels and checks jump move over their surfaces";
     double m[6];
     if (!rey_xml_has(node, "to_uv")) {
         return REY_OK;
@@ -101,7 +101,7 @@ static rey_result bitmap_to_uv(Builder *b, rey_xml_node *node, const char *path,
     Param p = {PARAM_DEFAULTS, .theta = at, .count = 9, .dims = 2, .shape = {3, 3}, .to_uv = texture,
                .description = "texture coordinates to the texture's own", .terms = REY_TERM_INTERIOR};
     if (!smooth) {
-        p.terms |= REY_TERM_PRIMARY;
+        p.terms |= REY_TERM_PRIMARY | REY_TERM_INDIRECT;
         p.why = why;
     }
     if (at < 0 || build_texture_param(b, name, p) < 0) {
@@ -187,7 +187,7 @@ static rey_result build_bitmap(Builder *b, rey_xml_node *node, TextureUse use, c
         p.shape[1] = image.width;
         p.shape[2] = image.channels;
         int param = build_texture_param(b, name, p);
-        result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR && wrap != WRAP_CLAMP);
+        result = param < 0 ? REY_ERROR_MEMORY : bitmap_to_uv(b, node, path, *out, filter == FILTER_BILINEAR);
     }
     load_free(b->ctx, &file);
     return result == REY_OK ? build_note_source(b, node, NULL, *out) : result;

@@ -208,10 +208,12 @@ static void name_further_terms(Builder *b) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
         p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
         p->terms |= p->normals >= 0 ? moving & REY_TERM_TERMINATOR : 0;
+        p->terms |= p->to_uv >= 0 && (p->terms & REY_TERM_PRIMARY) ? moving & REY_TERM_SPECULAR : 0; // lines of textures
         p->terms |= p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) ? moving & REY_TERM_SPECULAR : 0; // its shadows
+        int32_t texture = p->texture >= 0 ? p->texture : p->to_uv;
         bool mirror = p->normals >= 0
                           ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
-                          : (p->terms & REY_TERM_TERMINATOR) && p->texture >= 0 && texture_turns_mirror(scene, p->texture);
+                          : (p->terms & REY_TERM_TERMINATOR) && texture >= 0 && texture_turns_mirror(scene, texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
         p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them
         p->terms = moves_border(scene, p) ? REY_TERM_INTERIOR : p->terms;

@@ -105,6 +105,21 @@ static rey_result check_meetings(rey_scene *scene) {
     return result;
 }
 
+// Whether lines of textures that a selection moves over their surfaces are known.
+static rey_result check_lines(const Render *r, int term) {
+    int32_t bsdf, emitter, shape;
+    char name[OBJECT_NAME] = "";
+    const char *unknown = rey_lines_unknown(&r->scene->view, r->job.to_uv_at, &bsdf, &emitter, &shape);
+    if (bsdf >= 0) {
+        rey_name_bsdf(r->scene, bsdf, name);
+    } else if (emitter >= 0) {
+        rey_name_emitter(r->scene, emitter, name);
+    } else if (shape >= 0) {
+        rey_name_shape(r->scene, shape, name);
+    }
+    return unknown ? refuse(r->scene, term, unknown, name) : REY_OK;
+}
+
 // Whether a term of a selection can be computed; records why not.
 static rey_result boundary_check(const Render *r, int term) {
     rey_scene *scene = r->scene;
@@ -113,6 +128,10 @@ static rey_result boundary_check(const Render *r, int term) {
     char name[OBJECT_NAME];
     if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic", NULL);
+    }
+    rey_result result = r->lines ? check_lines(r, term) : REY_OK;
+    if (result != REY_OK || !(r->job.any_motion || r->job.any_places)) {
+        return result;
     }
     int32_t jumps;
     const char *unknown = rey_texture_unknown_step(view, term, &jumps);
@@ -170,12 +189,26 @@ static rey_result reserve_workspaces(Render *r) {
 static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
-                                                  [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1};
+                                                  [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
+                                                  [BOUNDARY_LINES] = 1};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
     int64_t count = asked ? pixels * asked / (part * r->def.sets) : pixels * r->job.spp / part;
     return count < least ? least : count;
+}
+
+// What is seen along chains of lines on the ends of their surfaces is taken for the surfaces' edges.
+static rey_result check_halves(const Render *r) {
+    for (size_t i = 0; i < r->marks.count; i++) {
+        if (ARRAY_AT(r->marks, MarkRecord, i).half) {
+            return refuse(r->scene, REY_TERM_SPECULAR,
+                          "lines along which textures jump that lie on edges of their surfaces, where to_uv moves them off these. "
+                          "Beside the edges they are known",
+                          NULL);
+        }
+    }
+    return REY_OK;
 }
 
 static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
@@ -184,7 +217,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     rey_film_plan_whole(&plan->film);
     rey_result result = reserve_workspaces(r);
     if (result == REY_OK && kind == BOUNDARY_MIRRORED) { // it looks for edges where they are seen
-        result = rey_texture_step_records(r->scene, &plan->steps, &plan->step_at);
+        result = rey_texture_step_records(r->scene, r->job.to_uv_at, &plan->steps, &plan->step_at);
+        result = result == REY_OK ? check_halves(r) : result;
     } else if (result == REY_OK) {
         result = rey_boundary_edges(r, kind, plan);
     }
@@ -195,13 +229,13 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     // In media only silhouettes are known, and what else there is does not depend on lights.
     int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
     if (kind == BOUNDARY_MIRRORED) {
-        edge_count = r->job.any_motion && rey_chains_known(&r->scene->view, r->plan.sensor);
+        edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
     }
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
-                              .edge_count = edge_count, .round = plan->job.round, .none = r->none, .everywhere = r->turns_rays,
+                              .edge_count = edge_count, .round = plan->job.round, .none = r->none, .everywhere = r->turns_rays || r->lines, .lines = r->lines,
                               .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
@@ -229,7 +263,8 @@ bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
 }
 
 rey_result rey_boundaries_begin(Render *r) {
-    bool moves = r->job.any_motion || r->job.any_places;
+    r->lines = rey_lines_selected(&r->scene->view, r->job.to_uv_at);
+    bool moves = r->job.any_motion || r->job.any_places || r->lines;
     rey_result result = REY_OK;
     if (!moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor)) {
         r->terms &= REY_TERM_INTERIOR; // paths look out instead
@@ -272,7 +307,8 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
 
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture) {
     // The interior's paths have found out whether the sensor sees mirrors and glass.
-    plan->job.mirrored = plan->job.chains && !r->particles && (!(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED));
+    bool may = !(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED) || r->lines;
+    plan->job.mirrored = plan->job.chains && !r->particles && may;
     if (plan->job.edge_count == 0 || (plan->job.kind == BOUNDARY_MIRRORED && !plan->job.mirrored)) {
         return;
     }

@@ -259,6 +259,11 @@ static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     return r->job.any_camera || shape_moves_itself(r, id, instance);
 }
 
+// Whether it moves the line of a texture over its surface.
+static bool line_moves(const Render *r, const EdgeRecord *e) {
+    return e->kind == EDGE_MARK && ARRAY_AT(r->marks, MarkRecord, e->corner).at >= 0;
+}
+
 // Whether it moves what an edge looks like. Meetings were looked for where something moves.
 static bool edge_moves(const Render *r, const EdgeRecord *e) {
     return e->kind == EDGE_MEETING || moves_on_film(r, e->shape, e->instance) ||
@@ -378,7 +383,13 @@ static Weigher weigher_of(const Render *r, int32_t kind) {
 // May cut the edge to what the film sees.
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
-    double factor = edge_moves(r, e) ? 1 : w->still;
+    if (w->kind == BOUNDARY_LINES) {
+        return line_moves(r, e) ? mark_weight(r, e) : 0;
+    }
+    if (w->kind != BOUNDARY_PRIMARY && e->kind == EDGE_MARK && ARRAY_AT(r->marks, MarkRecord, e->corner).half) {
+        return 0;
+    }
+    double factor = edge_moves(r, e) || (w->kind == BOUNDARY_PRIMARY && line_moves(r, e)) ? 1 : w->still;
     bool hides = !view->has_media || !rey_bsdf_passes(view->bsdfs[view->shapes[e->shape].bsdf].kind);
     if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
@@ -433,7 +444,7 @@ static bool seen_moving(const void *render, int32_t id, int32_t instance) {
 
 static rey_result find_edges(Render *r) {
     Array steps = {0};
-    rey_result result = rey_texture_steps(r->scene, &steps);
+    rey_result result = rey_texture_steps(r->scene, r->job.to_uv_at, &steps);
     if (result == REY_OK) {
         result = rey_edges_find(r->scene, &steps, &r->edges, &r->fans);
     }

@@ -6,12 +6,20 @@
 #include "render/boundary.h"
 #include "render/cuts.h"
 #include "render/motion.h"
+#include "render/particles.h"
 #include "scene/sink.h"
 
 #include <stdio.h>
 #include <string.h>
 
 enum { REASON = 3 * OBJECT_NAME };
+
+// What sees lines of textures that move over their surfaces but does not find them, null where nothing does.
+static const char *gap_of_lines(const rey_scene *scene) {
+    return scene->view.has_media           ? "in participating media, what collisions see of them is not known"
+           : rey_traces_particles(scene) ? "light tracing does not find them, the integrator 'path' does"
+                                           : NULL;
+}
 
 // Why a parameter needs a term, and what keeps it from being computed.
 static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int bit, const Param *p, char reason[REASON]) {
@@ -20,6 +28,8 @@ static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int 
         rey_name_obstacle(scene, sensor, obstacle);
         snprintf(reason, REASON, "'%.190s' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and "
                                  "the edges that are seen in or through it are not found because of %s", object, obstacle);
+    } else if (p->to_uv >= 0 && bit != REY_TERM_TERMINATOR && gap_of_lines(scene)) {
+        snprintf(reason, REASON, "%s, and %s", p->why, gap_of_lines(scene));
     } else if (bit == REY_TERM_TERMINATOR) {
         snprintf(reason, REASON, "the picture jumps where the normals of maps turn away from the viewer");
     } else if ((p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) && !rey_motion_known(scene, sensor, p)) {
@@ -39,6 +49,9 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     }
     if (p->normals >= 0) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+    }
+    if (p->to_uv >= 0) {
+        return gap_of_lines(scene) ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
     return (p->emitter >= 0 ? REY_TERM_INTERIOR : still) | REY_TERM_INDIRECT | chains;
 }
@@ -110,7 +123,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     if (p->camera >= 0) {
         return gap_of_cameras(view);
     }
-    if (p->geometry >= 0 || p->instance >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR))) {
+    if (p->geometry >= 0 || p->instance >= 0 || (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR))) {
         return "in scenes with participating media, what moves changes what they let through and scatter, and moves the shadows in "
                "them. Known are volumes, surfaces of the kind 'null', at which media end, and lights";
     }
@@ -209,7 +222,8 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
     }
     const char *gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
     gap = gap ? gap : gap_in_media(view, p);
-    bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (p->emitter < 0 && (p->terms & REY_TERM_SPECULAR));
+    bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
+                  (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));
     bool elsewhere = volumes && points && !rey_moves_border(view, p);
     return gap || !elsewhere ? gap : "surfaces have volumes as textures, which points that move look up elsewhere";
 }

@@ -2,6 +2,7 @@
 #include "render/texture_steps.h"
 
 #include "bsdf/table.h"
+#include "emitter/emitter.h"
 #include "emitter/table.h"
 #include "shape/shape.h"
 
@@ -47,9 +48,78 @@ const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *t
     return NULL;
 }
 
+// Whether a texture, or its slope, jumps along lines that a selection moves: to_uv_at as in rey_texture_steps.
+static bool has_lines(const SceneView *view, const int32_t *to_uv_at, int32_t id, bool slopes) {
+    const TextureNode *t = view->textures + id;
+    return id >= 0 && ((to_uv_at[id] >= 0 && (slopes ? t->kind == TEXTURE_BITMAP : jumps_itself(t))) ||
+                       has_lines(view, to_uv_at, t->child[0], slopes) || has_lines(view, to_uv_at, t->child[1], slopes));
+}
+
+static bool bsdf_has_lines(const SceneView *view, const int32_t *to_uv_at, int32_t id) {
+    const BsdfNode *node = view->bsdfs + id;
+    bool found = false;
+    for (int k = 0; id >= 0 && k < MAX_SLOTS; k++) {
+        found |= has_lines(view, to_uv_at, node->slot[k], rey_bsdf_takes_slope(node->kind, k));
+    }
+    for (int k = 0; id >= 0 && k < MAX_CHILDREN; k++) {
+        found |= bsdf_has_lines(view, to_uv_at, node->child[k]);
+    }
+    return found;
+}
+
+static bool emitter_has_lines(const SceneView *view, const int32_t *to_uv_at, int32_t id) {
+    bool found = false;
+    for (int k = 0; id >= 0 && k < rey_emitter_kinds[view->emitters[id].kind].param_count; k++) {
+        bool texture = rey_emitter_kinds[view->emitters[id].kind].params[k].type < EMITTER_PARAM_POSITION;
+        found |= texture && has_lines(view, to_uv_at, view->emitters[id].slot[k], false);
+    }
+    return found;
+}
+
+bool rey_lines_selected(const SceneView *view, const int32_t *to_uv_at) {
+    bool found = false;
+    for (int32_t i = 0; i < (int32_t)view->bsdfs_count && !found; i++) {
+        found = bsdf_has_lines(view, to_uv_at, i);
+    }
+    for (int32_t i = 0; i < (int32_t)view->emitters_count && !found; i++) {
+        found = emitter_has_lines(view, to_uv_at, i);
+    }
+    return found;
+}
+
+const char *rey_lines_unknown(const SceneView *view, const int32_t *to_uv_at, int32_t *bsdf, int32_t *emitter, int32_t *shape) {
+    *bsdf = *emitter = *shape = -1;
+    for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
+        for (int k = 0; k < MAX_SLOTS && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
+            if (has_lines(view, to_uv_at, view->bsdfs[i].slot[k], false)) {
+                *bsdf = i;
+                return "the jumps of opacities";
+            }
+        }
+    }
+    for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
+        bool area = view->emitters[i].kind == EMITTER_AREA;
+        if (!area && emitter_has_lines(view, to_uv_at, i)) {
+            *emitter = i;
+            return "the jumps of the textures of lights of other kinds than 'area'";
+        }
+    }
+    for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
+        const ShapeRecord *s = view->shapes + i;
+        bool known = s->kind == SHAPE_MESH || (s->collection < 0 && (s->kind == SHAPE_SPHERE || s->kind == SHAPE_DISK ||
+                                                                     s->kind == SHAPE_CYLINDER));
+        if (!known && (bsdf_has_lines(view, to_uv_at, s->bsdf) || emitter_has_lines(view, to_uv_at, s->emitter))) {
+            *shape = i;
+            return "the lines along which textures jump on curves, grids of distances and round shapes in shapegroups";
+        }
+    }
+    return NULL;
+}
+
 // Which textures of a shape have been met.
 typedef struct Steps {
     rey_scene *scene;
+    const int32_t *to_uv_at;
     Array *steps;
     size_t first;
     int32_t shape;
@@ -61,7 +131,8 @@ static rey_result push_step(Steps *s, TextureStep step) {
     step.shape = s->shape;
     for (size_t i = s->first; i < s->steps->count; i++) {
         const TextureStep *t = &ARRAY_AT(*s->steps, TextureStep, i);
-        if (t->sort == step.sort && t->u == step.u && t->v == step.v && t->offset == step.offset && t->low == step.low &&
+        bool parts = step.sort == STEP_LINES && t->at != step.at;
+        if (!parts && t->sort == step.sort && t->u == step.u && t->v == step.v && t->offset == step.offset && t->low == step.low &&
             t->high == step.high) {
             return REY_OK;
         }
@@ -76,13 +147,15 @@ static rey_result push_step(Steps *s, TextureStep step) {
 
 // Lines x' = level / width and y' = level / height, (x', y') = to_uv (x, y); with `slopes`, half a texel further, where those of
 // bilinear filtering jump. Behind the border of a picture that is clamped nothing jumps.
-static rey_result push_grid(Steps *s, const TextureNode *t, int32_t width, int32_t height, bool clamped, bool slopes) {
+static rey_result push_grid(Steps *s, int32_t id, int32_t width, int32_t height, bool clamped, bool slopes) {
     static const float identity[6] = {1, 0, 0, 0, 1, 0};
+    const TextureNode *t = s->scene->view.textures + id;
     const float *m = t->to_uv >= 0 ? s->scene->view.theta + t->to_uv : identity;
+    int32_t first = s->to_uv_at[id];
     rey_result result = REY_OK;
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         double n = k ? height : width;
-        result = push_step(s, (TextureStep){.sort = STEP_LINES, .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
+        result = push_step(s, (TextureStep){.sort = STEP_LINES, .at = first < 0 ? -1 : first + 3 * k, .scale = n, .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
                                             .offset = n * (double)m[3 * k + 2] - (slopes ? 0.5 : 0),
                                             .low = !clamped ? -INFINITY : slopes ? 0 : 1,
                                             .high = clamped ? n - 1 : INFINITY});
@@ -99,11 +172,11 @@ static rey_result add_texture(Steps *s, int32_t id, bool slopes) {
     rey_result result = REY_OK;
     s->varies |= t->kind == TEXTURE_BITMAP || t->kind == TEXTURE_CHECKERBOARD;
     if (t->kind == TEXTURE_CHECKERBOARD) {
-        result = push_grid(s, t, 2, 2, false, false);
+        result = push_grid(s, id, 2, 2, false, false);
     } else if (t->kind == TEXTURE_BITMAP && (t->filter == FILTER_NEAREST) != slopes) { // those of nearest texels are 0
-        result = push_grid(s, t, t->width, t->height, t->wrap == WRAP_CLAMP, slopes);
+        result = push_grid(s, id, t->width, t->height, t->wrap == WRAP_CLAMP, slopes);
     } else if (t->kind == TEXTURE_ATTRIBUTE && t->per_face) {
-        result = push_step(s, (TextureStep){.sort = STEP_FACES});
+        result = push_step(s, (TextureStep){.sort = STEP_FACES, .at = -1});
     }
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         result = add_texture(s, t->child[k], slopes);
@@ -134,29 +207,29 @@ static rey_result add_emitter(Steps *s, int32_t id) {
     return result;
 }
 
-rey_result rey_texture_steps(rey_scene *scene, Array *steps) {
+rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *steps) {
     rey_result result = REY_OK;
     for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
         const ShapeRecord *shape = scene->view.shapes + i;
-        Steps s = {.scene = scene, .steps = steps, .first = steps->count, .shape = i};
+        Steps s = {.scene = scene, .to_uv_at = to_uv_at, .steps = steps, .first = steps->count, .shape = i};
         if (shape->flags & SHAPE_UNSEEN) {
             continue;
         }
         result = add_bsdf(&s, shape->bsdf);
         result = result == REY_OK ? add_emitter(&s, shape->emitter) : result;
         if (result == REY_OK && s.varies) {
-            result = push_step(&s, (TextureStep){.sort = STEP_SEAMS});
+            result = push_step(&s, (TextureStep){.sort = STEP_SEAMS, .at = -1});
         }
         if (result == REY_OK && s.oriented) {
-            result = push_step(&s, (TextureStep){.sort = STEP_TANGENTS});
+            result = push_step(&s, (TextureStep){.sort = STEP_TANGENTS, .at = -1});
         }
     }
     return result;
 }
 
-rey_result rey_texture_step_records(rey_scene *scene, Array *records, Array *step_at) {
+rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at) {
     Array steps = {0};
-    rey_result result = rey_texture_steps(scene, &steps);
+    rey_result result = rey_texture_steps(scene, to_uv_at, &steps);
     size_t count = (size_t)scene->view.shapes_count, k = 0;
     if (result == REY_OK && steps.count > 0) {
         StepRecord *to = rey_array_push(scene->ctx, records, sizeof *to, steps.count);
@@ -165,7 +238,8 @@ rey_result rey_texture_step_records(rey_scene *scene, Array *records, Array *ste
             at[i] = (int32_t)k;
             for (; k < steps.count && ARRAY_AT(steps, TextureStep, k).shape == (int32_t)i; k++) {
                 const TextureStep *s = &ARRAY_AT(steps, TextureStep, k);
-                to[k] = (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high, s->sort};
+                to[k] = (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high, (float)s->scale,
+                                     s->sort, s->at};
             }
         }
         result = at ? REY_OK : REY_ERROR_MEMORY;

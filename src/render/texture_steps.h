@@ -3,11 +3,17 @@
 
 #include "shape/marks.h"
 
-// Appends the steps of all surfaces' textures to `steps`, an Array of TextureStep, by shape.
-rey_result rey_texture_steps(rey_scene *scene, Array *steps);
+// Appends the steps of all surfaces' textures to `steps`, an Array of TextureStep, by shape. to_uv_at: of every texture, where its
+// to_uv begins in the selection, -1 = it is not selected.
+rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *steps);
 // The same for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the end. Both
 // stay empty where nothing jumps.
-rey_result rey_texture_step_records(rey_scene *scene, Array *records, Array *step_at);
+rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at);
+// Whether a selection moves lines along which textures jump, by their to_uv.
+bool rey_lines_selected(const SceneView *view, const int32_t *to_uv_at);
+// Where it does in a way that is not known, and the object: of one sort, -1 = none;
+// NULL if nowhere.
+const char *rey_lines_unknown(const SceneView *view, const int32_t *to_uv_at, int32_t *bsdf, int32_t *emitter, int32_t *shape);
 // What of the scene's textures jumps in a way that a boundary term (REY_TERM_) does not know, and *texture, one that does; NULL
 // if nothing does.
 const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture);

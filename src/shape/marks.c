@@ -1,11 +1,13 @@
 // marks.c: cuts the lines along which textures jump into pieces, one per triangle of a mesh, many per line of a round surface.
 // Each place is part of one piece at most, since a jump must not count twice: lines that two steps share are the first
-// one's, those along a triangle's sides belong to the mesh's edges, and those along the ends of uv to rims and seams.
+// one's, those along a triangle's sides belong to the mesh's edges, and those along the ends of uv to rims and seams. Where to_uv
+// moves them, both triangles have half of them.
 #include "shape/marks.h"
 
 #include "shape/shape.h"
 
 #include <math.h>
+#include <string.h>
 
 // Of the distance between two jumps: lines as near as that to an edge are on it.
 #define NEARLY 1e-4
@@ -28,8 +30,9 @@ bool rey_step_along(const Array *steps, size_t first, const double a[2], const d
     return false;
 }
 
-// Whether an earlier step of the same shape jumps along the line on which step number i is `level`.
-static bool known_before(const Array *steps, size_t first, size_t i, double level) {
+// Whether an earlier step of the same shape jumps along the line on which step number i is `level`. *parts: one of both may leave
+// the other behind.
+static bool known_before(const Array *steps, size_t first, size_t i, double level, bool *parts) {
     const TextureStep *s = &ARRAY_AT(*steps, TextureStep, i);
     double size = hypot(s->u, s->v);
     for (size_t k = first; k < i; k++) {
@@ -41,6 +44,7 @@ static bool known_before(const Array *steps, size_t first, size_t i, double leve
         double ratio = (t->u * s->u + t->v * s->v) / (size * size), at = t->offset + ratio * (level - s->offset);
         double whole = nearbyint(at);
         if (fabs(at - whole) < NEARLY && in_range(t, whole)) {
+            *parts = s->at != t->at;
             return true;
         }
     }
@@ -55,10 +59,22 @@ typedef struct Marking {
     MarkMoves *moves;
     const void *user;
     int32_t shape;
+    bool selected;     // some step of the shape is
     Array *edges, *marks;
 } Marking;
 
-static rey_result push_mark(const Marking *w, int32_t prim, int32_t instance, const double ends[4]) {
+// Whether the line of step number i is one of an earlier step, too.
+static rey_result look_before(const Marking *w, size_t i, double level, bool *known) {
+    bool parts = false;
+    *known = known_before(w->steps, w->first, i, level, &parts);
+    return !parts ? REY_OK
+                  : rey_fail(w->scene->ctx, REY_ERROR_INCOMPLETE,
+                             "two textures of one surface (shape number %d) jump along the same line, and where to_uv moves one of "
+                             "them alone the picture has no derivative. --terms interior gives the part without", (int)w->shape);
+}
+
+static rey_result push_mark(const Marking *w, const TextureStep *s, bool half, int32_t prim, int32_t instance,
+                            const double ends[4]) {
     rey_context *ctx = w->scene->ctx;
     if (w->marks->count >= MOST_MARKS) {
         return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "textures jump along more than 2^22 pieces of lines");
@@ -74,20 +90,27 @@ static rey_result push_mark(const Marking *w, int32_t prim, int32_t instance, co
     for (int k = 0; k < 4; k++) {
         m->ends[k] = (float)ends[k];
     }
+    m->u = (float)s->u;
+    m->v = (float)s->v;
+    m->scale = (float)(half ? 0.5 * s->scale : s->scale);
+    m->at = s->at;
+    m->half = half;
     return REY_OK;
 }
 
-// A piece on the shape itself, or on all its instances that move.
-static rey_result push_piece(const Marking *w, int32_t prim, const double ends[4]) {
+// A piece on the shape itself, or on all its instances, where they or the step's lines move.
+static rey_result push_piece(const Marking *w, size_t i, bool half, int32_t prim, const double ends[4]) {
     const SceneView *view = &w->scene->view;
+    const TextureStep *s = &ARRAY_AT(*w->steps, TextureStep, i);
     int32_t group = view->shapes[w->shape].collection;
     if (group < 0) {
-        return push_mark(w, prim, 0, ends);
+        bool moves = s->at >= 0 || w->moves(w->user, w->shape, 0);
+        return moves ? push_mark(w, s, half, prim, 0, ends) : REY_OK;
     }
     rey_result result = REY_OK;
-    for (int32_t i = 0; i < view->instances_count && result == REY_OK; i++) {
-        if (view->instances[i].group == group && w->moves(w->user, w->shape, i)) {
-            result = push_mark(w, prim, i, ends);
+    for (int32_t k = 0; k < view->instances_count && result == REY_OK; k++) {
+        if (view->instances[k].group == group && (s->at >= 0 || w->moves(w->user, w->shape, k))) {
+            result = push_mark(w, s, half, prim, k, ends);
         }
     }
     return result;
@@ -120,6 +143,18 @@ static bool cross_triangle(const double f[3], double level, double ends[4]) {
     return count == 2 && on < 2;
 }
 
+// Where a selected step is `level` along sides of a triangle: their ends with the triangle on the left.
+static rey_result mark_sides(const Marking *w, size_t i, int32_t prim, const double f[3], double level) {
+    static const double corners[4][2] = {{0, 0}, {1, 0}, {0, 1}, {0, 0}};
+    rey_result result = REY_OK;
+    for (int k = 0; k < 3 && result == REY_OK; k++) {
+        if (fabs(f[k] - level) < NEARLY && fabs(f[(k + 1) % 3] - level) < NEARLY) {
+            result = push_piece(w, i, true, prim, (double[4]){corners[k][0], corners[k][1], corners[k + 1][0], corners[k + 1][1]});
+        }
+    }
+    return result;
+}
+
 static rey_result mark_triangle(const Marking *w, size_t i, int32_t prim, const double uv[3][2]) {
     const TextureStep *s = &ARRAY_AT(*w->steps, TextureStep, i);
     double f[3], low = INFINITY, high = -INFINITY, ends[4];
@@ -128,15 +163,19 @@ static rey_result mark_triangle(const Marking *w, size_t i, int32_t prim, const 
         low = fmin(low, f[k]);
         high = fmax(high, f[k]);
     }
-    low = fmax(ceil(low), s->low);
-    high = fmin(floor(high), s->high);
+    low = fmax(ceil(low - NEARLY), s->low);
+    high = fmin(floor(high + NEARLY), s->high);
     if (high - low > MOST_MARKS) {
         low = high - MOST_MARKS; // as many as are too many
     }
     rey_result result = REY_OK;
     for (double level = low; level <= high && result == REY_OK; level++) {
-        if (cross_triangle(f, level, ends) && !known_before(w->steps, w->first, i, level)) {
-            result = push_piece(w, prim, ends);
+        bool known;
+        result = look_before(w, i, level, &known);
+        if (result == REY_OK && !known && cross_triangle(f, level, ends)) {
+            result = push_piece(w, i, false, prim, ends);
+        } else if (result == REY_OK && !known && s->at >= 0) {
+            result = mark_sides(w, i, prim, f, level);
         }
     }
     return result;
@@ -158,7 +197,7 @@ static rey_result mark_mesh(const Marking *w, size_t i) {
 
 // ---- round shapes ------------------------------------------------------------------------------------------------
 
-static rey_result mark_line(const Marking *w, const double from[2], const double to[2]) {
+static rey_result mark_line(const Marking *w, size_t number, bool half, const double from[2], const double to[2]) {
     int pieces = (int)ceil(PIECES * hypot(to[0] - from[0], to[1] - from[1]));
     rey_result result = REY_OK;
     for (int i = 0; i < pieces && result == REY_OK; i++) {
@@ -166,19 +205,23 @@ static rey_result mark_line(const Marking *w, const double from[2], const double
         for (int k = 0; k < 4; k++) {
             ends[k] = from[k % 2] + (i + k / 2) / (double)pieces * (to[k % 2] - from[k % 2]);
         }
-        result = push_piece(w, 0, ends);
+        result = push_piece(w, number, half, 0, ends);
     }
     return result;
 }
 
-// Where a step is `level` in the unit square.
-static bool cross_square(const TextureStep *s, double level, double ends[2][2]) {
+// Where a step is `level` in the unit square; *side: whether along that side of it, which the square is on the left of, else -1.
+static bool cross_square(const TextureStep *s, double level, double ends[2][2], int *side) {
     static const double corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
     int count = 0;
+    *side = -1;
     for (int k = 0; k < 4; k++) {
         const double *a = corners[k], *b = corners[(k + 1) % 4];
         double fa = step_at(s, a), fb = step_at(s, b);
         if (fabs(fa - level) < NEARLY && fabs(fb - level) < NEARLY) {
+            memcpy(ends[0], a, sizeof ends[0]);
+            memcpy(ends[1], b, sizeof ends[1]);
+            *side = k;
             return false;
         }
         if ((fa < level) != (fb < level) && count < 2) {
@@ -196,18 +239,31 @@ static rey_result mark_round(const Marking *w, size_t i) {
     if (s->sort == STEP_SEAMS) {
         // Where the angle begins anew: u = 0, and v = 0 on disks.
         bool disk = w->scene->view.shapes[w->shape].kind == SHAPE_DISK;
-        return mark_line(w, (double[2]){0, 0}, (double[2]){disk ? 1 : 0, disk ? 0 : 1});
+        return mark_line(w, i, false, (double[2]){0, 0}, (double[2]){disk ? 1 : 0, disk ? 0 : 1});
     }
     double low = s->offset + fmin(s->u, 0) + fmin(s->v, 0), high = s->offset + fmax(s->u, 0) + fmax(s->v, 0), ends[2][2];
-    low = fmax(ceil(low), s->low);
-    high = fmin(floor(high), s->high);
+    low = fmax(ceil(low - NEARLY), s->low);
+    high = fmin(floor(high + NEARLY), s->high);
     rey_result result = REY_OK;
     for (double level = low; level <= high && result == REY_OK; level++) {
-        if (cross_square(s, level, ends) && !known_before(w->steps, w->first, i, level)) {
-            result = mark_line(w, ends[0], ends[1]);
+        bool known;
+        int side;
+        result = look_before(w, i, level, &known);
+        if (result == REY_OK && !known && cross_square(s, level, ends, &side)) {
+            result = mark_line(w, i, false, ends[0], ends[1]);
+        } else if (result == REY_OK && !known && s->at >= 0 && side >= 0) {
+            result = mark_line(w, i, true, ends[0], ends[1]);
         }
     }
     return result;
+}
+
+static bool any_selected(const Array *steps, size_t first, int32_t shape) {
+    bool selected = false;
+    for (size_t i = first; i < steps->count && ARRAY_AT(*steps, TextureStep, i).shape == shape; i++) {
+        selected |= ARRAY_AT(*steps, TextureStep, i).at >= 0;
+    }
+    return selected;
 }
 
 rey_result rey_marks_find(rey_scene *scene, const Array *steps, MarkMoves *moves, const void *user, Array *edges, Array *marks) {
@@ -219,9 +275,10 @@ rey_result rey_marks_find(rey_scene *scene, const Array *steps, MarkMoves *moves
         if (s->shape != w.shape) {
             w.shape = s->shape;
             w.first = i;
+            w.selected = any_selected(steps, i, s->shape);
         }
         const ShapeRecord *shape = view->shapes + s->shape;
-        if (shape->collection < 0 && !moves(user, s->shape, 0)) {
+        if (shape->collection < 0 && !w.selected && !moves(user, s->shape, 0)) {
             continue;
         }
         if (shape->kind != SHAPE_MESH) {

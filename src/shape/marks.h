@@ -7,20 +7,27 @@
 // `low` to `high`. STEP_FACES: from triangle to triangle. STEP_SEAMS: where uv itself does, between triangles and where
 // round surfaces close. STEP_TANGENTS: where the direction in which u grows does, by which the surface scatters, between triangles.
 enum { STEP_LINES, STEP_FACES, STEP_SEAMS, STEP_TANGENTS };
+// Of STEP_LINES, (u, v, offset) is `scale` times a row of the texture's to_uv, less a constant, and that row begins at number `at`
+// of the selection, -1 = it is not selected.
 typedef struct TextureStep {
-    int32_t shape, sort;
-    double u, v, offset, low, high;
+    int32_t shape, sort, at;
+    double u, v, offset, low, high, scale;
 } TextureStep;
 
 // The same as kernels read it.
 typedef struct StepRecord {
-    float u, v, offset, low, high;
-    int32_t sort;
+    float u, v, offset, low, high, scale;
+    int32_t sort, at;
 } StepRecord;
 
-// A piece of such a curve: two points, by their barycentrics in a triangle, or by uv on other shapes.
+// A piece of such a curve: two points, by their barycentrics in a triangle, or by uv on other shapes; and of a line of a
+// texture whose to_uv is selected, what the step says of it. Where such a line lies along the end of its surface or triangle, the
+// picture has two derivatives, one to either side: `half` of its jump is their mean, between the field on the left of the piece and the
+// one that would be on its right. That moves with to_uv alone: surfaces' ends are edges.
 typedef struct MarkRecord {
     float ends[4];
+    float u, v, scale;
+    int32_t at, half;
 } MarkRecord;
 
 // Whether a shape (of an instance) can move.
@@ -30,5 +37,6 @@ typedef bool MarkMoves(const void *user, int32_t shape, int32_t instance);
 // shape. Such lines are edges, not marks.
 bool rey_step_along(const Array *steps, size_t first, const double a[2], const double b[2]);
 
-// Appends the marks of shapes that move to `edges` (EDGE_MARK) and `marks`, an Array of MarkRecord.
+// Appends the marks of shapes that move, and those of steps that are selected, to `edges` (EDGE_MARK) and `marks`, an Array of
+// MarkRecord. Fails where a selected texture jumps along a line of another one.
 rey_result rey_marks_find(rey_scene *scene, const Array *steps, MarkMoves *moves, const void *user, Array *edges, Array *marks);

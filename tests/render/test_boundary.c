@@ -102,6 +102,14 @@ static const Motion motions[] = {
     {"marks_bump.xml", "tile.to_world", TURN, {0.2f, 0.3f, 1}, 1, 1},
     {"marks_bump.xml", "kite.positions", SHEAR, {0, 0, 0}, 0.05, 1},
     {"marks_view.xml", "lamp.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1},
+    {"lines_view.xml", "floor.bsdf.reflectance.to_uv", ADD, {0}, 0.01, 1},
+    {"lines_view.xml", "wall.bsdf.brdf_0.reflectance.to_uv", ADD, {0}, 0.01, 1},
+    {"lines_view.xml", "ball.bsdf.diffuse_reflectance.to_uv", ADD, {0}, 0.02, 1},
+    {"lines_view.xml", "tube.bsdf.brdf_0.reflectance.to_uv", ADD, {0}, 0.01, 1},
+    {"lines_view.xml", "coin.bsdf.brdf_0.reflectance.to_uv", ADD, {0}, 0.01, 1},
+    {"lines_bounce.xml", "wall.bsdf.reflectance.to_uv", ADD, {0}, 0.02, 4},
+    {"lines_bounce.xml", "lamp.emitter.radiance.to_uv", ADD, {0}, 0.04, 4},
+    {"marks_bump.xml", "tile.bsdf.nested_texture.to_uv", ADD, {0}, 0.02, 1},
     {"mirror_lamp.xml", "card.to_world", SHIFT, {0, 1, 0.5f}, 0.05, 2},
     {"mirror_lamp.xml", "lamp.to_world", SHIFT, {0, 1, 0.3f}, 0.05, 2},
     {"mirror_lamp.xml", "mirror.to_world", SHIFT, {1, 0.5f, 0}, 0.05, 4},
@@ -128,6 +136,9 @@ static const Motion motions[] = {
     {"seen_tiles.xml", "ball.to_world", TURN, {0.3f, 1, 0.4f}, 4, 4},
     {"seen_tiles.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 4},
     {"seen_tiles.xml", "coin.to_world", TURN, {0, 0.3f, 1}, 2, 3},
+    {"seen_lines.xml", "mirror.bsdf.specular_reflectance.to_uv", ADD, {0}, 0.008, 1},
+    {"seen_lines.xml", "floor.bsdf.reflectance.to_uv", ADD, {0}, 0.01, 1},
+    {"seen_lines.xml", "ball.emitter.radiance.to_uv", ADD, {0}, 0.01, 1},
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }
@@ -362,9 +373,28 @@ static void test_refused(void **state) {
     room_close(room);
 }
 
+// Lines of textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show.
+static void test_refused_lines(void **state) {
+    UNUSED(state);
+    static const char *const cases[][3] = {{"marks_faces.xml", "grid.bsdf.bsdf_0.reflectance.to_uv", "the same line"},
+                                           {"seen_tiles.xml", "coin.emitter.radiance.to_uv", "edges of their surfaces"}};
+    static float image[NUMBERS];
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        Room room = room_open(cases[i][0], 1, 0);
+        int param = rey_param_find(room.scene, cases[i][1]);
+        assert_true(param >= 0);
+        float tangent[MOST] = {1};
+        rey_render_def def = def_make(16, 1, 1);
+        def.terms = 0;
+        assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+        assert_non_null(strstr(rey_error(room.ctx), cases[i][2]));
+        room_close(room);
+    }
+}
+
 // Arguments: what the names of rooms, parameters in them, or other tests begin with.
 int main(int argc, char **argv) {
-    struct CMUnitTest tests[2 * COUNT_OF(motions) + 2];
+    struct CMUnitTest tests[2 * COUNT_OF(motions) + 3];
     static char names[COUNT_OF(motions)][64];
     size_t count = 0;
     for (int i = 0; i < COUNT_OF(motions); i++) {
@@ -375,6 +405,7 @@ int main(int argc, char **argv) {
     }
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_bits);
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_refused);
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_refused_lines);
     count = tests_asked(tests, count, argc, argv);
     return _cmocka_run_group_tests("boundary", tests, count, write_pictures, remove_pictures);
 }

@@ -7,8 +7,8 @@
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
-// along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); and the planes
-// at which maps cut light off (turning.h).
+// along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); the planes
+// at which maps cut light off (turning.h); and lines of textures that move over their surfaces (lines.h).
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -18,6 +18,7 @@ enum {
     BOUNDARY_CHAINED,
     BOUNDARY_MIRRORED,
     BOUNDARY_CUT,
+    BOUNDARY_LINES,
     BOUNDARY_KINDS
 };
 
@@ -35,6 +36,7 @@ typedef struct BoundaryJob {
     bool round;               // there are outlines of round surfaces, or marks, among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
+    bool lines;               // lines of textures move over their surfaces
     bool chains;              // the scene has chains of smooth mirrors and glass
     bool mirrored;            // and the camera sees them
     bool everywhere;          // what the camera sees of them moves also where it meets nothing that moves

@@ -12,6 +12,9 @@ typedef struct Crossing {
     Vec3 p;              // on the line
     Vec3 n, n_other, across; // across: n - n'
     Mask m, meeting;
+    Int step;            // of the texture that jumps there, else -1: how it rises over the surface, and uv
+    Vec3 rise;
+    Vec2 uv;
 } Crossing;
 
 // The edge of the surface of `own` that is next to another ray. inside: how far that passes on the surface's side of it, as a
@@ -175,12 +178,16 @@ static void ends_load(const Sightline *line, Int level, int k, Ends *e) {
 
 // Where they meet one surface on both sides of a line of its texture, half-way between them: the normal of the plane of line and
 // ray.
-static Mask crossing_mark(const Tracer *t, const BoundaryJob *b, const Ends *e, const Miss *miss, Mask m, Hit *hit, Vec3 *n) {
+static Mask crossing_mark(const Tracer *t, const BoundaryJob *b, const Ends *e, const Miss *miss, Mask m, Hit *hit, Vec3 *n,
+                          Crossing *c) {
     const Hit *h = e->hit;
     Vec2 across;
     m = m & mi_eq(h[0].shape, h[1].shape) & mi_eq(h[0].prim, h[1].prim) & mi_eq(h[0].instance, h[1].instance) &
         mi_eq(e->behind[0], e->behind[1]);
-    m = fields_part(t->scene, b, h[0].shape, e->uv[0], e->uv[1], m, &across);
+    m = fields_part(t->scene, b, h[0].shape, e->uv[0], e->uv[1], m, &across, &c->step);
+    Float steep = f_safe_rcp(across.x * across.x + across.y * across.y);
+    c->rise = v3_scale(v3_madd(v3_scale(miss->du, across.x), across.y, miss->dv), steep);
+    c->uv = (Vec2){0.5f * (e->uv[0].x + e->uv[1].x), 0.5f * (e->uv[0].y + e->uv[1].y)};
     Vec3 line = v3_madd(v3_scale(miss->du, -across.y), across.x, miss->dv);
     *hit = h[0];
     hit->u = 0.5f * (h[0].u + h[1].u);
@@ -204,7 +211,8 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
     }
     Hit line;
     Vec3 across;
-    Mask mark = crossing_mark(t, b, &e, miss, met[0] & met[1], &line, &across);
+    Crossing c;
+    Mask mark = crossing_mark(t, b, &e, miss, met[0] & met[1], &line, &across, &c);
     // Rounding may leave the other ray inside, too: there it is the edge of what is nearer, or of what ends next to it.
     Mask open = m & ~edge[0] & ~edge[1];
     for (int k = 0; k < 2; k++) {
@@ -213,7 +221,9 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
     }
     // Edges of what is nearer hide what lies behind.
     Mask second = edge[1] & (~edge[0] | m_lt(e.reach[1], e.reach[0]));
-    Crossing c = {.hit = hit_select(second, &miss[1].edge, &miss[0].edge), .other = e.hit[1]};
+    c.hit = hit_select(second, &miss[1].edge, &miss[0].edge);
+    c.other = e.hit[1];
+    c.step = i_select(mark, c.step, i_set(-1));
     c.n = v3_select(second, miss[1].n, miss[0].n);
     c.p = c.hit.p;
     c.meeting = met[0] & met[1] & ~edge[0] & ~edge[1] & ~mark;
@@ -240,4 +250,19 @@ static Carried crossing_move_adj(const Tracer *t, const Crossing *c, const Sight
         points_move_adj(t, &c->other, v3_scale(c->n_other, -own), v3_zero(), sink, c->meeting);
     }
     return sightline_back(t, line, level, c->p, v3_scale(c->across, -own), sink, c->m);
+}
+
+// The same of lines of textures, by their to_uv: where a step grows, its line moves back over the surface.
+static void crossing_line_adj(const BoundaryJob *b, const Crossing *c, Float worth, Sink *sink) {
+    Mask m = c->m & mi_lt(i_set(-1), c->step);
+    if (!b->lines || !m_any(m)) {
+        return;
+    }
+    Int step = i_select(m, c->step, i_set(0)), at = STEP_INT(b, step, at);
+    m = m & mi_lt(i_set(-1), at);
+    at = i_select(m, at, i_set(0));
+    Float d = f_zero_unless(m, -worth * v3_dot(c->n, c->rise)) * STEP_FLOAT(b, step, scale);
+    sink_add(sink, at, d * c->uv.x, m);
+    sink_add(sink, at + 1, d * c->uv.y, m);
+    sink_add(sink, at + 2, d, m);
 }

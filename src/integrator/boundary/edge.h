@@ -24,14 +24,19 @@ typedef struct EdgePoint {
     Vec3 inner;         // of round ones: the point beside it whose normal is turned to the eye by OUTLINE_TURN
     Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
     // Where the shading normal n turns away from the viewer, along F = n . view = 0: n, the vector to the viewer, and how far
-    // over the surface F rises by 1. Elsewhere 0.
+    // over the surface F rises by 1. Of lines of textures, F is the step that is a whole number there, and `rise` that of it.
+    // Elsewhere 0.
     Vec3 normal, view, rise;
     Mask meeting;       // where the surface passes through that of the hit `met`, or through a light's border, where its
-                        // shape is -1; across: the normals of both
+                        // shape is -1 and its prim the light; across: the normals of both
     Hit met;
     Vec3 across[2];
     Mask mark;          // a line of its surface's texture; beside: the points on both sides of it, the first one at side[0]
     Hit beside[2];
+    Vec2 nudge[2];      // what is added to their uv
+    Mask half;          // it lies on the surface's end, and moves with to_uv alone
+    Int line;           // number of its mark, where its to_uv is selected, else -1
+    Vec2 uv;
 } EdgePoint;
 
 // Which sample of its random numbers a slot stands for.
@@ -269,19 +274,64 @@ static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e,
 
 // The line along which a texture jumps, on both sides of which the same surface is seen.
 static void edge_of_mark(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
-    Int number = EDGE_FIELD(b, e, corner);
-    Vec3 tangent, across, unused[2];
+    Int number = i_select(m, EDGE_FIELD(b, e, corner), i_set(0));
+    MarkFrame f;
+    out->half = m & mi_eq(MARK_INT(b, number, half), i_set(1));
+    out->line = i_select(m & mi_lt(i_set(-1), MARK_INT(b, number, at)), number, i_set(-1));
     out->hit.prim = i_select(m, EDGE_FIELD(b, e, prim), out->hit.prim);
     for (int k = 0; k < 2; k++) {
+        Float off = f_select(out->half, f_set(MARK_STEP), f_set(k ? -MARK_STEP : MARK_STEP));
         out->beside[k] = out->hit;
-        out->beside[k].p = mark_at(scene, b, number, t, f_set(k ? -MARK_STEP : MARK_STEP), &out->beside[k], m, unused, unused + 1);
+        out->beside[k].p = mark_at(scene, b, number, t, off, &out->beside[k], m, &f);
     }
-    Vec3 p = mark_at(scene, b, number, t, f_set(0), &out->hit, m, &tangent, &across);
+    Vec3 p = mark_at(scene, b, number, t, f_zero_unless(out->half, f_set(MARK_STEP)), &out->hit, m, &f);
+    Float slope = MARK_FLOAT(b, number, u) * f.turned.x + MARK_FLOAT(b, number, v) * f.turned.y;
+    // Where the end of a surface leaves no room for the other side, uv alone is taken across the line.
+    Float near = f_safe_rcp(f_sqrt(f.turned.x * f.turned.x + f.turned.y * f.turned.y)) * MARK_STEP;
+    near = f_zero_unless(mi_lt(i_set(-1), out->line), near);
+    Float far = near + f_zero_unless(out->half, 2.0f * MARK_STEP * f.unit);
+    out->nudge[0] = (Vec2){near * f.turned.x, near * f.turned.y};
+    out->nudge[1] = (Vec2){-far * f.turned.x, -far * f.turned.y};
+    out->uv = f.uv;
+    out->rise = v3_select(mi_lt(i_set(-1), out->line), v3_scale(f.across, f_safe_rcp(slope)), out->rise);
     out->p = v3_select(m, p, out->p);
-    out->tangent = v3_select(m, tangent, out->tangent);
-    out->side[0] = v3_select(m, across, out->side[0]);
-    out->side[1] = v3_select(m, v3_neg(across), out->side[1]);
+    out->tangent = v3_select(m, f.tangent, out->tangent);
+    out->side[0] = v3_select(m, f.across, out->side[0]);
+    out->side[1] = v3_select(m, v3_neg(f.across), out->side[1]);
     out->open = out->open & ~m;
+}
+
+// Adds the adjoint dp of points p of the borders of lights, which move with their poses: p = A q, q fixed.
+static void borders_move_adj(const SceneView *scene, Int light, Vec3 p, Vec3 dp, Sink *sink, Mask m) {
+    static const int kinds[2][2] = {{EMITTER_SPOT, SLOT(Spot, to_world)}, {EMITTER_PROJECTOR, SLOT(Projector, to_world)}};
+    Float rows[3] = {dp.x, dp.y, dp.z};
+    for (int i = 0; i < 2; i++) {
+        Mask mine = m & mi_eq(EMITTER_FIELD(scene, i_select(m, light, i_set(0)), kind), i_set(kinds[i][0]));
+        if (!m_any(mine)) {
+            continue;
+        }
+        Light of = {scene->emitters, i_select(mine, light, i_set(i_lane(light, m_first(mine)))), true};
+        Vec3 q = light_to_local(scene, &of, p);
+        for (int k = 0; k < 3; k++) {
+            light_place_adj(&of, kinds[i][1], 4 * k, rows[k] * q.x, sink, mine);
+            light_place_adj(&of, kinds[i][1], 4 * k + 1, rows[k] * q.y, sink, mine);
+            light_place_adj(&of, kinds[i][1], 4 * k + 2, rows[k] * q.z, sink, mine);
+            light_place_adj(&of, kinds[i][1], 4 * k + 3, rows[k], sink, mine);
+        }
+    }
+}
+
+// Adds what lines of textures are worth that move where their steps F change: to_uv has them change by `df`.
+static void edge_line_adj(const BoundaryJob *b, const EdgePoint *e, Float df, Sink *sink, Mask m) {
+    m = m & mi_lt(i_set(-1), e->line);
+    if (!m_any(m)) {
+        return;
+    }
+    Int line = i_select(m, e->line, i_set(0)), at = i_select(m, MARK_INT(b, line, at), i_set(0));
+    Float d = f_zero_unless(m, df) * MARK_FLOAT(b, line, scale);
+    sink_add(sink, at, d * e->uv.x, m);
+    sink_add(sink, at + 1, d * e->uv.y, m);
+    sink_add(sink, at + 2, d, m);
 }
 
 // A point of a random edge; u in the unit square.
@@ -325,6 +375,9 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     }
     out.mark = mi_eq(kind, i_set(EDGE_MARK));
     out.beside[0] = out.beside[1] = out.hit;
+    out.nudge[0] = out.nudge[1] = out.uv = (Vec2){f_set(0), f_set(0)};
+    out.half = m_set(false);
+    out.line = i_set(-1);
     if (m_any(out.mark)) {
         edge_of_mark(scene, b, e, t, out.mark, &out);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "integrator/boundary/chained.h"
+#include "integrator/boundary/lines.h"
 #include "integrator/boundary/meeting.h"
 #include "integrator/film.h"
 
@@ -45,11 +46,13 @@ static void far_paths(Indirect *in, int32_t *begin) {
     Tracer *t = in->t;
     Segments *q = &in->q;
     int32_t kind = in->b->kind;
-    t->placed = kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_MEETING;
+    t->placed = kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_MEETING || kind == BOUNDARY_LINES;
     if (kind == BOUNDARY_TERMINATOR) {
         turning_start(t, q, far_half(q));
     } else if (kind == BOUNDARY_MEETING) {
         meetings_start(t, q);
+    } else if (kind == BOUNDARY_LINES) {
+        lines_start(t, q, far_half(q));
     } else if (kind == BOUNDARY_CHAINED) {
         chained_start(t, q, far_half(q));
     } else {
@@ -78,6 +81,7 @@ static void far_paths(Indirect *in, int32_t *begin) {
     t->fork = NULL;
     t->first_bounce = 0;
     t->placed = false;
+    t->nudge[0] = NULL;
     t->rungs = NULL;
 }
 
@@ -122,6 +126,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
     switch (in->b->kind) {
     case BOUNDARY_TERMINATOR:
+    case BOUNDARY_LINES:
         return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
     case BOUNDARY_HORIZON:
     case BOUNDARY_CUT:

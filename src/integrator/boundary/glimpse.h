@@ -155,10 +155,10 @@ static void glimpse_book(Indirect *in, const Glimpse *g, const Landing *at, Spec
     Segments *q = &in->q;
     const bool forward = in->b->job.mode == MODE_FORWARD;
     Int slot = at->v.slot;
-    Mask slides = m & mi_eq(i_gather(q->arrived, slot), i_set(UPSTREAM_RAY));
+    Mask slides = in->upstream ? m & mi_eq(i_gather(q->arrived, slot), i_set(UPSTREAM_RAY)) : m_set(false);
     Vec3 drag = v3_select(slides, LOAD_V3(*q, dragx, dragy, dragz, slot), v3_zero());
     real rate[LANES];
-    if (forward) {
+    if (forward && in->upstream) {
         in->sink->derivative = f_set(0);
         glimpse_move_adj(t, g, &at->v.hit, drag, lens, in->sink, slides);
         f_store(rate, real_gather(q->rate, slot) + in->sink->derivative);
@@ -168,8 +168,8 @@ static void glimpse_book(Indirect *in, const Glimpse *g, const Landing *at, Spec
     for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
         int lane = __builtin_ctz(bits);
         int32_t k = i_lane(slot, lane);
-        bool sliding = q->arrived[k] == UPSTREAM_RAY;
-        real *row = sliding ? q->up[bounce].passed : upstream_row(q, k, bounce);
+        bool sliding = in->upstream && q->arrived[k] == UPSTREAM_RAY;
+        real *row = !in->upstream ? q->unseen : sliding ? q->up[bounce].passed : upstream_row(q, k, bounce);
         double x = (double)f_lane(g->x, lane), y = (double)f_lane(g->y, lane), rgb[SPEC_N];
         float delta[SPEC_N], own = 0;
         if (!row) {
@@ -220,7 +220,8 @@ static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens,
     SampleKey key = slot_key(t, at->v.slot);
     key.scramble = rng_mix(key.scramble, 2 + (uint32_t)bounce);
     Sink still = sink_of(in->b->still);
-    Mask m = at->v.m & m_gt(at->cosine, f_set(0)) & mi_lt(i_set(UPSTREAM_NONE), i_gather(in->q.arrived, at->v.slot));
+    Mask m = at->v.m & m_gt(at->cosine, f_set(0));
+    m = in->upstream ? m & mi_lt(i_set(UPSTREAM_NONE), i_gather(in->q.arrived, at->v.slot)) : m;
     Glimpse g;
     glimpse_try(in, &key, lens, 0, at->si.p, &still, m, &g);
     g.m = g.m & m_ge(g.x, f_set((real)job->x)) & m_lt(g.x, f_set((real)(job->x + job->width))) &

@@ -197,7 +197,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
             upstream_arrive(t, &in->q, bounce);
             ways_advance(in, bounce, sink);
         }
-        if (in->glimpses && in->b->job.mode == MODE_REVERSE) {
+        if (in->glimpses && in->upstream && in->b->job.mode == MODE_REVERSE) {
             ways_carry(in, bounce);
         }
         sort_stage(t, begin, groups);
@@ -430,7 +430,11 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
     Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
     points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
-    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, m & mi_lt(i_set(-1), other.shape));
+    Mask attached = m & mi_lt(i_set(-1), other.shape);
+    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, attached);
+    if (sink->any_places) {
+        borders_move_adj(in->t->scene, other.prim, other.p, w, sink, m & ~attached);
+    }
     if (forward) {
         Float all = sink_taken(sink);
         f_store(q->seen + k, all);
@@ -445,6 +449,8 @@ static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
         segments_move_adj(in, k, sink);
     } else if (in->b->kind == BOUNDARY_MEETING) {
         meetings_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_LINES) {
+        lines_move_adj(&in->q, in->b->job.mode == MODE_FORWARD, k, sink);
     } else if (in->b->kind == BOUNDARY_CUT) {
         cuts_move_adj(in, k, sink);
     } else {
@@ -460,6 +466,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         segments_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_MEETING) {
         meetings_find(t, in->b, first, count, q);
+    } else if (in->b->kind == BOUNDARY_LINES) {
+        lines_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_CHAINED) {
         chained_find(t, in->b, first, count, q);
     } else {

@@ -57,14 +57,45 @@ static MarkPoint mark_on_turned(const SceneView *scene, Int table, Mask disk, Fl
 // Of a mark's uv: how far beside it a path starts.
 #define MARK_STEP 2e-5f
 
-// Point t of the mark `number` on the surface of *hit, moved by `off` across it: *hit gets its coordinates; *tangent is that of
-// the mark, *across where positive steps lead.
-static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Float t, Float off, Hit *hit, Mask m, Vec3 *tangent,
-                    Vec3 *across) {
-    const float *marks = b->marks->ends;
-    Int at = i_select(m, number, i_set(0)) * 4;
-    Float u = f_gather(marks, at), v = f_gather(marks, at + 1);
-    Float du = f_gather(marks, at + 2) - u, dv = f_gather(marks, at + 3) - v, rcp = f_safe_rcp(f_sqrt(du * du + dv * dv));
+#define MARK_ROW(number) ((number) * (int32_t)(sizeof(MarkRecord) / 4))
+#define MARK_FLOAT(job, number, field)                                                                                 \
+    f_gather((const float *)(job)->marks, MARK_ROW(number) + (int32_t)(offsetof(MarkRecord, field) / 4))
+#define MARK_INT(job, number, field)                                                                                   \
+    i_gather((const int32_t *)(job)->marks, MARK_ROW(number) + (int32_t)(offsetof(MarkRecord, field) / 4))
+
+// A mark's tangent, and where positive steps across it lead, by `unit` of which it is moved; the surface's uv, and what such steps
+// change it by.
+typedef struct MarkFrame {
+    Vec3 tangent, across;
+    Vec2 uv, turned;
+    Float unit;
+} MarkFrame;
+
+// What mark coordinates on a mesh, and a change of them, are as uv.
+static void mark_uv_on_mesh(const SceneView *scene, const Hit *hit, Mask m, MarkFrame *f) {
+    Corners c = mesh_corners(scene, hit->shape, hit->prim);
+    Int uvs = SHAPE_FIELD(scene, hit->shape, uvs);
+    Mask given = m & mi_lt(i_set(-1), uvs);
+    uvs = i_select(given, uvs, i_set(0));
+    Float x[2], dx[2], a = f->turned.x, b = f->turned.y;
+    for (int k = 0; k < 2; k++) {
+        Float corner[3];
+        for (int i = 0; i < 3; i++) {
+            corner[i] = theta_at(scene, uvs + i_select(given, c.i[i], i_set(0)) * 2 + k);
+        }
+        x[k] = (1.0f - hit->u - hit->v) * corner[0] + hit->u * corner[1] + hit->v * corner[2];
+        dx[k] = a * (corner[1] - corner[0]) + b * (corner[2] - corner[0]);
+    }
+    f->uv = (Vec2){f_select(given, x[0], f->uv.x), f_select(given, x[1], f->uv.y)};
+    f->turned = (Vec2){f_select(given, dx[0], a), f_select(given, dx[1], b)};
+}
+
+// Point t of the mark `number` on the surface of *hit, moved by `off` across it: *hit gets its coordinates.
+static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Float t, Float off, Hit *hit, Mask m, MarkFrame *f) {
+    number = i_select(m, number, i_set(0));
+    Float u = MARK_FLOAT(b, number, ends[0]), v = MARK_FLOAT(b, number, ends[1]);
+    Float du = MARK_FLOAT(b, number, ends[2]) - u, dv = MARK_FLOAT(b, number, ends[3]) - v;
+    Float rcp = f_safe_rcp(f_sqrt(du * du + dv * dv));
     u = u + t * du - off * rcp * dv;
     v = v + t * dv + off * rcp * du;
     Int shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m)))), kind = SHAPE_FIELD(scene, shape, kind);
@@ -72,6 +103,9 @@ static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Fl
     Mask mesh = m & mi_eq(kind, i_set(SHAPE_MESH)), sphere = m & mi_eq(kind, i_set(SHAPE_SPHERE));
     Mask turned = m & ~mesh & ~sphere;
     MarkPoint p = {v3_zero(), v3_zero(), v3_zero()}, other;
+    f->uv = (Vec2){u, v};
+    f->turned = (Vec2){-dv, du};
+    f->unit = rcp;
     if (m_any(mesh)) {
         // lanes of other shapes stand in for triangles of this one
         Hit own = {i_select(mesh, shape, i_set(i_lane(shape, m_first(mesh)))),
@@ -81,6 +115,7 @@ static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Fl
                    hit->p,
                    hit->instance};
         p = mark_on_mesh(scene, &own);
+        mark_uv_on_mesh(scene, &own, mesh, f);
     }
     if (m_any(sphere)) {
         other = mark_on_sphere(scene, i_select(sphere, table, i_set(i_lane(table, m_first(sphere)))), u, v);
@@ -93,7 +128,7 @@ static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Fl
     }
     hit->u = f_select(mesh, u, hit->u);
     hit->v = f_select(mesh, v, hit->v);
-    *tangent = v3_madd(v3_scale(p.du, du), dv, p.dv);
-    *across = v3_madd(v3_scale(p.du, -dv), du, p.dv);
+    f->tangent = v3_madd(v3_scale(p.du, du), dv, p.dv);
+    f->across = v3_madd(v3_scale(p.du, -dv), du, p.dv);
     return p.p;
 }

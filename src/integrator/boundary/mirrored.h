@@ -85,8 +85,9 @@ static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *
         Mask same = mi_eq(a->hit[i].shape, b->hit[i].shape) & mi_eq(a->hit[i].prim, b->hit[i].prim) &
                     mi_eq(a->hit[i].instance, b->hit[i].instance) & mi_eq(a->behind[i], b->behind[i]);
         Vec2 unused;
+        Int step;
         Mask met = m & same & mi_lt(i_set(-1), a->hit[i].shape);
-        same = same & ~fields_part(t->scene, job, a->hit[i].shape, a->uv[i], b->uv[i], met, &unused);
+        same = same & ~fields_part(t->scene, job, a->hit[i].shape, a->uv[i], b->uv[i], met, &unused, &step);
         level = i_select(m & ~same, i_set(i), level);
         m = m & same & mi_eq(a->lobe[i], b->lobe[i]) & lobe_turns(a->lobe[i]);
     }
@@ -302,6 +303,7 @@ static void curves_finish(Tracer *t, const BoundaryJob *b, const Segments *q, Si
         c.crossing.m = c.m & m_finite(worth) & m_finite(spec_sum(jump));
         c.crossing.meeting = c.crossing.meeting & c.crossing.m;
         Carried carried = crossing_move_adj(t, &c.crossing, c.line, c.level, worth, sink);
+        crossing_line_adj(b, &c.crossing, worth, sink);
         if (sink->any_camera) {
             RayAdj ray = {c.line[0].hit[0].p, carried.drag, carried.turn};
             sensor_ray_adj(t->scene, t->sensor, c.x, c.y, c.lens, &ray, sink, c.crossing.m);

@@ -5,8 +5,7 @@
 // NOT differentiated: jumps of volumes' voxels and of opacities. What is seen behind mirrors and glass: mirrored.h.
 #pragma once
 
-#include "integrator/boundary/edge.h"
-#include "integrator/boundary/view.h"
+#include "integrator/boundary/segments.h"
 #include "integrator/film.h"
 
 // Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
@@ -70,6 +69,9 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         Hit hit = trace_closest(t->scene, &ray, mark, false);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask own = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
+        if (t->scene->hide_emitters) {
+            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(mark & own, hit.shape, i_set(0)), emitter), i_set(0));
+        }
         visible = visible | (mark & own & m_le(f_abs(found - reach), 2e-5f * reach));
         t->job->rays += m_count(mark);
     }
@@ -122,7 +124,7 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
 
 // Finds the first vertices of those paths. Beside the outline of a round surface its normal turns with the root of the distance,
 // which no step would resolve: there the vertex is the point that is all but on the outline. Beside marks it is on their surface.
-static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int32_t count, int32_t half) {
+static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Segments *q, int32_t count, int32_t half) {
     trace_stage(t, 0);
     for (int32_t k = 0; k < count && b->round; k += LANES) {
         PrimarySample s;
@@ -142,8 +144,11 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
             hit = hit_select(m & s.edge.mark, &beside, &hit);
             hit_store(t, at, &hit);
         }
+        nudges_store(&s.edge, above, q, k, half + k);
     }
     t->placed = true;
+    t->nudge[0] = b->lines ? q->nudge_u : NULL;
+    t->nudge[1] = q->nudge_v;
 }
 
 // Where two surfaces with normals a and b pass through each other, their curve moves across itself as both say:
@@ -153,15 +158,21 @@ static void primary_meeting_adj(Tracer *t, const PrimarySample *s, Vec3 along, V
     Vec3 a = s->edge.across[0], b = s->edge.across[1];
     Float c = v3_dot(a, b), r = f_safe_rcp(1.0f - c * c), na = v3_dot(along, a), nb = v3_dot(along, b);
     *first = v3_select(m, v3_scale(a, (na - c * nb) * r), *first);
-    points_move_adj(t, &s->edge.met, v3_scale(b, (nb - c * na) * r), v3_zero(), sink, attached);
+    Vec3 other = v3_scale(b, (nb - c * na) * r);
+    points_move_adj(t, &s->edge.met, other, v3_zero(), sink, attached);
+    if (sink->any_places) {
+        borders_move_adj(t->scene, s->edge.met.prim, s->edge.p, other, sink, m & ~attached);
+    }
 }
 
 // Adds the motion of the edges along n, worth `worth`. A terminator is where F = n . view is 0: where F grows, it moves back over
-// the surface, down the slope.
-static void primary_move_adj(Tracer *t, const PrimarySample *s, Float worth, bool parallel, Sink *sink) {
+// the surface, down the slope. So do lines of textures.
+static void primary_move_adj(Tracer *t, const BoundaryJob *b, const PrimarySample *s, Float worth, bool parallel, Sink *sink) {
     Vec3 along = v3_scale(s->n, f_zero_unless(s->m, worth));
     SurfaceAdj d = surface_adj_zero();
     Float df = -v3_dot(along, s->edge.rise);
+    edge_line_adj(b, &s->edge, df, sink, s->m);
+    along = v3_select(s->edge.half, v3_zero(), along);
     RayAdj ray = {s->edge.p, v3_neg(along), v3_zero()};
     d.p = v3_select(s->edge.meeting, v3_zero(), along);
     d.n = v3_scale(s->edge.view, df);
@@ -196,7 +207,7 @@ static void primary_finish(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
             worth = worth * spec_dot(jump, spec_load(t->ws.adjoint, k));
         }
         s.m = s.m & m_finite(worth) & m_finite(spec_sum(jump));
-        primary_move_adj(t, &s, worth, pinhole->parallel, sink);
+        primary_move_adj(t, b, &s, worth, pinhole->parallel, sink);
         if (b->job.mode == MODE_FORWARD) {
             spec_store(t->ws.radiance, k, spec_zero_unless(s.m, spec_scale(jump, sink->derivative)));
             sink->derivative = f_set(0);

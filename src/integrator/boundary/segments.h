@@ -27,9 +27,10 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
-// what its motion is worth. In media: what the near point is in (airborne.h), and what the flight to it weighs.
+// what its motion is worth; of both points beside a line of a texture, what is added to their uv. In media: what the near point is in (airborne.h), and what the flight to it weighs.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
+        F(nudge_u) F(nudge_v)                                                                                                  \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
 #define SEGMENT_INTS(I) I(number) I(lit) I(source) I(air) I(around) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light) S(flown)
@@ -247,6 +248,12 @@ KFN Hit segment_edge(const Segments *q, Int at) {
                  LOAD_V3(*q, edge_x, edge_y, edge_z, at), i_gather(q->edge_instance, at)};
 }
 
+// And the far point.
+KFN Hit segment_far(const Segments *q, Int at) {
+    return (Hit){i_gather(q->far_shape, at), i_gather(q->far_prim, at), real_gather(q->far_u, at), real_gather(q->far_v, at),
+                 LOAD_V3(*q, far_x, far_y, far_z, at), i_gather(q->far_instance, at)};
+}
+
 // Two paths for every segment, in slots k and half + k, share its numbers.
 static void segment_pairs(Tracer *t, const Segments *q, int32_t half) {
     for (int32_t k = 0; k < half; k++) {
@@ -254,6 +261,14 @@ static void segment_pairs(Tracer *t, const Segments *q, int32_t half) {
         t->ws.pixel[k] = t->ws.pixel[half + k] = t->ws.pixel[at];
         t->ws.sample[k] = t->ws.sample[half + k] = t->ws.sample[at];
     }
+}
+
+// Keeps what is added to the uv of the paths in the slots `first` and `second`, which lie on the sides of `above` and the other ones.
+KFN void nudges_store(const EdgePoint *e, Mask above, Segments *q, int32_t first, int32_t second) {
+    f_store(q->nudge_u + first, f_select(above, e->nudge[1].x, e->nudge[0].x));
+    f_store(q->nudge_v + first, f_select(above, e->nudge[1].y, e->nudge[0].y));
+    f_store(q->nudge_u + second, f_select(above, e->nudge[0].x, e->nudge[1].x));
+    f_store(q->nudge_v + second, f_select(above, e->nudge[0].y, e->nudge[1].y));
 }
 
 // Traces both halves and keeps the segments that have ends.
