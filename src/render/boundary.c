@@ -93,7 +93,7 @@ static rey_result check_meetings(rey_scene *scene) {
     rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
     if (result == REY_OK && meetings.count > 0) {
         const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, 0);
-        char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a projector's light"};
+        char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a light"};
         for (int k = 0; k < 2 && m->shape[k] >= 0; k++) {
             rey_name_shape(scene, m->shape[k], names[k]);
         }
@@ -149,15 +149,17 @@ static rey_result boundary_check(const Render *r, int term) {
         }
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
-        bool directional = view->emitters[i].kind == EMITTER_DIRECTIONALAREA, moves = r->job.any_motion;
+        bool steep = rey_light_is_steep(view, view->emitters + i), moves = r->job.any_motion;
+        bool lost = view->has_media || (!r->def.terms && !(r->terms & REY_TERM_PRIMARY)); // it became abrupt
+        bool hard = lost && rey_light_is_abrupt(view, view->emitters + i);
         for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
             moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
         }
-        if (directional || (moves && rey_light_is_abrupt(view, view->emitters + i))) {
+        if (moves && (steep || hard)) {
             rey_name_emitter(scene, (int32_t)i, name);
             return refuse(scene, term,
-                          directional ? "emitters of the kind 'directionalarea'"
-                                      : "the border of the light of spots whose beam_width is their cutoff_angle",
+                          hard ? "here the border of the light of spots whose beam_width is their cutoff_angle"
+                               : "the border of the light of spots whose beam_width is all but their cutoff_angle",
                           name);
         }
     }

@@ -253,10 +253,18 @@ static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
                        (r->scene->view.shapes[id].collection >= 0 && job->instance_at[instance] >= 0));
 }
 
-// The same, as the sensor sees it.
+static bool light_moves(const Render *r, int32_t light) {
+    bool moves = false;
+    for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
+        moves |= r->job.place_at[MAX_EMITTER_SLOTS * light + k] >= 0;
+    }
+    return moves;
+}
+
+// The same, as the sensor sees it; id -1: of a light.
 static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
-    return r->job.any_camera || shape_moves_itself(r, id, instance);
+    return r->job.any_camera || (id < 0 ? light_moves(r, instance) : shape_moves_itself(r, id, instance));
 }
 
 // Whether it moves the line of a texture over its surface.
@@ -277,7 +285,8 @@ static double meeting_weight(const Render *r, const EdgeRecord *e) {
     for (int k = 0; k < 3; k++) {
         length2 += (double)(m->ends[3 + k] - m->ends[k]) * (double)(m->ends[3 + k] - m->ends[k]);
     }
-    bool moves = shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]);
+    bool moves = shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]) ||
+                 (m->shape[1] < 0 && light_moves(r, m->prim[1]));
     return moves ? sqrt(length2) : 0;
 }
 

@@ -3,8 +3,10 @@
 
 #include "shape/meetings.h"
 
-// rey_meetings_find with the sides of the frustums of projectors, as far as the scene goes: of those whose outermost texels are
-// not black.
+// rey_meetings_find with the surfaces in the air at which light jumps, as far as the scene goes: the sides of the frustums of
+// projectors whose outermost texels are not black, the planes along which their pictures jump, and the cones of spots that end
+// abruptly.
 rey_result rey_meetings_with_borders(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings);
-// Whether a light ends abruptly elsewhere.
+// Whether a spot has no soft border; or so narrow a one that it all but jumps, which no border says.
 bool rey_light_is_abrupt(const SceneView *view, const EmitterRecord *e);
+bool rey_light_is_steep(const SceneView *view, const EmitterRecord *e);

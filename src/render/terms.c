@@ -53,7 +53,8 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     if (p->to_uv >= 0) {
         return gap_of_lines(scene) ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
-    return (p->emitter >= 0 ? REY_TERM_INTERIOR : still) | REY_TERM_INDIRECT | chains;
+    const int light = REY_TERM_INTERIOR | (scene->view.has_media ? 0 : REY_TERM_PRIMARY);
+    return (p->emitter >= 0 ? light : still) | REY_TERM_INDIRECT | chains;
 }
 
 // Whether some medium's extinction jumps from voxel to voxel.

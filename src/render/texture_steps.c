@@ -38,7 +38,8 @@ const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *t
     for (int64_t i = 0; i < view->emitters_count && film; i++) {
         const EmitterRecord *e = view->emitters + i;
         const EmitterKind *kind = rey_emitter_kinds + e->kind;
-        for (int k = 0; k < kind->param_count && e->shape < 0; k++) {
+        bool known = e->kind == EMITTER_PROJECTOR; // light_borders.c
+        for (int k = 0; k < kind->param_count && e->shape < 0 && !known; k++) {
             *texture = kind->params[k].type < EMITTER_PARAM_POSITION ? e->slot[k] : -1;
             if (texture_jumps(view, *texture)) {
                 return "the jumps of the textures of lights that are no surfaces";
@@ -151,7 +152,7 @@ static rey_result push_grid(Steps *s, int32_t id, int32_t width, int32_t height,
     static const float identity[6] = {1, 0, 0, 0, 1, 0};
     const TextureNode *t = s->scene->view.textures + id;
     const float *m = t->to_uv >= 0 ? s->scene->view.theta + t->to_uv : identity;
-    int32_t first = s->to_uv_at[id];
+    int32_t first = s->to_uv_at ? s->to_uv_at[id] : -1;
     rey_result result = REY_OK;
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         double n = k ? height : width;
@@ -225,6 +226,11 @@ rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *s
         }
     }
     return result;
+}
+
+rey_result rey_light_steps(rey_scene *scene, int32_t texture, Array *steps) {
+    Steps s = {.scene = scene, .steps = steps, .first = steps->count, .shape = -1};
+    return add_texture(&s, texture, false);
 }
 
 rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at) {

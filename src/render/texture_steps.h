@@ -6,7 +6,9 @@
 // Appends the steps of all surfaces' textures to `steps`, an Array of TextureStep, by shape. to_uv_at: of every texture, where its
 // to_uv begins in the selection, -1 = it is not selected.
 rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *steps);
-// The same for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the end. Both
+// Appends the lines of the picture of a light that is no surface, over the unit square. No shape has them.
+rey_result rey_light_steps(rey_scene *scene, int32_t texture, Array *steps);
+// The same as the first for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the end. Both
 // stay empty where nothing jumps.
 rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at);
 // Whether a selection moves lines along which textures jump, by their to_uv.

@@ -210,8 +210,7 @@ static rey_result mark_line(const Marking *w, size_t number, bool half, const do
     return result;
 }
 
-// Where a step is `level` in the unit square; *side: whether along that side of it, which the square is on the left of, else -1.
-static bool cross_square(const TextureStep *s, double level, double ends[2][2], int *side) {
+bool rey_step_across(const TextureStep *s, double level, double ends[2][2], int *side) {
     static const double corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
     int count = 0;
     *side = -1;
@@ -249,7 +248,7 @@ static rey_result mark_round(const Marking *w, size_t i) {
         bool known;
         int side;
         result = look_before(w, i, level, &known);
-        if (result == REY_OK && !known && cross_square(s, level, ends, &side)) {
+        if (result == REY_OK && !known && rey_step_across(s, level, ends, &side)) {
             result = mark_line(w, i, false, ends[0], ends[1]);
         } else if (result == REY_OK && !known && s->at >= 0 && side >= 0) {
             result = mark_line(w, i, true, ends[0], ends[1]);

@@ -37,6 +37,9 @@ typedef bool MarkMoves(const void *user, int32_t shape, int32_t instance);
 // shape. Such lines are edges, not marks.
 bool rey_step_along(const Array *steps, size_t first, const double a[2], const double b[2]);
 
+// Where a step is `level` across the unit square; *side: whether along that side of it, which the square is on the left of, else -1.
+bool rey_step_across(const TextureStep *s, double level, double ends[2][2], int *side);
+
 // Appends the marks of shapes that move, and those of steps that are selected, to `edges` (EDGE_MARK) and `marks`, an Array of
 // MarkRecord. Fails where a selected texture jumps along a line of another one.
 rey_result rey_marks_find(rey_scene *scene, const Array *steps, MarkMoves *moves, const void *user, Array *edges, Array *marks);

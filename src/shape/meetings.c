@@ -197,8 +197,12 @@ static Quadric quadric_of_cylinder(const float *table) {
     return q;
 }
 
-static Quadric quadric_of(const SceneView *view, const Body *body, const Triangle *t) {
+static Quadric quadric_of(const Facets *f, const Body *body, const Triangle *t) {
+    const SceneView *view = &f->scene->view;
     const ShapeRecord *shape = body->shape < 0 ? NULL : view->shapes + body->shape;
+    if (!shape && f->borders[body->instance].round) {
+        return f->borders[body->instance].cone;
+    }
     if (shape && shape->kind == SHAPE_SPHERE) {
         return quadric_of_sphere(view->tables + shape->table);
     }
@@ -327,11 +331,12 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     }
     bool round = false;
     for (int i = 0; i < 2; i++) {
-        bool mesh = body[i]->shape < 0 || view->shapes[body[i]->shape].kind == SHAPE_MESH;
+        const LightBorder *border = body[i]->shape < 0 ? f->borders + body[i]->instance : NULL;
+        bool mesh = border ? !border->round : view->shapes[body[i]->shape].kind == SHAPE_MESH;
         m.shape[i] = body[i]->shape;
-        m.instance[i] = body[i]->instance;
-        m.prim[i] = mesh ? piece[i]->triangle : 0;
-        m.surface[i] = quadric_of(view, body[i], t + i);
+        m.instance[i] = border ? 0 : body[i]->instance;
+        m.prim[i] = border ? border->light : mesh ? piece[i]->triangle : 0;
+        m.surface[i] = quadric_of(f, body[i], t + i);
         round |= !mesh;
     }
     double near = 0.1 * fmin(t[0].size, t[1].size);
@@ -371,8 +376,8 @@ static rey_result add_body(Facets *f, int32_t shape, int32_t instance) {
             box->high[k] = fmaxf(box->high[k], one.high[k]);
         }
     }
-    box->moves = shape >= 0 && f->moves(f->user, shape, instance);
-    body->meets = box->moves && f->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
+    box->moves = f->moves(f->user, shape, shape < 0 ? f->borders[instance].light : instance);
+    body->meets = shape >= 0 && box->moves && f->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
     return REY_OK;
 }
 

@@ -9,20 +9,23 @@ typedef struct Quadric {
     float matrix[6]; // xx yy zz yz zx xy
 } Quadric;
 
-// A triangle of the surface, in the air, at which the light of a lamp ends.
+// A triangle of the surface, in the air, at which the light of a lamp ends or jumps; of a cone, between two of its lines.
 typedef struct LightBorder {
     float p[3][3];
+    int32_t light;
+    bool round;
+    Quadric cone;
 } LightBorder;
 
 // A piece of such a curve, close to the straight line between its ends.
 typedef struct MeetingRecord {
-    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, which stands still
+    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, and prim its light
     int32_t instance[2]; // of shapes with SHAPE_INSTANCED, else 0
     float ends[6];       // two points
     Quadric surface[2];
 } MeetingRecord;
 
-// Whether a shape (of an instance) can move.
+// Whether a shape (of an instance) can move; shape -1: the light with the number `instance`.
 typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
 
 // Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without
