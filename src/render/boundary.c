@@ -237,7 +237,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
                               .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
-                              .edge_count = edge_count, .round = plan->job.round, .none = r->none, .everywhere = r->turns_rays || r->lines, .lines = r->lines,
+                              .edge_count = edge_count, .round = plan->job.round, .none = r->none,
+                              .everywhere = r->turns_rays || r->lines, .lines = r->lines,
                               .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;

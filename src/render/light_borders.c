@@ -154,7 +154,8 @@ static float spot_number(const SceneView *view, const EmitterRecord *e, int slot
 }
 
 bool rey_light_is_abrupt(const SceneView *view, const EmitterRecord *e) {
-    return e->kind == EMITTER_SPOT && spot_number(view, e, SLOT(Spot, beam_width)) >= spot_number(view, e, SLOT(Spot, cutoff_angle));
+    return e->kind == EMITTER_SPOT &&
+           spot_number(view, e, SLOT(Spot, beam_width)) >= spot_number(view, e, SLOT(Spot, cutoff_angle));
 }
 
 bool rey_light_is_steep(const SceneView *view, const EmitterRecord *e) {

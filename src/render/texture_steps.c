@@ -156,7 +156,8 @@ static rey_result push_grid(Steps *s, int32_t id, int32_t width, int32_t height,
     rey_result result = REY_OK;
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         double n = k ? height : width;
-        result = push_step(s, (TextureStep){.sort = STEP_LINES, .at = first < 0 ? -1 : first + 3 * k, .scale = n, .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
+        result = push_step(s, (TextureStep){.sort = STEP_LINES, .at = first < 0 ? -1 : first + 3 * k, .scale = n,
+                                            .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
                                             .offset = n * (double)m[3 * k + 2] - (slopes ? 0.5 : 0),
                                             .low = !clamped ? -INFINITY : slopes ? 0 : 1,
                                             .high = clamped ? n - 1 : INFINITY});

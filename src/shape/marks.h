@@ -22,8 +22,8 @@ typedef struct StepRecord {
 
 // A piece of such a curve: two points, by their barycentrics in a triangle, or by uv on other shapes; and of a line of a
 // texture whose to_uv is selected, what the step says of it. Where such a line lies along the end of its surface or triangle, the
-// picture has two derivatives, one to either side: `half` of its jump is their mean, between the field on the left of the piece and the
-// one that would be on its right. That moves with to_uv alone: surfaces' ends are edges.
+// picture has two derivatives, one to either side: `half` of its jump is their mean, between the field on the left of the piece and
+// the one that would be on its right. That moves with to_uv alone: surfaces' ends are edges.
 typedef struct MarkRecord {
     float ends[4];
     float u, v, scale;
@@ -37,7 +37,7 @@ typedef bool MarkMoves(const void *user, int32_t shape, int32_t instance);
 // shape. Such lines are edges, not marks.
 bool rey_step_along(const Array *steps, size_t first, const double a[2], const double b[2]);
 
-// Where a step is `level` across the unit square; *side: whether along that side of it, which the square is on the left of, else -1.
+// Where a step is `level` across the unit square; *side: along which side of it, with the square on the left, else -1.
 bool rey_step_across(const TextureStep *s, double level, double ends[2][2], int *side);
 
 // Appends the marks of shapes that move, and those of steps that are selected, to `edges` (EDGE_MARK) and `marks`, an Array of

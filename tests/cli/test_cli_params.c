@@ -84,8 +84,9 @@ static void refusals_name_objects(void **state) {
         "name='width' value='4'/><integer name='height' value='4'/></film></sensor><emitter type='constant'/>"
         "<shape type='cube' id='box'/>";
     static const char *const scenes[][2] = {
-        {"<emitter type='spot' id='torch'><float name='cutoff_angle' value='20'/><float name='beam_width' value='20'/></emitter>",
-         "does not know the border of the light of spots whose beam_width is their cutoff_angle ('torch')"},
+        {"<emitter type='spot' id='torch'><float name='cutoff_angle' value='20'/><float name='beam_width' value='19.99'/>"
+         "</emitter>",
+         "does not know the border of the light of spots whose beam_width is all but their cutoff_angle ('torch')"},
         {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='obj' id='hill'><string name='filename' "
          "value='hill.obj'/></shape>",
          "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in "

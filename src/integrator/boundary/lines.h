@@ -4,8 +4,9 @@
 // over the points of the line and the directions w from there to the vertex that sees it, W the importance of that; n in the
 // surface, at right angles to the line, from the side of L- to that of L+. With F the number of the line at a fixed point, which
 // to_uv has grow, and r the way over the surface along which it grows by 1, v = -F' r.
-// Two paths look at the fields on both sides, and particles carry the difference to the sensor. What the sensor sees of lines itself:
-// primary.h; in mirrors and through glass: mirrored.h.
+// Two paths look at the fields on both sides, and particles carry the difference to the sensor. What the sensor sees of lines
+// itself: primary.h; in mirrors and through glass: mirrored.h.
+// NOT differentiated: what collisions in media see of them.
 #pragma once
 
 #include "integrator/boundary/turning.h"

@@ -27,7 +27,8 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
-// what its motion is worth; of both points beside a line of a texture, what is added to their uv. In media: what the near point is in (airborne.h), and what the flight to it weighs.
+// what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
+// (airborne.h), and what the flight to it weighs.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         F(nudge_u) F(nudge_v)                                                                                                  \
@@ -263,7 +264,7 @@ static void segment_pairs(Tracer *t, const Segments *q, int32_t half) {
     }
 }
 
-// Keeps what is added to the uv of the paths in the slots `first` and `second`, which lie on the sides of `above` and the other ones.
+// Keeps what is added to the uv of the paths in the slots `first` and `second`, the latter on the side of side[0] where `above`.
 KFN void nudges_store(const EdgePoint *e, Mask above, Segments *q, int32_t first, int32_t second) {
     f_store(q->nudge_u + first, f_select(above, e->nudge[1].x, e->nudge[0].x));
     f_store(q->nudge_v + first, f_select(above, e->nudge[1].y, e->nudge[0].y));
