@@ -33,7 +33,8 @@ rey_result build_note_ranges(Builder *b) {
             most = fmaxf(most, value);
         }
         if (outside) {
-            TRY(rey_scene_add_note(b->scene, "warning: %lld of the %lld numbers of %s lie outside of %g to %g, and go from %g to %g: "
+            TRY(rey_scene_add_note(b->scene,
+                                   "warning: %lld of the %lld numbers of %s lie outside of %g to %g, and go from %g to %g: "
                                    "they are used as they are", (long long)outside, (long long)p->count, p->name, (double)p->low,
                                    (double)p->high, (double)least, (double)most));
         }
