@@ -132,6 +132,9 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         if (t->job->live_borders) {
             border_stage(t, begin, count);
         }
+        if (t->job->corner_at) {
+            corner_stage(t, begin);
+        }
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);
         }

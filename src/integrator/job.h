@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene/scene.h"
+#include "shape/corners.h"
 
 // MODE_REPLAY: the picture of another scene along the paths of this one (path_replay.h).
 enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV, MODE_REPLAY };
@@ -38,6 +39,9 @@ typedef struct PathJob {
     bool any_normals, any_attributes, any_places, any_motion, any_camera;
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
+    const int32_t *none;          // the offsets of a selection of nothing
+    const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
+    const int32_t *corner_at;     // null: there are none
     const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
     bool live_extinctions;        // that of some medium depends on the selection
     bool live_borders;            // so does where some medium begins and ends

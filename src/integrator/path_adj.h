@@ -7,6 +7,7 @@
 #pragma once
 
 #include "integrator/collision_adj.h"
+#include "integrator/corner.h"
 
 static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     const Records *r = &t->ws.records;
@@ -108,6 +109,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     sink->at = NULL;
     if (sink->any_motion) {
         d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
+        d.p = s->corner ? corner_move_adj(t, s, weight, sink) : d.p;
         vertex_move_adj(t, s, &d, weight, live, channel, sink);
     } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         vertex_frame_adj(s, call.surface != NULL, &d);
@@ -157,6 +159,12 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     }
     if ((live & LIVE_SCATTERING) || live_passing) {
         s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+    }
+    Corner corner;
+    if (job->corner_at && !batch->ends) {
+        corner = corner_load(t, batch);
+        s.corner = m_any(corner.m) ? &corner : NULL;
+        corner_meet(t, slot, &corner);
     }
     Spec unshadowed = s.light_weight, transmittance = spec_set(f_set(1));
     if (t->scene->through) {

@@ -18,9 +18,9 @@
 #include "shape/move.h"
 
 // Adjoint of one vertex: of wi (local), of the direction onwards, of the light sample, shading frame, surface and uv; and
-// what light samples and the rest of the path contribute.
+// what light samples and the rest of the path contribute; p: of its position, beside what these ask for.
 typedef struct VertexAdj {
-    Vec3 wi, wo;
+    Vec3 p, wi, wo;
     LightMove light;
     Frame frame;
     BsdfSurface surface;
@@ -254,7 +254,7 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, Spec
 static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, VertexAdj *v, Spec weight, int32_t live,
                                      int channel, Sink *sink) {
     Carried carried = {v3_zero(), v3_zero()};
-    Vec3 dp = v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink));
+    Vec3 dp = v3_add(v->p, v3_add(connection_move_adj(t, s, v, sink), onward_move_adj(t, s, v, channel, sink)));
     vertex_place_adj(t, s, v, dp, s->slides, live, &carried, sink);
     Vec3 back = frame_to_world(&s->si.sh, v->wi);
     if (m_any(s->scattered & s->chained)) {

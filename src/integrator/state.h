@@ -29,11 +29,11 @@ enum {
 // scattering function),
 // the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
 // camera, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
-// radiance arriving along the sampled direction.
+// radiance arriving along the sampled direction. corner: see corner.h.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw)
-#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight)
+#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(corner)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)
 
 // Of a camera sample: where it lies on the film, and its alpha.

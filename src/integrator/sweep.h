@@ -45,6 +45,7 @@ typedef struct SurfaceSweep {
     Vec3 dp_dv;
     const EmitterRecord *emitter;
     const Group *group;
+    const struct Corner *corner; // where some look through a lens (corner.h), else null
 } SurfaceSweep;
 
 // Lanes whose path goes on along a direction that follows from how it came. Where shadow rays pass surfaces, so does
@@ -64,6 +65,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.suffix = suffix;
     s.attached = suffix;
     s.group = t->scene->groups + batch->group;
+    s.corner = NULL;
     s.hit.shape = i_load(r->shape + at);
     s.hit.prim = i_load(r->prim + at);
     s.hit.instance = i_load(r->instance + at);

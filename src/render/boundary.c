@@ -6,6 +6,7 @@
 #include "emitter/emitter.h"
 #include "render/blame.h"
 #include "render/boundary_edges.h"
+#include "render/corners.h"
 #include "render/light_borders.h"
 #include "render/texture_steps.h"
 #include "scene/sink.h"
@@ -166,14 +167,22 @@ static rey_result boundary_check(const Render *r, int term) {
     return term == REY_TERM_SPECULAR ? check_meetings(scene) : REY_OK;
 }
 
-void rey_boundary_free(Render *r, BoundaryPlan *plan) {
+void rey_boundaries_free(Render *r) {
     rey_context *ctx = r->scene->ctx;
-    rey_free(ctx, plan->edges);
-    rey_free(ctx, plan->cdf);
-    rey_free(ctx, plan->films);
-    rey_array_free(ctx, &plan->steps);
-    rey_array_free(ctx, &plan->step_at);
-    *plan = (BoundaryPlan){.shards = 0};
+    for (int i = 0; i < BOUNDARY_KINDS; i++) {
+        BoundaryPlan *plan = r->boundary + i;
+        rey_free(ctx, plan->edges);
+        rey_free(ctx, plan->cdf);
+        rey_free(ctx, plan->films);
+        rey_array_free(ctx, &plan->steps);
+        rey_array_free(ctx, &plan->step_at);
+    }
+    rey_array_free(ctx, &r->edges);
+    rey_array_free(ctx, &r->fans);
+    rey_array_free(ctx, &r->meetings);
+    rey_array_free(ctx, &r->marks);
+    rey_array_free(ctx, &r->corners);
+    rey_free(ctx, r->corner_at);
 }
 
 static rey_result reserve_workspaces(Render *r) {
@@ -280,7 +289,7 @@ rey_result rey_boundaries_begin(Render *r) {
         }
     }
     watch_smooth_normals(r);
-    return result;
+    return result == REY_OK ? rey_corners_begin(r) : result;
 }
 
 typedef struct BoundaryPass {

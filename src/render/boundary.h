@@ -4,8 +4,9 @@
 #include "render/render_parts.h"
 
 // Prepares the terms of a derivative after the selection is mapped, where they can be computed, and records why not; a
-// rey_boundary_free of every plan follows in any case.
+// rey_boundaries_free follows in any case.
 rey_result rey_boundaries_begin(Render *r);
+void rey_boundaries_free(Render *r);
 // Whether what only vertex normals move is known for a sensor: silhouettes have no part in it.
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.
@@ -18,6 +19,5 @@ typedef struct ChainObstacle {
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor);
 // The term that boundaries of a kind (BOUNDARY_) belong to.
 int rey_boundary_term(int32_t kind);
-void rey_boundary_free(Render *r, BoundaryPlan *plan);
 // Runs the samples of one set. Reverse: adds to r->gradients. Forward: adds to the picture.
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture);

@@ -26,13 +26,7 @@ static void render_free(Render *r) {
         rey_free(ctx, r->workspaces[i]);
     }
     rey_free(ctx, r->workspaces);
-    for (int i = 0; i < BOUNDARY_KINDS; i++) {
-        rey_boundary_free(r, r->boundary + i);
-    }
-    rey_array_free(ctx, &r->edges);
-    rey_array_free(ctx, &r->fans);
-    rey_array_free(ctx, &r->meetings);
-    rey_array_free(ctx, &r->marks);
+    rey_boundaries_free(r);
     rey_free(ctx, r->films);
     rey_free(ctx, r->squares);
     rey_free(ctx, r->coverage);

@@ -50,6 +50,8 @@ typedef struct Render {
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
     Array meetings;        // curves that two boundary terms share (shape/meetings.h)
     bool meetings_found;
+    Array corners;         // where the interior term looks through lenses (shape/corners.h)
+    int32_t *corner_at;    // by viewer
     Array marks;           // curves along which textures jump (shape/marks.h)
     BoundaryPlan boundary[BOUNDARY_KINDS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
