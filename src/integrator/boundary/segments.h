@@ -272,9 +272,29 @@ KFN void nudges_store(const EdgePoint *e, Mask above, Segments *q, int32_t first
     f_store(q->nudge_v + second, f_select(above, e->nudge[0].y, e->nudge[1].y));
 }
 
+// segment_offset of an edge that stands on another surface: beside it, the ray would begin behind that, where it lies between the
+// edge and the viewer. It begins in front of it.
+static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
+    Vec3 p = s->edge.p, n;
+    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
+    Ray back = {o, v3_neg(s->d), 32.0f * step};
+    Hit met = trace_closest(t->scene, &back, s->m, false);
+    t->job->rays += m_count(s->m);
+    Mask m = s->m & mi_lt(i_set(-1), met.shape);
+    m = m & ~(mi_eq(met.shape, s->edge.hit.shape) & mi_eq(met.instance, s->edge.hit.instance));
+    if (!m_any(m)) {
+        return o;
+    }
+    point_hit(t->scene, i_select(m, met.shape, i_set(-1)), i_select(m, met.prim, i_set(0)), met.instance, met.p, &n);
+    Float rises[2] = {v3_dot(s->edge.side[0], n), v3_dot(s->edge.side[1], n)};
+    Float above = f_select(m_lt(f_abs(rises[0]), f_abs(rises[1])), rises[1], rises[0]);
+    m = m & m_lt(v3_dot(s->d, n) * above, f_set(0));
+    return v3_select(m, v3_madd(met.p, -2.0f * step, s->d), o);
+}
+
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
-    Vec3 o = segment_offset(s);
+    Vec3 o = segment_stand(t, s, segment_offset(s));
     Ray ahead = {o, s->d, s->distance * (1.0f - 9e-4f)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
     Mask m = s->m;
     t->job->rays += m_count(m);
