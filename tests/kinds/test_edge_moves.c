@@ -28,6 +28,7 @@ static Interaction attached_of(const World *w, const Sample *x) {
 static Sample sample_make(World *w, bool terminator, bool parallel, int32_t shape, uint64_t *random) {
     Sample x = {.s = {.m = m_set(true)}};
     EdgePoint *e = &x.s.edge;
+    e->line = i_set(-1);
     e->hit = (Hit){shape, 0, 0.4f + 0.2f * uniform(random), 0.3f + 0.1f * uniform(random), v3_zero(), 0};
     x.si = attached_of(w, &x);
     e->p = e->hit.p = x.si.p;
@@ -54,7 +55,7 @@ static void gradient_of(const World *w, const Sample *x, float worth, bool paral
     t->scene = &w->scene;
     t->sensor = &w->sensor;
     Sink sink = world_sink(gradient, instance_at);
-    primary_move_adj(t, &x->s, worth, parallel, &sink);
+    primary_move_adj(t, &w->job, &x->s, worth, parallel, &sink);
     free(t);
 }
 
