@@ -69,19 +69,24 @@ static void losses_are_explained(void **state) {
     assert_non_null(strstr(f->out, "(of the last iteration)"));
 }
 
-// What would be found out at the end, or in the first iteration, is told before it.
-static void mistakes_are_told_at_the_start(void **state) {
+// The truth is opened when all is done: what is wrong with it is told then, and the report of what was found is there.
+static void truths_are_opened_last(void **state) {
     Fixture *f = *state;
     write_job(f, "iterations: 2\ntruth: {scene: wide.xml}\n");
     assert_int_equal(system("sed 's/value=\"32\"/value=\"40\"/' " TEST_JOBS "/start.xml >wide.xml"), 0);
-    expect_words(f, 1, "fit job.yaml -o late", "job.yaml:8: wide.xml: sensor 0 delivers 40 x 24, the scene's 32 x 24");
-    assert_int_not_equal(access("late/metrics.jsonl", F_OK), 0);
-    write_job(f, "iterations: 2\ntruth: {scene: nowhere.xml}\n"); // which may come until then
+    expect_words(f, 1, "fit job.yaml -o wide", "job.yaml:8: wide.xml: sensor 0 delivers 40 x 24, the scene's 32 x 24");
+    assert_int_equal(access("wide/report.html", R_OK), 0);
+    write_job(f, "iterations: 2\ntruth: {scene: nowhere.xml}\n");
     expect_words(f, 1, "fit job.yaml -o late", "nowhere.xml: cannot open");
     assert_int_equal(access("late/report.html", R_OK), 0);
     write_words("broken.xml", "<scene version='3.0.0'><shape type='spehre'/></scene>");
     expect_words(f, 1, "fit job.yaml -o broken --set truth.scene=broken.xml", "broken.xml:1:24: there is no shape 'spehre'");
-    assert_int_not_equal(access("broken/metrics.jsonl", F_OK), 0);
+    assert_int_equal(access("broken/report.html", R_OK), 0);
+}
+
+// What would be found out in the first iteration is told before it.
+static void mistakes_are_told_at_the_start(void **state) {
+    Fixture *f = *state;
     write_job(f, "iterations: 2\n");
     expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.7.exposure]'", "the job has no view 7, expected 0");
     expect_words(f, 2, "fit job.yaml -o no --set 'parameters=[views.1.exposure]' --set 'views.1={sensor: 0, target: target.exr, "
@@ -256,6 +261,7 @@ static void mistakes_are_recognised(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses_are_explained),
+        cmocka_unit_test(truths_are_opened_last),
         cmocka_unit_test(mistakes_are_told_at_the_start),
         cmocka_unit_test(refusals_are_those_of_grad),
         cmocka_unit_test(restricted_gradients_say_what_they_lack),
