@@ -239,14 +239,15 @@ KFN Int i_gather_shared(const int32_t *base, Int index) {
 }
 
 // base[index + k] per lane for k = 0, 1, 2, and one entry more is read: arrays have room behind their ends. A load of 16 bytes
-// per lane and a transposition, which take a third of the time of three gathers (Zen 4).
+// per lane and a transposition, which take a third of the time of three gathers (Zen 4). Not inlined: kernels would take twice
+// as long to compile.
 #if LANES == 1
-KFN void f_gather3(const float *base, Int index, Float out[3]) {
+static NOINLINE void f_gather3(const float *base, Int index, Float out[3]) {
     for (int k = 0; k < 3; k++) {
         out[k] = base[index + k];
     }
 }
-KFN void i_gather3(const int32_t *base, Int index, Int out[3]) { memcpy(out, base + index, 3 * sizeof *out); }
+static NOINLINE void i_gather3(const int32_t *base, Int index, Int out[3]) { memcpy(out, base + index, 3 * sizeof *out); }
 #else
 #if LANES == 8
 #define SIMD_ROWS(f) _mm256_##f
@@ -263,7 +264,7 @@ KFN __m512 simd_rows(const float *base, const int32_t *index) {
     return _mm512_insertf32x4(rows, _mm_loadu_ps(base + index[12]), 3);
 }
 #endif
-KFN void f_gather3(const float *base, Int index, Float out[3]) {
+static NOINLINE void f_gather3(const float *base, Int index, Float out[3]) {
     int32_t at[LANES];
     memcpy(at, &index, sizeof at);
     // Blocks of four lanes: rows[k] has what lanes k, k + 4, ... read.
@@ -277,7 +278,7 @@ KFN void f_gather3(const float *base, Int index, Float out[3]) {
     out[1] = (Float)SIMD_ROWS(shuffle_ps)(xy01, xy23, 0xee);
     out[2] = (Float)SIMD_ROWS(shuffle_ps)(z01, z23, 0x44);
 }
-KFN void i_gather3(const int32_t *base, Int index, Int out[3]) {
+static NOINLINE void i_gather3(const int32_t *base, Int index, Int out[3]) {
     Float bits[3];
     f_gather3((const float *)base, index, bits);
     for (int k = 0; k < 3; k++) {
