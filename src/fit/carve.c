@@ -92,7 +92,7 @@ static void voxel_corners(const SceneView *view, const VolumeNode *v, const int6
     }
 }
 
-// Repeated and mirrored voxels have a part beyond the other side of the grid, too.
+// Repeated voxels have a part beyond the other side of the grid, too; mirrored ones next to themselves.
 static bool is_wrapped(const VolumeNode *v, const int64_t at[3]) {
     const int32_t n[3] = {v->nx, v->ny, v->nz};
     bool border = false;
@@ -111,8 +111,11 @@ static int64_t carve_by(const rey_scene *scene, const FitView *view, const Volum
     for (int64_t i = 0; i < voxels; i++) {
         const int64_t at[3] = {i % v->nx, i / v->nx % v->ny, i / v->nx / v->ny};
         double corners[8][3];
+        if (carved[i * channels] || is_wrapped(v, at)) {
+            continue;
+        }
         voxel_corners(&scene->view, v, at, corners);
-        if (!carved[i * channels] && !is_wrapped(v, at) && sees_nothing(view, s, &film, corners)) {
+        if (sees_nothing(view, s, &film, corners)) {
             memset(carved + i * channels, 1, (size_t)channels);
             count++;
         }
@@ -156,9 +159,9 @@ static rey_result carve_grid(Fit *fit, const rey_scene *scene, Unknowns *u, Unkn
         return rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM, "parameter '%s': no voxel is left: of each, some silhouette sees "
                                "nothing", p->name);
     }
+    const float empty = (float)(isfinite(p->low) ? p->low : fmin(0, p->high));
     for (int64_t i = 0; i < p->count; i++) {
-        float *start = u->start + p->offset + i;
-        *start = p->carved[i] ? (float)fmin(fmax(isfinite(p->low) ? p->low : 0, p->low), p->high) : *start;
+        u->start[p->offset + i] = p->carved[i] ? empty : u->start[p->offset + i];
     }
     return REY_OK;
 }
