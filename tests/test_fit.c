@@ -147,7 +147,7 @@ static void test_job_round_trip(void **state) {
     const char *text = HEAD "defines: {big.xml: 1}\n";
     assert_int_not_equal(read_job(f, text, NULL, &job), REY_OK);
     rey_job_free(&job);
-    text = HEAD "defines: {big: 'a: \"b\"'}\nspp: [{from: 0, spp: 4}, {from: 9, spp: 8}]\n"
+    text = HEAD "defines: {big: 'a: \"b\"'}\nspp: [{from: 0, spp: 4}, {from: 9, spp: 8}]\ngradient_spp: 3\n"
                 "optimizer: {type: sgd, schedule: {type: step, every: 7}}\nstop: {window: 5, tolerance: 0.01}\n";
     assert_int_equal(read_job(f, text, "parameters.1={name: b, bounds: [0, .inf], start: [1, 2, 0.1]}", &job), REY_OK);
     assert_int_equal(rey_job_flat(&job, &flat), REY_OK);

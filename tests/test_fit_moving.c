@@ -267,6 +267,7 @@ static void test_level_errors(void **state) {
         {"parameters: [{name: views.1.exposure, parameterisation: rigid}]\n", "an exposure is one number"},
         {"parameters: [{name: views.1.exposure}, {name: 'views.*'}]\n", "names it already"},
         {"optimizer: {type: lbfgs, schedule: cosine}\nparameters: [{name: ball.positions}]\n", "it has no schedule"},
+        {"gradient_spp: 2\noptimizer: {type: lbfgs}\nparameters: [{name: ball.positions}]\n", "no gradient_spp"},
         {"views_per_iteration: 1\noptimizer: {type: lbfgs}\nparameters: [{name: ball.positions}]\n", "all views"},
         {"parameters: [{name: ball.positions, parameterisation: laplacian, regularisers: {length: 1}}]\n", "unknown key"},
     };

@@ -2,7 +2,8 @@
 //
 // Every view of an iteration is rendered twice with independently scrambled samples, A and B, of half the samples each.
 // With the loss's derivative at one half pulled back through the other, (I_A - R) dI_B + (I_B - R) dI_A, no factor of
-// a product shares noise with the other, so that the gradients of the squared losses are unbiased.
+// a product shares noise with the other, so that the gradients of the squared losses are unbiased. With gradient_spp
+// the sum of both derivatives is pulled back through a third set C, (I_A + I_B - 2 R) dI_C; docs/fit.md compares their noise.
 #include "fit/fit.h"
 
 #include "base/parallel.h"
@@ -84,6 +85,8 @@ static rey_result render_half(Fit *fit, const FitView *view, uint32_t set, int s
     return result;
 }
 
+static const uint32_t FIRST_OF_DERIVATIVES = UINT32_C(1) << 31; // of the sets: those of pictures are 2 per iteration
+
 static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int spp, const float *adjoint) {
     rey_render_def def = view_def(fit, view, set, spp);
     rey_selection selection = {fit->unknowns.params, fit->unknowns.param_count};
@@ -121,6 +124,12 @@ static rey_result add_view(Fit *fit, int index, int batch_count, double *loss) {
             rey_loss(fit->job.loss, fit->job.loss_epsilon, &loss_view, fit->a, fit->b, view->weight / batch_count,
                      fit->adjoint_a, fit->adjoint_b);
     rey_exposure_adjoint(fit, index, exposure);
+    if (fit->job.gradient_spp) {
+        for (int64_t i = 0; i < 3 * loss_view.pixels; i++) {
+            fit->adjoint_a[i] += fit->adjoint_b[i];
+        }
+        return add_product(fit, view, FIRST_OF_DERIVATIVES + (uint32_t)iteration, fit->job.gradient_spp, fit->adjoint_a);
+    }
     result = add_product(fit, view, set_a, spp, fit->adjoint_a);
     return result ? result : add_product(fit, view, set_b, spp, fit->adjoint_b);
 }

@@ -257,6 +257,7 @@ static const Field job_fields[] = {
     {.key = "seed", .type = FIELD_SEED, .offset = offsetof(Job, seed), .high = 4294967295.0},
     {.key = "iterations", .type = FIELD_INTEGER, .offset = offsetof(Job, iterations), .high = 1e9},
     {.key = "spp", .type = FIELD_READER, .offset = offsetof(Job, spp), .read = read_spp},
+    {.key = "gradient_spp", .type = FIELD_INTEGER, .offset = offsetof(Job, gradient_spp), .high = 65536},
     {.key = "levels", .type = FIELD_READER, .offset = offsetof(Job, levels), .read = read_levels},
     {.key = "views", .type = FIELD_READER, .offset = offsetof(Job, views), .read = read_views, .required = true},
     {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
@@ -337,6 +338,9 @@ static rey_result check_lbfgs(Job *job) {
     }
     if (job->views_per_iteration && job->views_per_iteration != job->fitted_count) {
         return rey_job_fail(job, node, "lbfgs needs all views in every iteration");
+    }
+    if (job->gradient_spp) {
+        return rey_job_fail(job, node, "lbfgs needs the gradient of the pictures that it compares: it has no gradient_spp");
     }
     return REY_OK;
 }

@@ -110,6 +110,7 @@ typedef struct Job {
     int report_spp;                      // 0 = no report
     JobSpp *spp;
     int spp_count;
+    int gradient_spp; // of samples of their own that pull the loss's derivative back, 0 = the pictures' samples do
     JobLevel *levels; // none = one level of full pictures
     int level_count;
     JobView *views;

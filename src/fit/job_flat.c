@@ -167,6 +167,7 @@ static void flat_decisive(Text *t, const Job *job) {
         snprintf(key, sizeof key, "spp.%d.spp", i);
         line_integer(t, key, job->spp[i].spp);
     }
+    line_integer(t, "gradient_spp", job->gradient_spp);
     for (int i = 0; i < job->level_count; i++) {
         snprintf(key, sizeof key, "levels.%d.from", i);
         line_integer(t, key, job->levels[i].from);
