@@ -201,7 +201,7 @@ rey_result cli_refuse_input(const Session *s, const char *path) {
 // By number or by id; the message lists what there is.
 static rey_result find_sensor(Session *s, int count) {
     const Options *o = s->options;
-    char list[512] = "";
+    char list[512];
     s->sensor = o->sensor_id ? rey_mitsuba_sensor(s->scene, o->sensor_id) : o->sensor;
     if (count == 0) {
         s->sensor = 0; // that there is none, the size of the film tells
@@ -209,11 +209,7 @@ static rey_result find_sensor(Session *s, int count) {
     if (count == 0 || (s->sensor >= 0 && s->sensor < count)) {
         return REY_OK;
     }
-    for (int i = 0; i < count; i++) {
-        size_t used = strlen(list);
-        const char *id = rey_mitsuba_sensor_id(s->scene, i);
-        snprintf(list + used, sizeof list - used, id ? "%s%d is '%s'" : "%s%d has no id", i ? ", " : "", i, id);
-    }
+    rey_mitsuba_list_sensors(s->scene, list, sizeof list);
     return o->sensor_id ? rey_fail(s->ctx, REY_ERROR_ARGUMENT, "--sensor: the scene has no sensor '%s': %s", o->sensor_id, list)
                         : rey_fail(s->ctx, REY_ERROR_ARGUMENT, "--sensor: the scene has %d sensor%s, counted from 0, got %d: %s",
                                    count, PLURAL(count), o->sensor, list);

@@ -129,6 +129,7 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD, "parameters.0.bounds=[1,0]", "--set parameters.0.bounds=[1,0]: bounds: 1 is not below 0");
     expect_error(f, HEAD, "seed=[", "--set seed=[: did not find");
     expect_error(f, HEAD, "views.1.weight=2", "--set views.1.weight=2: views: key 'target' is missing");
+    expect_error(f, HEAD, "views.0.sensor=[0]", "sensor: expected a number from 0 or an id");
     expect_error(f, "scene: a.xml\nviews:\n  - t.exr\n", NULL, "job.yaml:3: views: expected entries such as {sensor: 0,");
     expect_error(f, "parameters: [[a]]\n", NULL, "job.yaml:1: parameters: expected 'key: value' lines");
     expect_error(f, "parameters: ['']\n", NULL, "job.yaml:1: entry: expected a text");
@@ -150,6 +151,7 @@ static void test_job_round_trip(void **state) {
     text = HEAD "defines: {big: 'a: \"b\"'}\nspp: [{from: 0, spp: 4}, {from: 9, spp: 8}]\ngradient_spp: 3\n"
                 "optimizer: {type: sgd, schedule: {type: step, every: 7}}\nstop: {window: 5, tolerance: 0.01}\n";
     assert_int_equal(read_job(f, text, "parameters.1={name: b, bounds: [0, .inf], start: [1, 2, 0.1]}", &job), REY_OK);
+    job.views[0].sensor_id = "side";
     assert_int_equal(rey_job_flat(&job, &flat), REY_OK);
     assert_int_equal(rey_job_yaml(&job, &yaml), REY_OK);
     if (read_job(f, yaml, NULL, &again)) {
@@ -157,6 +159,7 @@ static void test_job_round_trip(void **state) {
     }
     assert_int_equal(rey_job_flat(&again, &flat_again), REY_OK);
     assert_string_equal(flat, flat_again);
+    assert_string_equal(again.views[0].sensor_id, "side");
     assert_int_equal(rey_job_spp_at(&job, 8), 4);
     assert_int_equal(rey_job_spp_at(&job, 9), 8);
     rey_job_free(&again);
@@ -459,7 +462,8 @@ static void test_fit_errors(void **state) {
         {"terms=primary", "--set terms=primary: terms primary: the gradient of red.reflectance.value has no such term, "
                           "expected some of interior"},
         {"views.0.weight=0", "weight = 0, expected 1e-09 to"},
-        {"views.0.sensor=3", "sensor 3 does not exist"},
+        {"views.0.sensor=3", "sensor 3 does not exist: the scene has 1, counted from 0: 0 is 'camera'"},
+        {"views.0.sensor=cam", "--set views.0.sensor=cam: the scene has no sensor 'cam': 0 is 'camera'"},
         {"views.0.mask=nowhere.png", "nowhere.png"},
         {"truth.scene=nowhere.xml", "nowhere.xml"},
     };

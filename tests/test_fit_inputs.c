@@ -222,11 +222,31 @@ static void test_own_result_is_no_scene(void **state) {
     assert_true(stands(f, "out/recovered_data/floor.png"));
 }
 
+// A view's sensor by the name of its parameters; an id is looked up in the same way, in the truth, too.
+static void test_sensor_by_name(void **state) {
+    const Fixture *f = *state;
+    char path[128], other[128], command[400];
+    path_of(f, "scene.xml", path);
+    path_of(f, "named.xml", other);
+    snprintf(command, sizeof command, "sed 's/sensor type=.perspective./& id=\"front\"/' '%s' > '%s'", path, other);
+    assert_int_equal(system(command), 0);
+    assert_int_equal(run_fit(f, OVERWRITE, 1, "views.0.sensor=sensor_0"), REY_ERROR_CANCELLED);
+    assert_int_equal(run_fit(f, RESUME, 9, "views.0.sensor=sensor_0"), REY_OK);
+    static const char named[] = "scene: named.xml\niterations: 1\nspp: 4\nviews: [{sensor: front, target: target_0.exr}]\n"
+                                "parameters: [paint.reflectance.value]\ntruth: {scene: truth.xml}\n";
+    assert_int_equal(write_text(f, "job.yaml", named), 0);
+    assert_int_equal(run_fit(f, OVERWRITE, 9, "truth.scene=named.xml"), REY_OK);
+    assert_int_equal(run_fit(f, OVERWRITE, 9, NULL), REY_ERROR_SCENE);
+    assert_non_null(strstr(rey_error(f->ctx), "job.yaml:6: truth.xml: sensor 0 is not 'front' as in the scene: 0 has no id"));
+    assert_int_equal(write_text(f, "job.yaml", JOB), 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_changed_inputs),         cmocka_unit_test(test_any_lanes),
         cmocka_unit_test(test_differences_are_named),  cmocka_unit_test(test_nothing_stale),
         cmocka_unit_test(test_foreign_folder),         cmocka_unit_test(test_own_result_is_no_scene),
+        cmocka_unit_test(test_sensor_by_name),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

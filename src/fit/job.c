@@ -101,10 +101,22 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
     return result;
 }
 
+// By number or by id, as --sensor.
+static rey_result read_sensor(Job *job, const YamlNode *node, void *target) {
+    static const Field number = {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6};
+    double value;
+    if (rey_job_is_real(node, &value)) {
+        return rey_job_read_field(job, &number, node, target);
+    }
+    bool text = node->kind == YAML_SCALAR && node->text && node->text[0];
+    return text ? rey_job_read_text(job, node, &((JobView *)target)->sensor_id)
+                : rey_job_fail(job, node, "sensor: expected a number from 0 or an id");
+}
+
 static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     static const char *const truths[] = {"false", "true", NULL};
     static const Field fields[] = {
-        {.key = "sensor", .type = FIELD_INTEGER, .offset = offsetof(JobView, sensor), .high = 1e6},
+        {.key = "sensor", .type = FIELD_READER, .read = read_sensor},
         {.key = "target", .type = FIELD_TEXT, .offset = offsetof(JobView, target), .required = true},
         {.key = "mask", .type = FIELD_TEXT, .offset = offsetof(JobView, mask)},
         {.key = "silhouette", .type = FIELD_TEXT, .offset = offsetof(JobView, silhouette)},

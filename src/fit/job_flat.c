@@ -105,7 +105,11 @@ static void flat_views(Text *t, const Job *job) {
     for (int i = 0; i < job->view_count; i++) {
         const JobView *v = &job->views[i];
         snprintf(key, sizeof key, "views.%d.sensor", i);
-        line_integer(t, key, v->sensor);
+        if (v->sensor_id) {
+            line_text(t, key, v->sensor_id);
+        } else {
+            line_integer(t, key, v->sensor);
+        }
         snprintf(key, sizeof key, "views.%d.target", i);
         line_text(t, key, v->target);
         snprintf(key, sizeof key, "views.%d.weight", i);

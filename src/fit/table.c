@@ -308,7 +308,15 @@ static rey_result weigh_rows(Fit *fit, rey_scene *truth, const float *ones, FitR
 static rey_result check_films(Fit *fit, const rey_scene *truth) {
     for (int v = 0; v < fit->job.view_count; v++) {
         const FitView *view = &fit->views[v];
+        const char *id = fit->job.views[v].sensor_id;
         int width, height;
+        if (id && rey_mitsuba_sensor(truth, id) != view->sensor) {
+            char list[512];
+            rey_mitsuba_list_sensors(truth, list, sizeof list);
+            return rey_job_fail_at(&fit->job, fit->job.truth_at, REY_ERROR_SCENE,
+                                   "%s: sensor %d is not '%.100s' as in the scene: %s", fit->job.truth_scene, view->sensor, id,
+                                   list);
+        }
         rey_result result = rey_scene_film_size(truth, view->sensor, &width, &height);
         if (result) {
             return result;

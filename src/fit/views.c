@@ -1,6 +1,7 @@
 // views.c: target pictures and masks, and what they must agree with.
 #include "fit/carve.h"
 #include "io/image.h"
+#include "io/mitsuba.h"
 
 #include <math.h>
 
@@ -59,11 +60,26 @@ static rey_result keep_full(Fit *fit, const JobView *job_view, FitView *view) {
     return had ? rey_levels_check(fit, job_view, view) : REY_ERROR_MEMORY;
 }
 
+// The sensor that a view names, and the size of its film. Where there is none of that name, the message says which there are.
+static rey_result find_sensor(Fit *fit, const JobView *job_view, FitView *view) {
+    char list[512];
+    view->sensor = job_view->sensor_id ? rey_mitsuba_sensor(fit->scene, job_view->sensor_id) : job_view->sensor;
+    if (rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height) == REY_OK) {
+        return REY_OK;
+    }
+    rey_mitsuba_list_sensors(fit->scene, list, sizeof list);
+    return job_view->sensor_id && list[0]
+               ? rey_job_fail_at(&fit->job, job_view->sensor_at, REY_ERROR_FORMAT, "the scene has no sensor '%.100s': %s",
+                                 job_view->sensor_id, list)
+               : rey_job_fail_at(&fit->job, job_view->sensor_at, REY_ERROR_FORMAT, list[0] ? "%s: %s" : "%s",
+                                 rey_error(fit->ctx), list);
+}
+
 static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
-    *view = (FitView){.sensor = job_view->sensor, .weight = job_view->weight};
-    rey_result result = rey_scene_film_size(fit->scene, view->sensor, &view->width, &view->height);
+    *view = (FitView){.weight = job_view->weight};
+    rey_result result = find_sensor(fit, job_view, view);
     if (result) {
-        return rey_job_fail_at(&fit->job, job_view->sensor_at, REY_ERROR_FORMAT, "%s", rey_error(fit->ctx));
+        return result;
     }
     rey_image image = {0};
     result = rey_view_picture(fit, job_view->target_at, view, job_view->target, &image);

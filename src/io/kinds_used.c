@@ -117,3 +117,12 @@ const char *rey_mitsuba_sensor_id(const rey_scene *scene, int index) {
     }
     return NULL;
 }
+
+void rey_mitsuba_list_sensors(const rey_scene *scene, char *text, size_t size) {
+    text[0] = 0;
+    for (int i = 0; i < (int)scene->view.sensors_count; i++) {
+        size_t used = strlen(text);
+        const char *id = rey_mitsuba_sensor_id(scene, i);
+        snprintf(text + used, size - used, id ? "%s%d is '%s'" : "%s%d has no id", i ? ", " : "", i, id);
+    }
+}

@@ -32,6 +32,8 @@ rey_result rey_mitsuba_reads(const rey_scene *scene, const char *beginning, char
 // Index of the sensor of this id, -1 where there is none; the id of sensor `index`, null where it has none.
 int rey_mitsuba_sensor(const rey_scene *scene, const char *id);
 const char *rey_mitsuba_sensor_id(const rey_scene *scene, int index);
+// "0 is 'front', 1 has no id": what there is, for messages.
+void rey_mitsuba_list_sensors(const rey_scene *scene, char *text, size_t size);
 
 // Whether a scene reads a file: its own one, what it includes, meshes, pictures, spectra and the like.
 rey_result rey_mitsuba_reads_file(const rey_scene *scene, const char *path, bool *reads);
