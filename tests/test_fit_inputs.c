@@ -222,6 +222,22 @@ static void test_own_result_is_no_scene(void **state) {
     assert_true(stands(f, "out/recovered_data/floor.png"));
 }
 
+// The job that a fit writes down goes on where that fit wrote, which is not where its own job says.
+static void test_resolved_output(void **state) {
+    const Fixture *f = *state;
+    char job[128];
+    FitResult result;
+    int stop = 9;
+    assert_int_equal(run_fit(f, OVERWRITE, 2, "output=elsewhere"), REY_ERROR_CANCELLED);
+    path_of(f, "out/job.resolved.yaml", job);
+    FitDef def = {.job_path = job, .resume = true, .progress = stop_at, .user = &stop};
+    assert_int_equal(rey_fit(f->ctx, &def, &result), REY_OK);
+    assert_int_equal(result.iterations_before, 2);
+    assert_non_null(strstr(result.output, "/out"));
+    rey_fit_result_free(&result);
+    assert_true(stands(f, "out/report.html") && !stands(f, "elsewhere"));
+}
+
 // A view's sensor by the name of its parameters; an id is looked up in the same way, in the truth, too.
 static void test_sensor_by_name(void **state) {
     const Fixture *f = *state;
@@ -246,7 +262,7 @@ int main(void) {
         cmocka_unit_test(test_changed_inputs),         cmocka_unit_test(test_any_lanes),
         cmocka_unit_test(test_differences_are_named),  cmocka_unit_test(test_nothing_stale),
         cmocka_unit_test(test_foreign_folder),         cmocka_unit_test(test_own_result_is_no_scene),
-        cmocka_unit_test(test_sensor_by_name),
+        cmocka_unit_test(test_resolved_output),        cmocka_unit_test(test_sensor_by_name),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

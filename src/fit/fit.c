@@ -8,9 +8,11 @@
 #include "fit/rigid.h"
 #include "io/file.h"
 
+#include <limits.h>
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -27,9 +29,23 @@ char *rey_fit_output_path(const Fit *fit, const char *name) {
     return path;
 }
 
+// The job that is written down writes where this fit does, which -o may have moved.
+static rey_result resolve_output(Fit *fit) {
+    char absolute[PATH_MAX], *kept;
+    if (!fit->def->output || !realpath(fit->output, absolute)) {
+        return REY_OK;
+    }
+    kept = rey_job_alloc(&fit->job, strlen(absolute) + 1, 1);
+    fit->job.output = kept ? strcpy(kept, absolute) : fit->job.output;
+    return kept ? REY_OK : REY_ERROR_MEMORY;
+}
+
 static rey_result write_resolved(Fit *fit) {
     char *text = NULL, *path = rey_fit_output_path(fit, "job.resolved.yaml");
-    rey_result result = path ? rey_job_yaml(&fit->job, &text) : REY_ERROR_MEMORY;
+    rey_result result = path ? resolve_output(fit) : REY_ERROR_MEMORY;
+    if (!result) {
+        result = rey_job_yaml(&fit->job, &text);
+    }
     if (!result) {
         result = rey_file_write(fit->ctx, path, text, strlen(text));
     }
