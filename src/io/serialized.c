@@ -257,26 +257,61 @@ static rey_result read_header(SerializedReader *r, int *version) {
     return REY_OK;
 }
 
-// Moves to the mesh of this index by the list of offsets at the end of the file.
-static rey_result find_shape(SerializedReader *r, int version, int shape_index) {
-    int64_t width = version == 3 ? 4 : 8;
-    int64_t count = r->size >= 4 ? (int64_t)load(r->bytes + r->size - 4, 4) : 0;
-    if (shape_index >= count) {
-        return fail(r, r->size - 4, "the file has %lld mesh%s, expected more than the shape index %d", (long long)count,
-                    count == 1 ? "" : "es", shape_index);
+// The list of offsets at the end of the file, behind byte `from`.
+typedef struct MeshList {
+    int64_t begin, count, width; // of an entry
+} MeshList;
+
+static rey_result find_list(SerializedReader *r, int version, int64_t from, MeshList *list) {
+    list->width = version == 3 ? 4 : 8;
+    list->count = r->size - from >= 4 ? (int64_t)load(r->bytes + r->size - 4, 4) : 0;
+    list->begin = r->size - 4 - list->count * list->width;
+    if (list->count == 0) {
+        return fail(r, r->size, "the file ends without the list of its meshes, or within it");
     }
-    int64_t list = r->size - 4 - count * width;
-    if (list < HEADER_BYTES) {
-        return fail(r, r->size - 4, "a list of %lld meshes does not fit the file", (long long)count);
+    return list->begin >= from ? REY_OK
+                               : fail(r, r->size - 4, "a list of %lld meshes does not fit the file, which ends without its list or "
+                                                      "within it", (long long)list->count);
+}
+
+// Where the list says that a mesh begins.
+static rey_result mesh_offset(SerializedReader *r, MeshList list, int64_t index, int64_t *out) {
+    int64_t entry = list.begin + index * list.width;
+    uint64_t at = load(r->bytes + entry, (int)list.width);
+    if (at + HEADER_BYTES > (uint64_t)list.begin || at > (uint64_t)list.begin) {
+        return fail(r, entry, "offset %llu of mesh %lld is out of range, expected less than %lld", (unsigned long long)at,
+                    (long long)index, (long long)list.begin);
     }
-    uint64_t at = load(r->bytes + list + shape_index * width, (int)width);
-    if (at >= (uint64_t)list) {
-        return fail(r, list + shape_index * width, "offset %llu of mesh %d is out of range, expected less than %lld",
-                    (unsigned long long)at, shape_index, (long long)list);
-    }
-    r->at = (int64_t)at;
-    r->end = list;
+    *out = (int64_t)at;
     return REY_OK;
+}
+
+// Moves to the mesh of this index.
+static rey_result find_shape(SerializedReader *r, int version, int shape_index) {
+    MeshList list;
+    rey_result result = find_list(r, version, r->at, &list);
+    if (result == REY_OK && shape_index >= list.count) {
+        return fail(r, r->size - 4, "the file has %lld mesh%s, expected more than the shape index %d", (long long)list.count,
+                    list.count == 1 ? "" : "es", shape_index);
+    }
+    result = result == REY_OK ? mesh_offset(r, list, shape_index, &r->at) : result;
+    r->end = result == REY_OK ? list.begin : r->end;
+    return result;
+}
+
+// The first mesh is found without the list, but a file that lost it has lost other meshes, too.
+static rey_result check_list(SerializedReader *r, int version) {
+    MeshList list;
+    rey_result result = find_list(r, version, offset(r), &list);
+    for (int64_t i = 0; i < list.count && result == REY_OK; i++) {
+        int64_t at;
+        result = mesh_offset(r, list, i, &at);
+        if (result == REY_OK && load(r->bytes + at, 2) != MAGIC) {
+            result = fail(r, list.begin + i * list.width, "no mesh begins at offset %lld of mesh %lld: the list of meshes is "
+                                                          "damaged", (long long)at, (long long)i);
+        }
+    }
+    return result;
 }
 
 static voidpf zlib_alloc(voidpf ctx, uInt count, uInt size) {
@@ -305,7 +340,7 @@ static rey_result read_shape(SerializedReader *r, int shape_index, rey_mesh *mes
     }
     result = read_stream(r, version, mesh);
     inflateEnd(&r->stream);
-    return result;
+    return result == REY_OK && shape_index == 0 ? check_list(r, version) : result;
 }
 
 rey_result rey_mesh_read_serialized_memory(rey_context *ctx, const char *name, const void *bytes, size_t size,
