@@ -3,6 +3,7 @@
 
 #include "io/number.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const XmlTag tags[] = {
@@ -37,9 +38,19 @@ static const char *next_tag(void *user, int i) {
     return i < COUNT_OF(tags) ? tags[i].name : NULL;
 }
 
+// The attributes of an element: those of its tag, and one more of the root.
+typedef struct Known {
+    const XmlTag *tag;
+    const char *extra; // or null
+} Known;
+
 static const char *next_attribute(void *user, int i) {
-    const XmlTag *tag = user;
-    return i < COUNT_OF(tag->attributes) ? tag->attributes[i] : NULL;
+    const Known *known = user;
+    int count = 0;
+    while (count < COUNT_OF(known->tag->attributes) && known->tag->attributes[count]) {
+        count++;
+    }
+    return i < count ? known->tag->attributes[i] : i == count ? known->extra : NULL;
 }
 
 rey_xml_position rey_xml_element_position(const XmlFile *file) {
@@ -111,28 +122,41 @@ const XmlAttribute *rey_xml_attribute_named(const XmlAttributes *attributes, con
     return NULL;
 }
 
-static bool takes(const XmlTag *tag, const char *name) {
-    const char *known;
-    for (int i = 0; (known = next_attribute((void *)tag, i)); i++) {
-        if (strcmp(known, name) == 0) {
+static bool takes(Known *known, const char *name) {
+    const char *one;
+    for (int i = 0; (one = next_attribute(known, i)); i++) {
+        if (strcmp(one, name) == 0) {
             return true;
         }
     }
     return false;
 }
 
+// An attribute that the element does not take, with the nearest that it does, or with all of them where none is near.
+static rey_result unknown_attribute(const XmlFile *file, Known *known, const char *name) {
+    char list[128] = "";
+    const char *one, *inner = known->tag->class == XML_OBJECT ? "; properties are elements within it" : "";
+    for (int i = 0; (one = next_attribute(known, i)) && !rey_nearest_word(name, next_attribute, known); i++) {
+        size_t used = strlen(list);
+        const char *before = !i ? ", expected " : next_attribute(known, i + 1) ? ", " : " or ";
+        snprintf(list + used, sizeof list - used, "%s%s", before, one);
+    }
+    return rey_xml_fail_word(file->reader->ctx, attribute_position(file, name), name, next_attribute, known,
+                             "unknown attribute '%.100s' of <%s>%s%s", name, known->tag->name, list, list[0] ? inner : "");
+}
+
 rey_result rey_xml_take_attributes(XmlFile *file, const XmlTag *tag, const char *extra, const char **given,
                                    XmlAttributes *out) {
     rey_context *ctx = file->reader->ctx;
+    Known known = {tag, extra};
     out->count = 0;
     for (; given[0]; given += 2) {
         const char *name = given[0];
         if (file->version[0] < 2 && strcmp(name, "intent") == 0 && tag->class == XML_VALUE) {
             continue; // of version 0.x: the plugin decides what a colour is meant as
         }
-        if (!takes(tag, name) && !(extra && strcmp(extra, name) == 0)) {
-            return rey_xml_fail_word(ctx, attribute_position(file, name), name, next_attribute, (void *)tag,
-                                     "unknown attribute '%.100s' of <%s>", name, tag->name);
+        if (!takes(&known, name)) {
+            return unknown_attribute(file, &known, name);
         }
         XmlAttribute *item = &out->items[out->count++];
         item->name = name;
