@@ -8,6 +8,7 @@
 #include "npy.h"
 
 #include "base/context.h"
+#include "scene/absent.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -255,9 +256,10 @@ static rey_result find_param(rey_context *ctx, rey_scene *scene, const char *spe
                             *name, mesh, spec[length] ? spec + length + 1 : "translate=1,0,0");
         }
     }
-    const char *nearest = rey_param_nearest(scene, *name);
-    return rey_fail(ctx, REY_ERROR_ARGUMENT, "unknown parameter '%s'%s%s%s", *name, nearest ? ", did you mean '" : "",
-                    nearest ? nearest : "", nearest ? "'?" : "; 'reynolds params' lists them");
+    char absent[ABSENT_BYTES];
+    rey_param_absent(scene, *name, absent);
+    return rey_fail(ctx, REY_ERROR_ARGUMENT, "unknown parameter '%s'%s", *name,
+                    absent[0] ? absent : "; 'reynolds params' lists them");
 }
 
 // What a float cannot hold would be infinite, or be answered by 0.

@@ -4,6 +4,7 @@
 
 #include "base/context.h"
 #include "io/image.h"
+#include "scene/absent.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -42,9 +43,9 @@ static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name,
     snprintf(text, sizeof text, "%.*s", (int)length, name);
     int param = rey_param_find(scene, text);
     if (param < 0) {
-        const char *nearest = rey_param_nearest(scene, text);
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s: the scene has no parameter '%s'%s%s%s", path, text,
-                        nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
+        char absent[ABSENT_BYTES];
+        rey_param_absent(scene, text, absent);
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s: the scene has no parameter '%s'%s", path, text, absent);
     }
     rey_result result = rey_param_get_info(scene, param, &info);
     float *values = result ? NULL : rey_alloc_array(ctx, (size_t)info.count, sizeof *values);

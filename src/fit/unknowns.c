@@ -3,7 +3,7 @@
 #include "fit/lbfgs.h"
 #include "fit/rigid.h"
 #include "io/image.h"
-#include "scene/scene.h"
+#include "scene/absent.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -368,10 +368,9 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
     if (!strchr(p->name, '*')) {
         int param = rey_param_find(scene, p->name);
         if (param < 0) {
-            const char *nearest = rey_param_nearest(scene, p->name);
-            char why[512];
-            snprintf(why, sizeof why, "the scene has none of this name%s%s%s", nearest ? ", did you mean '" : "",
-                     nearest ? nearest : "", nearest ? "'?" : "");
+            char absent[ABSENT_BYTES], why[ABSENT_BYTES + 32];
+            rey_param_absent(scene, p->name, absent);
+            snprintf(why, sizeof why, "the scene has none of this name%s", absent);
             return fail_at(job, p, p->name, why);
         }
         return add_unknown(job, scene, param, p, index, owners, u);

@@ -1,6 +1,8 @@
 // values.c: the values of one scene's parameters for another scene, by name.
 #include "scene/values.h"
 
+#include "scene/absent.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -43,12 +45,12 @@ static rey_result find_own(const rey_scene *scene, const rey_scene *from, int pa
     const Param *p = &ARRAY_AT(from->params, Param, param);
     *own = find_by_names(scene, from, param);
     if (*own < 0) {
-        const char *nearest = rey_param_nearest(scene, p->name);
+        char absent[ABSENT_BYTES];
+        rey_param_absent(scene, p->name, absent);
         return is_computed(scene, p) ? REY_OK
                                      : rey_fail(scene->ctx, REY_ERROR_PARAM,
-                                                "%s: the scene has no parameter '%s', which this file has%s%s%s", path,
-                                                p->name, nearest ? ", did you mean '" : "", nearest ? nearest : "",
-                                                nearest ? "'?" : "");
+                                                "%s: the scene has no parameter '%s', which this file has%s", path, p->name,
+                                                absent);
     }
     const Param *q = &ARRAY_AT(scene->params, Param, *own);
     if (q->dims != p->dims || memcmp(q->shape, p->shape, sizeof *q->shape * (size_t)q->dims) != 0) {

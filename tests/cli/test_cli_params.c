@@ -10,6 +10,13 @@ static int count_words(const char *text, const char *words) {
     return count;
 }
 
+static void write_file(const char *name, const char *text) {
+    FILE *file = fopen(name, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
 static const JsonNode *find_param(const JsonNode *node, const char *name) {
     for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
         if (!strcmp(json_text(p, "name", ""), name)) {
@@ -104,6 +111,42 @@ static void refusals_name_objects(void **state) {
         expect_said(f, 1, "grad objects.xml --param box.to_world:translate=1,0,0 --spp 1", scenes[i][1]);
     }
     expect_said(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16", "as 'floor' and 'wall' do");
+}
+
+// What other renderers list for a shape, and this one does not: the message says why.
+static void absent_parameters_are_explained(void **state) {
+    Fixture *f = *state;
+    static const char *const cases[][2] = {
+        {"box.normals", "rectangles and cubes have flat faces without vertex normals"},
+        {"box.vertex_normals", "meshes of obj, ply or serialized have some"},
+        {"box.texcoords", "those of rectangles and cubes are what they are"},
+        {"ball.vertex_positions", "it has no vertices; its to_world moves it"},
+        {"ball.normals", "its normals are those of its surface"},
+        {"ball.texcoords", "its texture coordinates are those of its surface"},
+        {"flat.normals", "the faces of this mesh are flat and have no vertex normals"},
+        {"flat.texcoords", "this mesh has no texture coordinates"},
+        {"flat.faces", "which vertices a triangle joins is no number that could change a little"},
+    };
+    static const char scene[] =
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective' id='camera'><film type='hdrfilm'><integer "
+        "name='width' value='4'/><integer name='height' value='4'/></film></sensor><emitter type='constant'/>"
+        "<shape type='cube' id='box'/><shape type='sphere' id='ball'/><shape type='obj' id='flat'><string name='filename' "
+        "value='%s'/><boolean name='face_normals' value='true'/></shape></scene>";
+    write_file("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    char text[1024], arguments[256], expected[256];
+    snprintf(text, sizeof text, scene, "flat.obj");
+    write_file("shapes.xml", text);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        snprintf(arguments, sizeof arguments, "grad shapes.xml --param %s", cases[i][0]);
+        snprintf(expected, sizeof expected, "unknown parameter '%s': ", cases[i][0]);
+        expect_said(f, 2, arguments, expected);
+        expect_said(f, 2, arguments, cases[i][1]);
+    }
+    expect_said(f, 2, "render shapes.xml -o a.exr --load box.normals=a.npy", "no parameter 'box.normals': rectangles and cubes");
+    write_file("shapes.yaml", "scene: shapes.xml\nviews: [{target: a.exr}]\nparameters: [flat.to_world]\n");
+    expect(f, 0, "render shapes.xml -o a.exr --spp 1");
+    expect_said(f, 1, "fit shapes.yaml", "shapes.yaml:3: parameter 'flat.to_world': the scene has none of this name: meshes have "
+                                         "no pose of their own; their positions move");
 }
 
 // Patterns stand for the parameters that move nothing, with an operation for those that it fits.
@@ -202,6 +245,7 @@ int main(void) {
         cmocka_unit_test(reasons_are_said_once),
         cmocka_unit_test(answers_are_those_of_one),
         cmocka_unit_test(refusals_name_objects),
+        cmocka_unit_test(absent_parameters_are_explained),
         cmocka_unit_test(patterns_choose),
         cmocka_unit_test(suggestions_are_listed),
         cmocka_unit_test(terms_that_do_not_exist_are_errors),

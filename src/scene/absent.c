@@ -1,0 +1,57 @@
+// absent.c: what is said of a parameter that a scene does not have. Other renderers give shapes more, or other, parameters.
+#include "scene/absent.h"
+
+#include <stdio.h>
+#include <string.h>
+
+// The shape that an object's name stands for, null where it is none.
+static const ShapeRecord *shape_named(const rey_scene *scene, const char *object) {
+    static const char *const leaves[] = {"positions", "to_world"};
+    char name[1024];
+    for (int i = 0; i < COUNT_OF(leaves); i++) {
+        snprintf(name, sizeof name, "%s.%s", object, leaves[i]);
+        int param = rey_param_find(scene, name);
+        const Param *p = param >= 0 ? &ARRAY_AT(scene->params, Param, param) : NULL;
+        if (p && p->geometry >= 0) {
+            return scene->view.shapes + p->geometry;
+        }
+    }
+    return NULL;
+}
+
+// Why a shape has no parameter of this name, null where that is not known.
+static const char *reason(const ShapeRecord *shape, const char *leaf) {
+    bool mesh = shape->triangle_count > 0, posed = shape->to_world >= 0;
+    leaf += strncmp(leaf, "vertex_", 7) == 0 ? 7 : 0; // older names
+    if (strcmp(leaf, "to_world") == 0) {
+        return mesh ? "meshes have no pose of their own; their positions move, or the to_world of an instance" : NULL;
+    }
+    if (strcmp(leaf, "positions") == 0) {
+        return mesh ? NULL : "it has no vertices; its to_world moves it";
+    }
+    if (strcmp(leaf, "normals") == 0) {
+        return !mesh   ? "it has no vertices, and its normals are those of its surface"
+               : posed ? "rectangles and cubes have flat faces without vertex normals; meshes of obj, ply or serialized have some"
+                       : "the faces of this mesh are flat and have no vertex normals";
+    }
+    if (strcmp(leaf, "texcoords") == 0) {
+        return !mesh   ? "it has no vertices, and its texture coordinates are those of its surface"
+               : posed ? "those of rectangles and cubes are what they are; the to_uv of a texture moves it"
+                       : "this mesh has no texture coordinates";
+    }
+    return strcmp(leaf, "faces") == 0 ? "which vertices a triangle joins is no number that could change a little" : NULL;
+}
+
+void rey_param_absent(const rey_scene *scene, const char *name, char text[ABSENT_BYTES]) {
+    char object[1024];
+    const char *dot = strrchr(name, '.');
+    snprintf(object, sizeof object, "%.*s", dot ? (int)(dot - name) : 0, name);
+    const ShapeRecord *shape = dot ? shape_named(scene, object) : NULL;
+    const char *why = shape ? reason(shape, dot + 1) : NULL, *nearest = why ? NULL : rey_param_nearest(scene, name);
+    text[0] = 0;
+    if (why) {
+        snprintf(text, ABSENT_BYTES, ": %s", why);
+    } else if (nearest) {
+        snprintf(text, ABSENT_BYTES, ", did you mean '%.600s'?", nearest);
+    }
+}
