@@ -58,7 +58,8 @@ rey_result build_copy_mesh(Builder *b, const rey_mesh *mesh, int32_t id, const c
                        .why = moving_why, .geometry = id};
     Param normals = {PARAM_DEFAULTS, .description = "vertex normals", .terms = GEOMETRY_TERMS, .why = normals_why, .normals = id};
     Param uvs = {PARAM_DEFAULTS, .description = "texture coordinates", .terms = 0,
-                 .why = "texture coordinates are not parameters of the derivative yet"};
+                 .why = "what the texture coordinates of vertices change is not computed; the to_uv of a texture, which moves all "
+                        "of it, has a derivative"};
     shape->vertex_count = (int32_t)v;
     shape->triangle_count = (int32_t)f;
     TRY(vertex_param(b, path, "positions", "vertex_positions", v, 3, positions, &shape->positions));

@@ -133,6 +133,7 @@ static void absent_parameters_are_explained(void **state) {
         "<shape type='cube' id='box'/><shape type='sphere' id='ball'/><shape type='obj' id='flat'><string name='filename' "
         "value='%s'/><boolean name='face_normals' value='true'/></shape></scene>";
     write_file("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write_file("uv.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
     char text[1024], arguments[256], expected[256];
     snprintf(text, sizeof text, scene, "flat.obj");
     write_file("shapes.xml", text);
@@ -147,6 +148,19 @@ static void absent_parameters_are_explained(void **state) {
     expect(f, 0, "render shapes.xml -o a.exr --spp 1");
     expect_said(f, 1, "fit shapes.yaml", "shapes.yaml:3: parameter 'flat.to_world': the scene has none of this name: meshes have "
                                          "no pose of their own; their positions move");
+    // texture coordinates that are listed are refused by params, grad and check in the same words
+    snprintf(text, sizeof text, scene, "uv.obj");
+    write_file("shapes.xml", text);
+    static const char refusal[] = "flat.texcoords is not differentiable: what the texture coordinates of vertices change is not "
+                                  "computed; the to_uv of a texture, which moves all of it, has a derivative";
+    expect_said(f, 1, "grad shapes.xml --param flat.texcoords", refusal);
+    expect_said(f, 1, "grad shapes.xml --param flat.vertex_texcoords --terms interior", refusal);
+    expect_said(f, 1, "check shapes.xml --param flat.texcoords", refusal);
+    JsonNode *node = run_json(f, 0, "params shapes.xml --json");
+    const JsonNode *texcoords = find_param(node, "flat.texcoords");
+    assert_string_equal(json_text(texcoords, "refused", ""), refusal);
+    assert_null(json_get(texcoords, "terms")->first);
+    json_free(node);
 }
 
 // Patterns stand for the parameters that move nothing, with an operation for those that it fits.
