@@ -297,7 +297,9 @@ static void test_raw_types(void **state) {
 
 static void test_round_trips(void **state) {
     UNUSED(state);
-    static const char *const names[] = {"view.R", "view.G", "view.B"};
+    static const char *const names[] = {"a_view_with_a_name_of_many_characters.R", "a_view_with_a_name_of_many_characters.G",
+                                        "a_view_with_a_name_of_many_characters.B"};
+    static const char *const twice[] = {"view.R", "view.R", "view.B"};
     char path[64];
     float data[W * H * 3];
     rey_image image;
@@ -330,6 +332,9 @@ static void test_round_trips(void **state) {
         rey_image_free(ctx, &image);
         unlink(path);
     }
+    assert_int_equal(rey_exr_write(ctx, "twice.exr", data, W, H, 3, twice), REY_ERROR_FORMAT); // and does not wait for itself
+    assert_non_null(strstr(rey_error(ctx), "twice.exr: cannot be written: "));
+    assert_int_not_equal(access("twice.exr", F_OK), 0);
     rey_context_destroy(ctx);
 }
 

@@ -99,6 +99,8 @@ static void test_integrators(void **state) {
         {"<integrator type='depth'/>", REY_OK, ""},
         {"<integrator type='aov'><string name='aovs' value='a:depth'/></integrator>", REY_OK, ""},
         {"<integrator type='aov'/>", REY_ERROR_SCENE, "aovs"},
+        {"<integrator type='aov'><string name='aovs' value='a:depth, a:depth'/></integrator>", REY_ERROR_SCENE,
+         "two channels have the name 'a.T'"},
         {"<integrator type='aov'><string name='aovs' value='a:dept'/></integrator>", REY_ERROR_SCENE,
          "there is no quantity 'dept', did you mean 'depth'?"},
         {"<integrator type='aov'><string name='aovs' value='depth'/></integrator>", REY_ERROR_SCENE,

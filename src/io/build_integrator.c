@@ -92,10 +92,15 @@ static rey_result get_ignored(Builder *b, rey_xml_node *node) {
 
 // ---- channels --------------------------------------------------------------------------------------------------------
 
-static rey_result add_channel(Builder *b, const char *prefix, const char *name, char letter, int32_t source,
-                              int32_t component) {
+static rey_result add_channel(Builder *b, const rey_xml_node *node, const char *prefix, const char *name, char letter,
+                              int32_t source, int32_t component) {
     char text[256];
     snprintf(text, sizeof text, "%s%s.%c", prefix, name, letter);
+    for (size_t i = 0; i < b->scene->channels.count; i++) {
+        if (strcmp(ARRAY_AT(b->scene->channels, Channel, i).name, text) == 0) {
+            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "two channels have the name '%s'", text);
+        }
+    }
     Channel *channel = rey_array_push(b->ctx, &b->scene->channels, sizeof *channel, 1);
     if (!channel) {
         return REY_ERROR_MEMORY;
@@ -122,7 +127,7 @@ static rey_result add_aov(Builder *b, const rey_xml_node *node, const char *name
     }
     view->aovs[view->aov_count++] = kind;
     for (int32_t c = 0; c < aov_components(kind); c++) {
-        TRY(add_channel(b, "", name, components[kind][c], CHANNEL_AOV, first + c));
+        TRY(add_channel(b, node, "", name, components[kind][c], CHANNEL_AOV, first + c));
     }
     return REY_OK;
 }
@@ -179,10 +184,10 @@ static rey_result nested_channels(Builder *b, const rey_xml_node *node, const re
     const char *name = nested->name ? nested->name : "_arg_0";
     bool moment = is(node, "moment");
     for (int32_t c = 0; c < 3 && !moment; c++) {
-        TRY(add_channel(b, "", name, "RGB"[c], CHANNEL_COLOUR, c));
+        TRY(add_channel(b, node, "", name, "RGB"[c], CHANNEL_COLOUR, c));
     }
     for (int32_t c = 0; c < 6 && moment; c++) {
-        TRY(add_channel(b, c < 3 ? "" : "m2_", name, "XYZ"[c % 3], c < 3 ? CHANNEL_MEAN : CHANNEL_SECOND, c % 3));
+        TRY(add_channel(b, node, c < 3 ? "" : "m2_", name, "XYZ"[c % 3], c < 3 ? CHANNEL_MEAN : CHANNEL_SECOND, c % 3));
     }
     b->scene->view.moments = moment;
     return moment || b->scene->view.colour_is_depth ? REY_OK : add_aov(b, node, name, AOV_ALPHA);

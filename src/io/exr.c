@@ -33,6 +33,13 @@ static void on_error(exr_const_context_t file, exr_result_t code, const char *me
     }
 }
 
+// While it writes, the core calls its handler with the lock held that exr_get_user_data waits for: the code must do.
+static void on_write_error(exr_const_context_t file, exr_result_t code, const char *message) {
+    UNUSED(file);
+    UNUSED(code);
+    UNUSED(message);
+}
+
 static int64_t on_size(exr_const_context_t file, void *user) {
     UNUSED(file);
     return (int64_t)((Stream *)user)->size;
@@ -74,7 +81,7 @@ static rey_result failed(Stream *s, exr_result_t code) {
     }
     return s->in ? rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: broken, or cut off after %zu bytes: %s; expected a whole OpenEXR file",
                             s->name, s->size, message)
-                 : rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: %s", s->name, message);
+                 : rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: cannot be written: %s", s->name, message);
 }
 
 // Which channels of the file become the picture's: R G B, or X Y Z, or Y, or (layer.)R G B, or all.
@@ -283,6 +290,15 @@ static void sort_channels(int channels, const char *const *names, int order[EXR_
     }
 }
 
+// Names of 32 characters and more are marked in the file.
+static bool has_long_name(int channels, const char *const *names) {
+    bool found = false;
+    for (int i = 0; i < channels; i++) {
+        found = found || strlen(names[i]) > 31;
+    }
+    return found;
+}
+
 typedef struct Compression {
     exr_result_t (*core)(exr_encode_pipeline_t *pipeline);
 } Compression;
@@ -348,11 +364,14 @@ rey_result rey_exr_write_as(rey_context *ctx, const char *path, const float *dat
     if (!names) {
         names = channels == 1 ? grey : rgb;
     }
-    options.error_handler_fn = on_error;
+    options.error_handler_fn = on_write_error;
     options.user_data = &stream;
     options.write_fn = on_write;
     sort_channels(channels, names, order);
     exr_result_t code = exr_start_write(&file, path, EXR_WRITE_FILE_DIRECTLY, &options);
+    if (code == EXR_ERR_SUCCESS && has_long_name(channels, names)) {
+        code = exr_set_longname_support(file, 1);
+    }
     code = code == EXR_ERR_SUCCESS ? exr_add_part(file, "image", EXR_STORAGE_SCANLINE, &part) : code;
     if (code == EXR_ERR_SUCCESS) {
         code = exr_initialize_required_attr_simple(file, 0, width, height, EXR_COMPRESSION_ZIP);
