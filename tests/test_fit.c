@@ -88,7 +88,7 @@ static void test_job_kinds(void **state) {
     assert_int_equal(read_job(f, HEAD, "optimizer=lbfgs", &job), REY_OK);
     assert_int_equal(job.optimizer.kind, OPTIMIZER_LBFGS);
     rey_job_free(&job);
-    expect_error(f, HEAD "optimizer: adan\n", NULL, "job.yaml:4: unknown value 'adan', did you mean 'adam'?");
+    expect_error(f, HEAD "optimizer: adan\n", NULL, "job.yaml:4: optimizer: unknown value 'adan', did you mean 'adam'?");
     // a parameter's name, too, may stand alone
     const char *names = "scene: a.xml\nviews: [{target: t.exr}]\nparameters: [a.b, 'c.*']\n";
     assert_int_equal(read_job(f, names, "parameters.1.start=2", &job), REY_OK);
@@ -114,7 +114,7 @@ static void test_job_errors(void **state) {
                  "sgd; lbfgs has learning_rate and memory");
     expect_error(f, HEAD "iterations: 2.5\n", NULL, "job.yaml:4: iterations = 2.5, expected a whole number");
     expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: expected a number");
-    expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: unknown value 'l3', did you mean");
+    expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: loss: unknown value 'l3', did you mean");
     expect_error(f, HEAD "loss: l2\nloss: l1\n", NULL, "job.yaml:5: key 'loss' is given twice");
     expect_error(f, HEAD "spp: [1, 2]\n", NULL, "expected a number, or a list of {from: ITERATION, spp: NUMBER}");
     expect_error(f, HEAD "spp: [{from: 0, spp: 4}, {from: 0, spp: 8}]\n", NULL, "'from' must rise");

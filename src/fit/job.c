@@ -88,6 +88,7 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
     };
     JobLevel **levels = target;
     void *items = NULL;
+    job->levels_at = rey_job_place(node);
     rey_result result = rey_job_open_list(job, node, sizeof **levels, &items, &job->level_count);
     *levels = items;
     int i = 0;
@@ -166,6 +167,19 @@ static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
                                      : rey_job_read_map(job, node, "loss", fields, job);
 }
 
+// Keys of another kind of schedule, which would be passed over.
+static rey_result check_schedule_keys(Job *job, const YamlNode *node, ScheduleKind kind) {
+    for (const YamlNode *entry = node->child; entry; entry = entry->next) {
+        bool of_falls = !strcmp(entry->key, "end") || !strcmp(entry->key, "length");
+        bool of_steps = !strcmp(entry->key, "factor") || !strcmp(entry->key, "every");
+        if (kind == SCHEDULE_STEP ? of_falls : kind != SCHEDULE_CONSTANT && of_steps) {
+            return rey_job_fail(job, entry, "'%s' is a key of %s, not of %s", entry->key,
+                                of_steps ? "step" : "cosine and exponential", rey_schedule_name((int)kind));
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
         {.key = "type",
@@ -179,8 +193,11 @@ static rey_result read_schedule(Job *job, const YamlNode *node, void *target) {
         {.key = "every", .type = FIELD_INTEGER, .offset = offsetof(JobSchedule, every), .low = 1, .high = 1e9},
         {0},
     };
-    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, target)
-                                     : rey_job_read_map(job, node, "schedule", fields, target);
+    if (node->kind == YAML_SCALAR) {
+        return rey_job_read_field(job, fields, node, target);
+    }
+    rey_result result = rey_job_read_map(job, node, "schedule", fields, target);
+    return result ? result : check_schedule_keys(job, node, ((const JobSchedule *)target)->kind);
 }
 
 // Keys that the optimizer of this kind would pass over. What lbfgs has none of is told where its reason is (check_lbfgs).

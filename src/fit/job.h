@@ -102,7 +102,7 @@ typedef struct Job {
     const char *folder; // that paths are relative to
     const char *scene, *truth_scene, *output;
     const char *load; // scene file whose values the scene gets, or null
-    JobPlace scene_at, truth_at, load_at, terms_at;
+    JobPlace scene_at, truth_at, load_at, terms_at, levels_at;
     JobDefines defines, truth_defines; // the truth gets those of the job where it has none of its own
     uint32_t seed;
     int iterations, views_per_iteration; // 0 = all views

@@ -25,13 +25,23 @@ bool rey_job_is_real(const YamlNode *node, double *value) {
     return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
 }
 
-rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double high, double *out) {
+// Where something else was expected, the override that made an entry of a value is to blame: scene.x=1 of the text that scene is.
+static const YamlNode *blamed(const YamlNode *node) {
+    for (const YamlNode *entry = node->child; entry; entry = entry->next) {
+        if (entry->set) {
+            return entry;
+        }
+    }
+    return node;
+}
+
+rey_result rey_job_read_real(Job *job, const YamlNode *node, const char *what, double low, double high, double *out) {
     double value;
     if (!rey_job_is_real(node, &value)) {
-        return rey_job_fail(job, node, "%s%sexpected a number", node->key ? node->key : "", node->key ? ": " : "");
+        return rey_job_fail(job, blamed(node), "%s: expected a number", what);
     }
     if (value < low || value > high) {
-        return rey_job_fail(job, node, "%s = %.10g, expected %.10g to %.10g", node->key ? node->key : "value", value, low, high);
+        return rey_job_fail(job, node, "%s = %.10g, expected %.10g to %.10g", what, value, low, high);
     }
     *out = value;
     return REY_OK;
@@ -42,7 +52,7 @@ static const char *word_at(void *user, int i) {
     return names[i];
 }
 
-static rey_result read_choice(Job *job, const YamlNode *node, const char *const *names, int *out) {
+static rey_result read_choice(Job *job, const YamlNode *node, const char *what, const char *const *names, int *out) {
     const char *text = node->kind == YAML_SCALAR && node->text ? node->text : "";
     char all[256] = "";
     for (int i = 0; names[i]; i++) {
@@ -54,13 +64,13 @@ static rey_result read_choice(Job *job, const YamlNode *node, const char *const 
         snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", names[i]);
     }
     const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
-    return nearest ? rey_job_fail(job, node, "unknown value '%s', did you mean '%s'?", text, nearest)
-                   : rey_job_fail(job, node, "unknown value '%s', expected one of %s", text, all);
+    return nearest ? rey_job_fail(job, blamed(node), "%s: unknown value '%s', did you mean '%s'?", what, text, nearest)
+                   : rey_job_fail(job, blamed(node), "%s: unknown value '%s', expected one of %s", what, text, all);
 }
 
 rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out) {
     if (node->kind != YAML_SCALAR || !node->text || !node->text[0]) {
-        return rey_job_fail(job, node, "%s: expected a text", node->key ? node->key : "entry");
+        return rey_job_fail(job, blamed(node), "%s: expected a text", node->key ? node->key : "entry");
     }
     *out = node->text;
     return REY_OK;
@@ -68,18 +78,19 @@ rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out) {
 
 rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node, char *base) {
     void *target = base + field->offset;
+    const char *what = node->key ? node->key : field->key; // a value alone has the key that it is short for
     double value;
     rey_result result;
     switch (field->type) {
     case FIELD_TEXT:
         return rey_job_read_text(job, node, target);
     case FIELD_REAL:
-        return rey_job_read_real(job, node, field->low, field->high, target);
+        return rey_job_read_real(job, node, what, field->low, field->high, target);
     case FIELD_INTEGER:
     case FIELD_SEED:
-        result = rey_job_read_real(job, node, field->low, field->high, &value);
+        result = rey_job_read_real(job, node, what, field->low, field->high, &value);
         if (!result && value != floor(value)) {
-            result = rey_job_fail(job, node, "%s = %g, expected a whole number", field->key, value);
+            result = rey_job_fail(job, node, "%s = %.10g, expected a whole number", what, value);
         }
         if (!result && field->type == FIELD_SEED) {
             *(uint32_t *)target = (uint32_t)value;
@@ -88,7 +99,7 @@ rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node
         }
         return result;
     case FIELD_CHOICE:
-        return read_choice(job, node, field->names, target);
+        return read_choice(job, node, what, field->names, target);
     default:
         return field->read(job, node, target);
     }
@@ -97,6 +108,17 @@ rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node
 static const char *key_at(void *user, int i) {
     const Field *fields = user;
     return fields[i].key;
+}
+
+static rey_result unknown_key(Job *job, const YamlNode *node, const char *what, const Field *fields) {
+    const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
+    char all[512] = "";
+    for (int i = 0; fields[i].key; i++) {
+        size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", fields[i].key);
+    }
+    return nearest ? rey_job_fail(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
+                   : rey_job_fail(job, node, "unknown key '%s' in %s, expected one of %s", node->key, what, all);
 }
 
 rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base) {
@@ -109,9 +131,7 @@ rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, con
             field++;
         }
         if (!field->key) {
-            const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
-            return nearest ? rey_job_fail(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
-                           : rey_job_fail(job, node, "unknown key '%s' in %s", node->key, what);
+            return unknown_key(job, node, what, fields);
         }
         rey_result result = rey_job_read_field(job, field, node, base);
         if (result) {

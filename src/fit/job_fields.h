@@ -33,7 +33,8 @@ typedef struct Field {
 rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
 JobPlace rey_job_place(const YamlNode *node); // null: none
 bool rey_job_is_real(const YamlNode *node, double *value);
-rey_result rey_job_read_real(Job *job, const YamlNode *node, double low, double high, double *out);
+// what: the key that a message calls it by.
+rey_result rey_job_read_real(Job *job, const YamlNode *node, const char *what, double low, double high, double *out);
 rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out);
 rey_result rey_job_read_field(Job *job, const Field *field, const YamlNode *node, char *base);
 // Reads a map by its table, which ends with a key of null.

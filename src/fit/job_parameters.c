@@ -15,7 +15,7 @@ static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
         *out = node->text[0] == '-' ? -INFINITY : INFINITY;
         return REY_OK;
     }
-    return rey_job_read_real(job, node, -1e30, 1e30, out);
+    return rey_job_read_real(job, node, "bounds", -1e30, 1e30, out);
 }
 
 static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
@@ -55,7 +55,7 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     rey_result result = values ? REY_OK : REY_ERROR_MEMORY;
     const YamlNode *entry = node->kind == YAML_LIST ? node->child : node;
     for (int i = 0; i < count && !result; i++, entry = entry->next) {
-        result = rey_job_read_real(job, entry, -1e30, 1e30, &values[i]);
+        result = rey_job_read_real(job, entry, "start", -1e30, 1e30, &values[i]);
     }
     parameter->start = values;
     parameter->start_count = count;

@@ -42,16 +42,15 @@ rey_result rey_levels_check_grids(Fit *fit) {
             int resolution = i < 0 ? 0 : fit->job.levels[i].resolution;
             int64_t count = rey_voxels_count(resolution > 0 ? rey_voxels_resized(p->grid, resolution) : p->grid);
             if (count <= HISTORY_LARGEST || count > INT32_MAX) {
-                return rey_fail(fit->ctx, REY_ERROR_ARGUMENT,
-                                "%s: levels with a 'resolution' make %s a grid of %lld numbers, expected %d or more",
-                                fit->job.path, p->name, (long long)count, HISTORY_LARGEST + 1);
+                return rey_job_fail_at(&fit->job, fit->job.levels_at, REY_ERROR_PARAM,
+                                       "levels with a 'resolution' make %s a grid of %lld numbers, expected %d or more", p->name,
+                                       (long long)count, HISTORY_LARGEST + 1);
             }
         }
     }
     return grids || !levels ? REY_OK
-                            : rey_fail(fit->ctx, REY_ERROR_ARGUMENT,
-                                       "%s: levels have a 'resolution', which is for grids, and the job has none",
-                                       fit->job.path);
+                            : rey_job_fail_at(&fit->job, fit->job.levels_at, REY_ERROR_PARAM,
+                                              "levels have a 'resolution', which is for grids, and the job has none");
 }
 
 // One pixel of a reduced view from r x r of the full one, from (x, y) on.

@@ -49,8 +49,16 @@ static rey_result next_event(Reader *r) {
         return rey_fail_memory(r->ctx, 0);
     }
     const char *problem = r->parser.problem ? r->parser.problem : "malformed YAML";
-    problem = has_tab(r, r->parser.problem_mark.line) ? "a tab in the indentation, expected spaces" : problem;
-    return fail_at(r, (int)r->parser.problem_mark.line + 1, problem);
+    size_t line = r->parser.problem_mark.line;
+    if (r->parser.error == YAML_READER_ERROR) { // of bytes that are no text there is an offset alone
+        line = 0;
+        for (size_t i = 0; i < r->parser.problem_offset && i < r->size; i++) {
+            line += r->bytes[i] == '\n';
+        }
+    } else if (has_tab(r, line)) {
+        problem = "a tab in the indentation, expected spaces";
+    }
+    return fail_at(r, (int)line + 1, problem);
 }
 
 static rey_result fail_here(Reader *r, const char *message) {

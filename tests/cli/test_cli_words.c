@@ -98,12 +98,15 @@ static void places_of_jobs_are_told(void **state) {
     expect_said(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
     expect_said(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
     expect_said(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
+    expect_said(f, 2, "fit job.yaml -o fit -D a=1 -D b=2 -D a=3", "-D: 'a' is defined twice");
     expect_said(f, 2, "fit job.yaml -o fit -D nothing=1", "the scene never uses '$nothing'");
     write_job(f, "defines: {nothing: 1}\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
     expect_said(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/start.xml:1:1: the parameter 'nothing' was given");
     write_job(f, "views: [{target: none.exr}]\nparameters:\n  - {name: red.reflectance, parameterisation: log, start: 0}\n");
     expect_said(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr",
                  "job.yaml:7: parameter 'red.reflectance': entry 0 starts at 0");
+    write_job(f, "levels: [{from: 0, resolution: 4}]\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
+    expect_said(f, 1, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr", "job.yaml:5: levels have a 'resolution'");
     write_job(f, "load: none.xml\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
     expect_said(f, 1, "fit job.yaml -o fit", "job.yaml:5: " TEST_JOBS "/none.xml: cannot open the scene");
     write_job(f, "views: [{target: none.exr}]\nparameters: [red.reflectance]\n");

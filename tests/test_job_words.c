@@ -1,0 +1,91 @@
+// test_job_words.c: what is wrong with a job is told with its line, its key and what was expected.
+#include "fit/job.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+#include <string.h>
+
+#define HEAD "scene: a.xml\nviews: [{target: t.exr}]\nparameters: [{name: a}]\n"
+
+static void expect_error(rey_context *ctx, const char *text, const char *set, const char *words) {
+    Job job;
+    rey_result result =
+        rey_job_read_memory(ctx, "job.yaml", (const unsigned char *)text, strlen(text), &set, set ? 1 : 0, &job);
+    rey_job_free(&job);
+    if (result == REY_OK || !strstr(rey_error(ctx), words)) {
+        fail_msg("result %d, '%s', expected '%s'", result, rey_error(ctx), words);
+    }
+}
+
+static void test_keys_are_named(void **state) {
+    rey_context *ctx = *state;
+    static const char *const cases[][2] = {
+        {HEAD "views_of: 1\n", "job.yaml:4: unknown key 'views_of', did you mean 'views'?"},
+        {HEAD "loss: {type: l2, x: 1}\n", "job.yaml:4: unknown key 'x' in loss, expected one of type, epsilon"},
+        {HEAD "loss: l3\n", "job.yaml:4: loss: unknown value 'l3', did you mean 'l1'?"},
+        {HEAD "loss: []\n", "job.yaml:4: loss: expected 'key: value' lines"},
+        {HEAD "optimizer: {schedule: fast}\n", "job.yaml:4: schedule: unknown value 'fast', expected one of constant, cosine,"},
+        {"scene: a\nviews: [{target: t, held_out: yes}]\n", "job.yaml:2: held_out: unknown value 'yes', expected one of false, true"},
+        {"parameters: [{name: a, bounds: [0, x]}]\n", "job.yaml:1: bounds: expected a number"},
+        {"parameters: [{name: a, bounds: [0, 1e99]}]\n", "job.yaml:1: bounds = 1e+99, expected -1e+30 to 1e+30"},
+        {"parameters: [{name: a, start: [0, x]}]\n", "job.yaml:1: start: expected a number"},
+        {HEAD "iterations: 12345678.5\n", "job.yaml:4: iterations = 12345678.5, expected a whole number"},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        expect_error(ctx, cases[i][0], NULL, cases[i][1]);
+    }
+}
+
+// A key that says nothing to the kind of schedule is a mistake; a constant one has none to be mistaken for.
+static void test_keys_of_schedules(void **state) {
+    rey_context *ctx = *state;
+    expect_error(ctx, HEAD "optimizer: {schedule: {type: cosine, every: 3}}\n", NULL,
+                 "job.yaml:4: 'every' is a key of step, not of cosine");
+    expect_error(ctx, HEAD "optimizer: {schedule: {end: 0.1, type: step}}\n", NULL,
+                 "job.yaml:4: 'end' is a key of cosine and exponential, not of step");
+    const char text[] = HEAD "optimizer: {schedule: {type: cosine, end: 0.1}}\n", *set = "optimizer.schedule.type=constant";
+    Job job;
+    assert_int_equal(rey_job_read_memory(ctx, "job.yaml", (const unsigned char *)text, strlen(text), &set, 1, &job), REY_OK);
+    rey_job_free(&job);
+}
+
+// An entry of what is no map or list was made by the override.
+static void test_overrides_are_blamed(void **state) {
+    rey_context *ctx = *state;
+    expect_error(ctx, HEAD, "scene.a=1", "--set scene.a=1: scene: expected a text");
+    expect_error(ctx, HEAD, "views.0.target.b=1", "--set views.0.target.b=1: target: expected a text");
+    expect_error(ctx, HEAD "iterations: 3\n", "iterations.0=1", "--set iterations.0=1: iterations: expected a number");
+    expect_error(ctx, HEAD "optimizer: {schedule: {type: cosine}}\n", "optimizer.schedule.type.x=1",
+                 "--set optimizer.schedule.type.x=1: type: unknown value ''");
+}
+
+// What is no text at all is found by its offset.
+static void test_bytes_have_lines(void **state) {
+    expect_error(*state, HEAD "a: \xff\n", NULL, "job.yaml:4: invalid leading UTF-8 octet");
+    expect_error(*state, HEAD "\na: \x01\n", NULL, "job.yaml:5: control characters are not allowed");
+}
+
+static int set_up(void **state) {
+    rey_context *ctx = NULL;
+    rey_result result = rey_context_create(NULL, &ctx);
+    *state = ctx;
+    return result != REY_OK;
+}
+
+static int tear_down(void **state) {
+    rey_context_destroy(*state);
+    return 0;
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_keys_are_named),
+        cmocka_unit_test(test_keys_of_schedules),
+        cmocka_unit_test(test_overrides_are_blamed),
+        cmocka_unit_test(test_bytes_have_lines),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
