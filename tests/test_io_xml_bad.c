@@ -133,7 +133,8 @@ static void test_unused(void **state) {
                          "  <ref id='t' name='alfa'/></bsdf><texture type='bitmap' id='t'/></scene>");
     rey_xml_node *bsdf = rey_xml_root(document)->children[0].node;
     assert_int_equal(rey_xml_check_unused(ctx, bsdf, known_names, NULL), REY_ERROR_SCENE);
-    assert_string_equal(rey_error(ctx), DATA "text.xml:3:3: bsdf 'diffuse' has no use for the texture 'bitmap'");
+    assert_string_equal(rey_error(ctx), DATA "text.xml:3:3: bsdf 'diffuse' has no use for the texture 'bitmap', whose "
+                                             "'name' would say which property it is");
     bsdf->children[0].used = true;
     assert_int_equal(rey_xml_check_unused(ctx, bsdf, known_names, NULL), REY_ERROR_SCENE);
     assert_string_equal(rey_error(ctx), DATA "text.xml:4:3: unknown property 'refelctance' of bsdf 'diffuse', did you "

@@ -118,6 +118,39 @@ static void neighbours_are_named(void **state) {
     check_cases(cases, sizeof cases / sizeof cases[0]);
 }
 
+// Where nothing is near, what there is is listed; a texture without a name may have been meant for any property.
+static void others_are_listed(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<shape type='sphere'><string name='filename' value='a'/></shape>",
+         "scene.xml:2:22: unknown property 'filename' of shape 'sphere', expected "},
+        {"<bsdf type='diffuse'><float name='xyz' value='1'/></bsdf>", "unknown property 'xyz' of bsdf 'diffuse', expected refl"},
+        {"<bsdf type='diffuse'><texture type='checkerboard'/></bsdf>",
+         "has no use for the texture 'checkerboard', whose 'name' would say which property it is"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
+// A wrong value is found where it stands, not where its object begins.
+static void values_have_places(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<shape type='sphere'>\n<float name='radius' value='0'/></shape>", "scene.xml:3:1: the radius is 0, expected a"},
+        {"<shape type='cube'>\n<transform name='to_world'><scale value='0'/></transform></shape>", "scene.xml:3:1: the shape's"},
+        {"<bsdf type='roughconductor'>\n<float name='alpha' value='-1'/></bsdf>", "scene.xml:3:1: alpha is -1, expected a number"},
+        {"<sensor type='perspective'>\n<float name='fov' value='200'/></sensor>", "scene.xml:3:1: fov is 200"},
+        {"<sensor type='perspective'>\n<float name='near_clip' value='1'/>\n<float name='far_clip' value='1'/></sensor>",
+         "scene.xml:4:1: near_clip 1 and far_clip 1"},
+        {"<sensor type='perspective'>\n<float name='near_clip' value='1e9'/></sensor>", "scene.xml:2:1: near_clip 1e+09"},
+        {"<emitter type='spot'>\n<float name='cutoff_angle' value='200'/></emitter>", "scene.xml:3:1: cutoff_angle is 200"},
+        {"<emitter type='constant'>\n<float name='sampling_weight' value='-1'/></emitter>", "scene.xml:3:1: sampling_weight is -1"},
+        {"<medium type='homogeneous' id='m'>\n<float name='albedo' value='2'/></medium><shape type='cube'><ref name='interior' "
+         "id='m'/></shape>", "scene.xml:3:1: albedo is 2"},
+        {"<integrator type='aov'>\n<string name='aovs' value='a:dept'/></integrator>", "scene.xml:3:1: there is no quantity"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+}
+
 static void what_is_missing_is_named(void **state) {
     (void)state;
     static const Case cases[] = {
@@ -264,6 +297,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_finite),
         cmocka_unit_test(neighbours_are_named),
+        cmocka_unit_test(others_are_listed),
+        cmocka_unit_test(values_have_places),
         cmocka_unit_test(what_is_missing_is_named),
         cmocka_unit_test(root_is_a_scene),
         cmocka_unit_test(twosided_is_opaque),

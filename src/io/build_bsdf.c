@@ -85,8 +85,8 @@ static rey_result rate_slot(Builder *b, rey_xml_node *node, const ParamDesc *p, 
     double value;
     TRY(rey_xml_get_float(b->ctx, node, p->name, (double)p->value, &value));
     if (!(value >= (double)p->low && value <= 1e6)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "%s is %g, expected a number in [%g, 1e6]", p->name, value,
-                            (double)p->low);
+        return rey_xml_fail_value(b->ctx, node, p->name, "%s is %g, expected a number in [%g, 1e6]", p->name, value,
+                                  (double)p->low);
     }
     return build_number(b, (float)value, out);
 }

@@ -24,7 +24,7 @@ static rey_result colour_slot(Builder *b, rey_xml_node *node, const EmitterParam
     double value = (double)p->value;
     TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
     return !build_is_volume(b, *out) ? REY_OK
-                                     : rey_xml_fail(b->ctx, node->at, REY_ERROR_UNSUPPORTED,
+                                     : rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_UNSUPPORTED,
                                                     "'%s' of a light cannot be a volume", p->name);
 }
 
@@ -34,7 +34,7 @@ static rey_result number_slot(Builder *b, rey_xml_node *node, const EmitterParam
     TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
     const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     if (t->kind != TEXTURE_CONSTANT || t->channels != 1) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' of a light must be a number", p->name);
+        return rey_xml_fail_value(b->ctx, node, p->name, "'%s' of a light must be a number", p->name);
     }
     return REY_OK;
 }
@@ -67,7 +67,7 @@ static rey_result position_slot(Builder *b, rey_xml_node *node, const EmitterPar
     double position[3] = {0, 0, 0}, matrix[16];
     if (rey_xml_has(node, "to_world")) {
         if (rey_xml_has(node, row->name)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either '%s' or 'to_world' may be given", row->name);
+            return rey_xml_fail_value(b->ctx, node, "to_world", "either '%s' or 'to_world' may be given", row->name);
         }
         TRY(rey_xml_get_transform(b->ctx, node, "to_world", matrix));
         for (int k = 0; k < 3; k++) {
@@ -93,12 +93,12 @@ static rey_result position_slot(Builder *b, rey_xml_node *node, const EmitterPar
 rey_result build_direction(Builder *b, rey_xml_node *node, double matrix[16]) {
     double d[3] = {0, 0, 1}, length, z[3], x[3];
     if (rey_xml_has(node, "to_world")) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'direction' or 'to_world' may be given");
+        return rey_xml_fail_value(b->ctx, node, "to_world", "either 'direction' or 'to_world' may be given");
     }
     TRY(rey_xml_get_vec3(b->ctx, node, "direction", d, d));
     length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     if (!(length > 0)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the direction of a %s must not be 0", node->type);
+        return rey_xml_fail_value(b->ctx, node, "direction", "the direction of a %s must not be 0", node->type);
     }
     for (int k = 0; k < 3; k++) {
         z[k] = d[k] / length;
@@ -246,7 +246,7 @@ static rey_result get_weight(Builder *b, rey_xml_node *node, EmitterRecord *e) {
     TRY(rey_xml_get_float(b->ctx, node, "sampling_weight", 1, &weight));
     e->weight = (float)weight;
     if (!(e->weight >= 0) || !isfinite(e->weight)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "sampling_weight is %g, expected a number >= 0", weight);
+        return rey_xml_fail_value(b->ctx, node, "sampling_weight", "sampling_weight is %g, expected a number >= 0", weight);
     }
     return REY_OK;
 }

@@ -153,7 +153,7 @@ static rey_result get_aovs(Builder *b, rey_xml_node *node) {
         char item[160], *colon;
         size_t length = strcspn(list, ",");
         if (length >= sizeof item) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%.40s...' in 'aovs' is too long", list);
+            return rey_xml_fail_value(b->ctx, node, "aovs", "'%.40s...' in 'aovs' is too long", list);
         }
         memcpy(item, list, length);
         list += length + (list[length] == ',');
@@ -164,7 +164,7 @@ static rey_result get_aovs(Builder *b, rey_xml_node *node) {
         const char *name = item + strspn(item, " ");
         colon = strchr(item, ':');
         if (!colon || colon == name) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' in 'aovs', expected NAME:QUANTITY", item);
+            return rey_xml_fail_value(b->ctx, node, "aovs", "'%s' in 'aovs', expected NAME:QUANTITY", item);
         }
         *colon = '\0';
         int kind = -1;
@@ -172,7 +172,8 @@ static rey_result get_aovs(Builder *b, rey_xml_node *node) {
             kind = strcmp(colon + 1, aov_word(NULL, i)) == 0 ? i : kind;
         }
         if (kind < 0) {
-            return rey_xml_fail_word(b->ctx, node->at, colon + 1, aov_word, NULL, "there is no quantity '%s'", colon + 1);
+            return rey_xml_fail_word(b->ctx, rey_xml_place(node, "aovs"), colon + 1, aov_word, NULL,
+                                     "there is no quantity '%s'", colon + 1);
         }
         TRY(add_aov(b, node, name, kind));
     }

@@ -38,7 +38,7 @@ static rey_result coefficient(Builder *b, rey_xml_node *node, int which, const c
     const VolumeNode *v = &ARRAY_AT(b->scene->build.volumes, VolumeNode, *out);
     return v->channels == 1 || v->channels == 3
                ? REY_OK
-               : rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' has %d channels, expected 1 or 3", name, v->channels);
+               : rey_xml_fail_value(b->ctx, node, name, "'%s' has %d channels, expected 1 or 3", name, v->channels);
 }
 
 // What scatters and what is absorbed, in place of the extinction and its share that scatters: values only.
@@ -47,7 +47,7 @@ static rey_result get_value(Builder *b, rey_xml_node *node, const char *name, do
     TRY(rey_xml_get_colour(b->ctx, node, name, REY_COLOUR_UNBOUNDED, zero, rgb));
     for (int c = 0; c < 3; c++) {
         if (!(rgb[c] >= 0)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "%s is %g, expected a number >= 0", name, rgb[c]);
+            return rey_xml_fail_value(b->ctx, node, name, "%s is %g, expected a number >= 0", name, rgb[c]);
         }
     }
     return REY_OK;

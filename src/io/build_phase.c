@@ -29,8 +29,8 @@ static rey_result number_slot(Builder *b, rey_xml_node *node, const PhaseParam *
     const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     return (t->kind == TEXTURE_CONSTANT || t->kind == TEXTURE_VOLUME) && t->channels == 1
                ? REY_OK
-               : rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                              "'%s' of a phase function must be a number or a volume of numbers", p->name);
+               : rey_xml_fail_value(b->ctx, node, p->name, "'%s' of a phase function must be a number or a volume of numbers",
+                                    p->name);
 }
 
 // A list of numbers as a texture, with the parameter `path`.
@@ -43,8 +43,8 @@ static rey_result add_list(Builder *b, rey_xml_node *node, const PhaseParam *p, 
     for (size_t i = 0; i < count; i++) {
         theta[i] = (float)values[i];
         if (!(theta[i] >= p->low && theta[i] <= p->high) || !isfinite(theta[i])) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "number %zu of '%s' is %g, expected a number in [%g, %g]",
-                                i + 1, p->name, values[i], (double)p->low, (double)p->high);
+            return rey_xml_fail_value(b->ctx, node, p->name, "number %zu of '%s' is %g, expected a number in [%g, %g]",
+                                      i + 1, p->name, values[i], (double)p->low, (double)p->high);
         }
     }
     Param param = {PARAM_DEFAULTS, .theta = t->theta, .count = (int32_t)count, .dims = 1, .shape = {(int32_t)count},
@@ -63,9 +63,9 @@ static rey_result table_slot(Builder *b, rey_xml_node *node, const PhaseParam *p
         sum += ARRAY_AT(list, double, i);
     }
     if (result == REY_OK && (list.count < least || list.count > 1 << 20 || !(sum > 0))) {
-        result = rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                              "'%s' holds %zu numbers with the sum %g, expected %s or more that are not all 0", p->name,
-                              list.count, sum, least == 2 ? "two" : "one");
+        result = rey_xml_fail_value(b->ctx, node, p->name,
+                                    "'%s' holds %zu numbers with the sum %g, expected %s or more that are not all 0", p->name,
+                                    list.count, sum, least == 2 ? "two" : "one");
     }
     if (result == REY_OK) {
         result = add_list(b, node, p, list.data, list.count, path, out);
@@ -100,7 +100,7 @@ static rey_result matrix_slot(Builder *b, rey_xml_node *node, const PhaseParam *
     } else {
         rey_result result = build_number_list(b, node, p->name, &list);
         if (result == REY_OK && list.count != 6) {
-            result = rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' holds %zu numbers, expected 6", p->name, list.count);
+            result = rey_xml_fail_value(b->ctx, node, p->name, "'%s' holds %zu numbers, expected 6", p->name, list.count);
         }
         if (result == REY_OK) {
             result = add_list(b, node, p, list.data, list.count, path, out);
@@ -111,7 +111,7 @@ static rey_result matrix_slot(Builder *b, rey_xml_node *node, const PhaseParam *
     const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, *out);
     for (int64_t i = 0; i < count; i++) {
         if (!is_positive(&ARRAY_AT(b->scene->build.theta, float, t->theta + 6 * i))) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' is not positive definite", p->name);
+            return rey_xml_fail_value(b->ctx, node, p->name, "'%s' is not positive definite", p->name);
         }
     }
     return REY_OK;

@@ -31,20 +31,20 @@ rey_result build_field_of_view(Builder *b, rey_xml_node *node, double aspect, do
     TRY(rey_xml_get_string(b->ctx, node, "focal_length", "50mm", &focal));
     if (rey_xml_has(node, "fov")) {
         if (rey_xml_has(node, "focal_length")) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "either 'fov' or 'focal_length' may be given");
+            return rey_xml_fail_value(b->ctx, node, "focal_length", "either 'fov' or 'focal_length' may be given");
         }
         TRY(rey_xml_get_float(b->ctx, node, "fov", 0, &fov));
     } else {
         const char *end = focal;
         double mm = 0;
         if (!rey_parse_real(focal, &end, &mm) || (*end && strcmp(end, "mm") != 0) || !(mm > 0)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "focal_length is '%s', expected a length such as 50mm", focal);
+            return rey_xml_fail_value(b->ctx, node, "focal_length", "focal_length is '%s', expected a length such as 50mm", focal);
         }
         fov = 2 * atan(sqrt(36.0 * 36 + 24 * 24) / (2 * mm)) / to_radians;
         axis = 2;
     }
     if (!(fov > 0 && fov < 180)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "fov is %g, expected an angle in (0, 180) degrees", fov);
+        return rey_xml_fail_value(b->ctx, node, "fov", "fov is %g, expected an angle in (0, 180) degrees", fov);
     }
     double t = tan(0.5 * fov * to_radians);
     bool vertical = axis == 1 || (axis == 3 && aspect > 1) || (axis == 4 && aspect < 1);
@@ -106,8 +106,8 @@ static rey_result clip_planes(Builder *b, rey_xml_node *node, SensorRecord *s) {
     TRY(rey_xml_get_float(b->ctx, node, "near_clip", 0.01, &near_clip));
     TRY(rey_xml_get_float(b->ctx, node, "far_clip", 10000, &far_clip));
     if (!(near_clip > 0 && near_clip < far_clip)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "near_clip %g and far_clip %g, expected 0 < near < far",
-                            near_clip, far_clip);
+        return rey_xml_fail_value(b->ctx, node, near_clip > 0 ? "far_clip" : "near_clip",
+                                  "near_clip %g and far_clip %g, expected 0 < near < far", near_clip, far_clip);
     }
     s->near_clip = (float)near_clip;
     s->far_clip = (float)far_clip;
@@ -136,8 +136,8 @@ static rey_result lens_numbers(Builder *b, rey_xml_node *node, const char *path,
     TRY(rey_xml_get_float(b->ctx, node, "aperture_radius", 0, &radius));
     TRY(rey_xml_get_float(b->ctx, node, "focus_distance", (double)s->far_clip, &focus));
     if (!(radius > 0) || !(focus > 0)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                            "aperture_radius %g and focus_distance %g, expected positive numbers", radius, focus);
+        return rey_xml_fail_value(b->ctx, node, radius > 0 ? "focus_distance" : "aperture_radius",
+                                  "aperture_radius %g and focus_distance %g, expected positive numbers", radius, focus);
     }
     const SensorNumber numbers[] = {
         {"aperture_radius", "scene units", "radius of the aperture", radius, 0, INFINITY, CAMERA_APERTURE},
@@ -159,8 +159,8 @@ static rey_result sensor_pose(Builder *b, rey_xml_node *node, const char *path, 
         TRY(rey_xml_get_transform(b->ctx, node, "to_world", pose));
     }
     if (camera && !is_rigid(pose)) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                            "to_world of a %s may turn and move it, but not scale or shear it", node->type);
+        return rey_xml_fail_value(b->ctx, node, "to_world", "to_world of a %s may turn and move it, but not scale or shear it",
+                                  node->type);
     }
     Param p = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT, .why = why_moving};
     p.camera = s->kind == SENSOR_DISTANT ? -1 : CAMERA_POSE;

@@ -185,8 +185,8 @@ static rey_result posed_fold(Builder *b, rey_xml_node *node, const PosedPlugin *
         }
         TRY(rey_xml_get_float(b->ctx, node, p->name, p->value[0], &values[n]));
         if (!(values[n] > 0)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the %s is %g, expected a positive number", p->name,
-                                values[n]);
+            return rey_xml_fail_value(b->ctx, node, p->name, "the %s is %g, expected a positive number", p->name,
+                                      values[n]);
         }
         n++;
     }
@@ -204,7 +204,7 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
         TRY(posed_fold(b, node, plugin, m));
     }
     if (rey_matrix_determinant(m) == 0) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the shape's to_world cannot be inverted");
+        return rey_xml_fail_value(b->ctx, node, "to_world", "the shape's to_world cannot be inverted");
     }
     Param pose = {PARAM_DEFAULTS, .terms = GEOMETRY_TERMS, .why = moving_why, .geometry = id};
     TRY(build_pose(b, m, path, pose, &shape->to_world));

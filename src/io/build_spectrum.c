@@ -29,7 +29,7 @@ static rey_result build_blackbody(Builder *b, rey_xml_node *node, TextureUse use
     t->child[0] = child;
     t->channels = 3;
     if (value->kind != TEXTURE_CONSTANT || value->channels != 1) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'temperature' of a blackbody must be a number");
+        return rey_xml_fail_value(b->ctx, node, "temperature", "'temperature' of a blackbody must be a number");
     }
     theta[BLACKBODY_BUILT] = -1;
     theta[BLACKBODY_RANGE] = (float)range[0];
@@ -59,7 +59,7 @@ rey_result build_number_list(Builder *b, rey_xml_node *node, const char *name, A
             return REY_ERROR_MEMORY;
         }
         if (!rey_parse_real(text, &end, value)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' must be numbers between commas or blanks", name);
+            return rey_xml_fail_value(b->ctx, node, name, "'%s' must be numbers between commas or blanks", name);
         }
         for (text = end; rey_is_blank(*text) || *text == ',';) {
             text++;

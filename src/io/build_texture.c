@@ -65,8 +65,8 @@ rey_result build_constant(Builder *b, rey_xml_node *node, const char *property, 
     for (int i = 0; i < count; i++) {
         theta[i] = (float)values[i];
         if (!(theta[i] >= use.low && theta[i] <= use.high)) {
-            return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "%s is %g, expected a number in [%g, %g]",
-                                property ? property : path, values[i], (double)use.low, (double)use.high);
+            return rey_xml_fail_value(b->ctx, node, property, "%s is %g, expected a number in [%g, %g]",
+                                      property ? property : path, values[i], (double)use.low, (double)use.high);
         }
     }
     Param p = texture_param(use, *out, t->theta, count);

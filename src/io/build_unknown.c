@@ -1,7 +1,6 @@
 // build_unknown.c: plugins that are refused: those of the format by name, with the reason; others with a near name.
 #include "io/build.h"
 
-#include <stdio.h>
 #include <string.h>
 
 static const char no_polarisation[] = "light has no polarisation here";
@@ -68,15 +67,6 @@ static const struct {
                {"wireframe", missing},
                {"curvature", missing}};
 
-// The names that there are, where none is near.
-static void list_words(const char *(*known)(void *user, int i), void *user, char *text, size_t size) {
-    text[0] = 0;
-    for (int i = 0; known(user, i); i++) {
-        size_t used = strlen(text);
-        snprintf(text + used, size - used, "%s%s", !i ? ", expected " : known(user, i + 1) ? ", " : " or ", known(user, i));
-    }
-}
-
 rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*known)(void *user, int i), void *user) {
     const char *tag = rey_xml_tag_name(node->tag);
     for (int i = 0; i < COUNT_OF(refused); i++) {
@@ -86,7 +76,6 @@ rey_result build_unknown(Builder *b, const rey_xml_node *node, const char *(*kno
         }
     }
     char list[1024];
-    list_words(known, user, list, sizeof list);
-    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%.100s'%s", tag, node->type,
-                             rey_nearest_word(node->type, known, user) ? "" : list);
+    rey_xml_list_words(node->type, known, user, list, sizeof list);
+    return rey_xml_fail_word(b->ctx, node->at, node->type, known, user, "there is no %s '%.100s'%s", tag, node->type, list);
 }

@@ -37,8 +37,8 @@ static rey_result build_place(Builder *b, rey_xml_node *node, const char *path, 
         }
     }
     if (rey_matrix_determinant(m) == 0) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "the volume's to_world%s cannot be inverted",
-                            box ? " with the box of its file" : "");
+        return rey_xml_fail_value(b->ctx, node, "to_world", "the volume's to_world%s cannot be inverted",
+                                  box ? " with the box of its file" : "");
     }
     Param pose = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR, .volume = id};
     TRY(build_pose(b, m, path, pose, &volume->to_world));

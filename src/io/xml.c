@@ -75,6 +75,22 @@ rey_result rey_xml_named_file(rey_context *ctx, rey_xml_position at, rey_result 
     return result == REY_OK || result == REY_ERROR_MEMORY ? result : rey_xml_fail(ctx, at, result, "%s", rey_error(ctx));
 }
 
+rey_result rey_xml_fail_value(rey_context *ctx, const rey_xml_node *node, const char *name, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    rey_xml_fail_position(ctx, rey_xml_place(node, name), REY_ERROR_SCENE, format, arguments);
+    va_end(arguments);
+    return REY_ERROR_SCENE;
+}
+
+void rey_xml_list_words(const char *word, const char *(*next)(void *user, int i), void *user, char *text, size_t size) {
+    text[0] = 0;
+    for (int i = 0; next(user, i) && !rey_nearest_word(word, next, user); i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%s", !i ? ", expected " : next(user, i + 1) ? ", " : " or ", next(user, i));
+    }
+}
+
 rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *word,
                              const char *(*next)(void *user, int i), void *user, const char *format, ...) {
     char text[1536];

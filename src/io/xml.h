@@ -131,9 +131,15 @@ const char *rey_xml_kind_name(rey_xml_kind kind);
 // Records "FILE:LINE:COLUMN: message" and returns the code.
 rey_result rey_xml_fail(rey_context *ctx, rey_xml_position at, rey_result code, const char *format, ...)
     PRINTF_LIKE(4, 5);
-// Records "FILE:LINE:COLUMN: message, did you mean 'x'?" with the nearest of the candidates (see rey_nearest_word).
 // Puts the place that named a file before what was wrong with the file; passes every result on.
 rey_result rey_xml_named_file(rey_context *ctx, rey_xml_position at, rey_result result);
+// Records "FILE:LINE:COLUMN: message" where the property or child `name` of the node stands; the node itself where it has
+// none, or name is null. Returns REY_ERROR_SCENE.
+rey_result rey_xml_fail_value(rey_context *ctx, const rey_xml_node *node, const char *name, const char *format, ...)
+    PRINTF_LIKE(4, 5);
+// ", expected A, B or C" of the candidates; nothing where one is near the word, which rey_xml_fail_word suggests.
+void rey_xml_list_words(const char *word, const char *(*next)(void *user, int i), void *user, char *text, size_t size);
+// Records "FILE:LINE:COLUMN: message, did you mean 'x'?" with the nearest of the candidates (see rey_nearest_word).
 rey_result rey_xml_fail_word(rey_context *ctx, rey_xml_position at, const char *word,
                              const char *(*next)(void *user, int i), void *user, const char *format, ...)
     PRINTF_LIKE(6, 7);
@@ -170,6 +176,9 @@ rey_result rey_xml_get_colour(rey_context *ctx, const rey_xml_node *node, const 
 // An index of refraction: a number or a name.
 rey_result rey_xml_get_ior(rey_context *ctx, const rey_xml_node *node, const char *name, const char *otherwise,
                            double *out);
+
+// Where the property or child of this name stands, as of rey_xml_fail_value.
+rey_xml_position rey_xml_place(const rey_xml_node *node, const char *name);
 
 // ---- children ----------------------------------------------------------------------------------------------------
 

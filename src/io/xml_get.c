@@ -43,6 +43,16 @@ static rey_xml_child *find_child(const rey_xml_node *node, const char *name) {
     return NULL;
 }
 
+rey_xml_position rey_xml_place(const rey_xml_node *node, const char *name) {
+    for (int i = 0; i < node->property_count && name; i++) {
+        if (strcmp(node->properties[i].name, name) == 0) {
+            return node->properties[i].at;
+        }
+    }
+    const rey_xml_child *child = name ? find_child(node, name) : NULL;
+    return child ? child->at : node->at;
+}
+
 bool rey_xml_has(const rey_xml_node *node, const char *name) {
     return rey_xml_find(node, name) || find_child(node, name);
 }
@@ -260,8 +270,10 @@ int rey_xml_count_children(const rey_xml_node *node, unsigned tags) {
 
 static rey_result fail_property(rey_context *ctx, const rey_xml_node *node, const rey_xml_property *property,
                                 const char *(*known)(void *user, int i), void *user) {
-    return rey_xml_fail_word(ctx, property->at, property->name, known, user, "unknown property '%.100s' of %s '%.100s'",
-                             property->name, rey_xml_tag_name(node->tag), node->type);
+    char list[1024];
+    rey_xml_list_words(property->name, known, user, list, sizeof list);
+    return rey_xml_fail_word(ctx, property->at, property->name, known, user, "unknown property '%.100s' of %s '%.100s'%s",
+                             property->name, rey_xml_tag_name(node->tag), node->type, list);
 }
 
 static rey_result fail_child(rey_context *ctx, const rey_xml_node *node, const rey_xml_child *child,
@@ -272,8 +284,9 @@ static rey_result fail_child(rey_context *ctx, const rey_xml_node *node, const r
                                  rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag),
                                  child->node->type, child->name);
     }
-    return rey_xml_fail(ctx, child->at, REY_ERROR_SCENE, "%s '%.100s' has no use for the %s '%.100s'",
-                        rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag), child->node->type);
+    const char *hint = child->node->tag == REY_XML_TEXTURE ? ", whose 'name' would say which property it is" : "";
+    return rey_xml_fail(ctx, child->at, REY_ERROR_SCENE, "%s '%.100s' has no use for the %s '%.100s'%s",
+                        rey_xml_tag_name(node->tag), node->type, rey_xml_tag_name(child->node->tag), child->node->type, hint);
 }
 
 // The first property or child that nobody took; both null when there is none.

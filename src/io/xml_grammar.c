@@ -3,7 +3,6 @@
 
 #include "io/number.h"
 
-#include <stdio.h>
 #include <string.h>
 
 static const XmlTag tags[] = {
@@ -134,13 +133,9 @@ static bool takes(Known *known, const char *name) {
 
 // An attribute that the element does not take, with the nearest that it does, or with all of them where none is near.
 static rey_result unknown_attribute(const XmlFile *file, Known *known, const char *name) {
-    char list[128] = "";
-    const char *one, *inner = known->tag->class == XML_OBJECT ? "; properties are elements within it" : "";
-    for (int i = 0; (one = next_attribute(known, i)) && !rey_nearest_word(name, next_attribute, known); i++) {
-        size_t used = strlen(list);
-        const char *before = !i ? ", expected " : next_attribute(known, i + 1) ? ", " : " or ";
-        snprintf(list + used, sizeof list - used, "%s%s", before, one);
-    }
+    char list[128];
+    const char *inner = known->tag->class == XML_OBJECT ? "; properties are elements within it" : "";
+    rey_xml_list_words(name, next_attribute, known, list, sizeof list);
     return rey_xml_fail_word(file->reader->ctx, attribute_position(file, name), name, next_attribute, known,
                              "unknown attribute '%.100s' of <%s>%s%s", name, known->tag->name, list, list[0] ? inner : "");
 }
