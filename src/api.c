@@ -4,6 +4,8 @@
 #include "render/update.h"
 #include "scene/values.h"
 
+#include <stdio.h>
+
 static rey_result load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                        rey_scene **out) {
     rey_result result = rey_begin(ctx, path && out && (!define_count || defines));
@@ -17,8 +19,10 @@ static rey_result load(rey_context *ctx, const char *path, const rey_define *def
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "define_count is %d, expected at least 0", define_count);
     }
     result = rey_mitsuba_load(ctx, path, defines, define_count, flags, out);
-    if (result == REY_OK) {
-        result = rey_scene_update(*out);
+    if (result == REY_OK && (result = rey_scene_update(*out)) != REY_OK && result != REY_ERROR_MEMORY) {
+        char why[1024];
+        snprintf(why, sizeof why, "%s", rey_error(ctx));
+        rey_fail(ctx, result, "%s: %s", path, why);
     }
     if (result != REY_OK) {
         rey_scene_destroy(*out);

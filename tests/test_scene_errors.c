@@ -151,6 +151,37 @@ static void values_have_places(void **state) {
     check_cases(cases, sizeof cases / sizeof cases[0]);
 }
 
+// Embree ends the process where rays begin too far away; what is beyond is refused, also where a parameter moves there.
+static void far_places_are_refused(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<sensor type='perspective'><transform name='to_world'><translate x='1e19'/></transform></sensor>",
+         "scene.xml: sensor_0.to_world has a number beyond 1e+17: that is too far away for rays"},
+        {"<emitter type='point'><point name='position' x='-1e38'/></emitter>", "emitter_0.position has a number beyond 1e+17"},
+        {"<shape type='sphere'><point name='center' z='1e20'/></shape>", "shape_0.to_world has a number beyond 1e+17"},
+        {"<shape type='shapegroup' id='g'><shape type='cube'><transform name='to_world'><scale value='1e12'/></transform></shape>"
+         "</shape><shape type='instance'><ref id='g'/><transform name='to_world'><scale value='1.5e6'/></transform></shape>",
+         "the scene reaches farther than 1e+18"},
+    };
+    check_cases(cases, sizeof cases / sizeof cases[0]);
+    rey_context *ctx = NULL;
+    rey_scene *scene = NULL;
+    rey_render_def def = rey_default_render_def();
+    float image[4 * 4 * 3], position[3] = {0, 0, 5}, far[3] = {0, 0, 3e18f};
+    def.spp = 1;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    static const char text[] = "<integrator type='ptracer'/>" SENSOR "<emitter type='point'/><shape type='cube'/>";
+    assert_int_equal(load(ctx, text, &scene), REY_OK);
+    int param = rey_param_find(scene, "emitter_0.position");
+    assert_int_equal(rey_param_set(scene, param, far, 3), REY_OK);
+    assert_int_equal(rey_render(scene, &def, image, NULL), REY_ERROR_PARAM);
+    assert_int_equal(rey_render(scene, &def, image, NULL), REY_ERROR_PARAM); // nothing was taken as done
+    assert_int_equal(rey_param_set(scene, param, position, 3), REY_OK);
+    assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
+    rey_scene_destroy(scene);
+    rey_context_destroy(ctx);
+}
+
 static void what_is_missing_is_named(void **state) {
     (void)state;
     static const Case cases[] = {
@@ -299,6 +330,7 @@ int main(void) {
         cmocka_unit_test(neighbours_are_named),
         cmocka_unit_test(others_are_listed),
         cmocka_unit_test(values_have_places),
+        cmocka_unit_test(far_places_are_refused),
         cmocka_unit_test(what_is_missing_is_named),
         cmocka_unit_test(root_is_a_scene),
         cmocka_unit_test(twosided_is_opaque),

@@ -10,6 +10,7 @@
 #include "shape/affine.h"
 #include "shape/update.h"
 
+#include <math.h>
 #include <string.h>
 
 // Colours of black bodies whose temperature changed.
@@ -73,9 +74,46 @@ static rey_result update_media(rey_scene *scene) {
     return REY_OK;
 }
 
+// Embree asserts that rays begin within 1.8e18 of the origin. Shapes, sensors and lights stay so far below that what is added to
+// their places (a pose times a corner, a disk around the bounds) does, too.
+static const float FARTHEST = 1e17f;
+
+static rey_result check_places(const rey_scene *scene) {
+    for (size_t i = 0; i < scene->params.count; i++) {
+        const Param *p = &ARRAY_AT(scene->params, Param, i);
+        const float *values = scene->view.theta + p->theta;
+        bool place = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0, far = false;
+        if (!place || (p->version == p->built && scene->view.embree)) {
+            continue;
+        }
+        for (int32_t k = 0; k < p->count; k++) {
+            far |= !(fabsf(values[k]) <= FARTHEST);
+        }
+        if (far) {
+            return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s has a number beyond %g: that is too far away for rays", p->name,
+                            (double)FARTHEST);
+        }
+    }
+    return REY_OK;
+}
+
+// Poses of instances multiply what their groups hold.
+static rey_result check_bounds(const rey_scene *scene) {
+    const SceneView *view = &scene->view;
+    bool near = view->bounds_radius <= 10 * FARTHEST;
+    for (int k = 0; k < 3; k++) {
+        near = near && fabsf(view->bounds_centre[k]) <= 10 * FARTHEST;
+    }
+    return near ? REY_OK : rey_fail(scene->ctx, REY_ERROR_PARAM, "the scene reaches farther than %g: that is too far for rays",
+                                    10 * (double)FARTHEST);
+}
+
 rey_result rey_scene_update(rey_scene *scene) {
     SceneView *view = &scene->view;
-    rey_result result = REY_OK;
+    rey_result result = check_places(scene);
+    if (result != REY_OK) {
+        return result;
+    }
     rey_scene_mark_changes(scene);
     if (!scene->dirty) {
         return REY_OK;
@@ -98,6 +136,9 @@ rey_result rey_scene_update(rey_scene *scene) {
     }
     if (result == REY_OK) {
         result = rey_accel_update(scene);
+    }
+    if (result == REY_OK) {
+        result = check_bounds(scene);
     }
     if (result != REY_OK) {
         return result;
