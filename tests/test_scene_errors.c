@@ -182,6 +182,32 @@ static void far_places_are_refused(void **state) {
     rey_context_destroy(ctx);
 }
 
+// Lines of textures are counted one by one, which at 1e30 would have no end.
+static void far_textures_are_refused(void **state) {
+    (void)state;
+    static const char *const shapes[] = {"rectangle", "sphere"};
+    rey_context *ctx = NULL;
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+        rey_scene *scene = NULL;
+        rey_render_def def = rey_default_render_def();
+        char text[1024];
+        float image[4 * 4 * 3], tangent[16] = {[3] = 1};
+        def.spp = 1;
+        snprintf(text, sizeof text, INTEGRATOR SENSOR "<emitter type='constant'/><shape type='%s' id='wall'><bsdf type='diffuse'>"
+                 "<texture type='checkerboard' name='reflectance'><transform name='to_uv'><translate y='1e30'/></transform>"
+                 "</texture></bsdf></shape>", shapes[i]);
+        assert_int_equal(load(ctx, text, &scene), REY_OK);
+        int param = rey_param_find(scene, "wall.to_world");
+        assert_int_equal(rey_jvp(scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_ERROR_UNSUPPORTED);
+        if (!strstr(rey_error(ctx), "too far away to be found: wall.bsdf.reflectance.to_uv has numbers beyond 1e+12")) {
+            fail_msg("%s", rey_error(ctx));
+        }
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
+}
+
 static void what_is_missing_is_named(void **state) {
     (void)state;
     static const Case cases[] = {
@@ -331,6 +357,7 @@ int main(void) {
         cmocka_unit_test(others_are_listed),
         cmocka_unit_test(values_have_places),
         cmocka_unit_test(far_places_are_refused),
+        cmocka_unit_test(far_textures_are_refused),
         cmocka_unit_test(what_is_missing_is_named),
         cmocka_unit_test(root_is_a_scene),
         cmocka_unit_test(twosided_is_opaque),

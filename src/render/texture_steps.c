@@ -146,6 +146,19 @@ static rey_result push_step(Steps *s, TextureStep step) {
     return REY_OK;
 }
 
+// Beyond it doubles do not tell apart what lies NEARLY (marks.c) on a line, and lines could not be counted one by one.
+static const double LARGEST_LEVEL = 1e12;
+
+static rey_result fail_large(const Steps *s, int32_t id) {
+    const char *name = "";
+    for (size_t i = 0; i < s->scene->params.count; i++) {
+        const Param *p = &ARRAY_AT(s->scene->params, Param, i);
+        name = p->to_uv == id ? p->name : name;
+    }
+    return rey_fail(s->scene->ctx, REY_ERROR_UNSUPPORTED, "the texture jumps along lines that are too many or too far away to be "
+                    "found: %s has numbers beyond %g over its width or height in texels", name, LARGEST_LEVEL);
+}
+
 // Lines x' = level / width and y' = level / height, (x', y') = to_uv (x, y); with `slopes`, half a texel further, where those of
 // bilinear filtering jump. Behind the border of a picture that is clamped nothing jumps.
 static rey_result push_grid(Steps *s, int32_t id, int32_t width, int32_t height, bool clamped, bool slopes) {
@@ -156,6 +169,9 @@ static rey_result push_grid(Steps *s, int32_t id, int32_t width, int32_t height,
     rey_result result = REY_OK;
     for (int k = 0; k < 2 && result == REY_OK; k++) {
         double n = k ? height : width;
+        if (!(n * ((double)fabsf(m[3 * k]) + (double)fabsf(m[3 * k + 1]) + (double)fabsf(m[3 * k + 2])) <= LARGEST_LEVEL)) {
+            return fail_large(s, id);
+        }
         result = push_step(s, (TextureStep){.sort = STEP_LINES, .at = first < 0 ? -1 : first + 3 * k, .scale = n,
                                             .u = n * (double)m[3 * k], .v = n * (double)m[3 * k + 1],
                                             .offset = n * (double)m[3 * k + 2] - (slopes ? 0.5 : 0),

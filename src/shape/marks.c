@@ -155,6 +155,15 @@ static rey_result mark_sides(const Marking *w, size_t i, int32_t prim, const dou
     return result;
 }
 
+// The whole numbers of a range, or as many of them as are too many.
+static void whole_levels(const TextureStep *s, double *low, double *high) {
+    *low = fmax(ceil(*low - NEARLY), s->low);
+    *high = fmin(floor(*high + NEARLY), s->high);
+    if (*high - *low > MOST_MARKS) {
+        *low = *high - MOST_MARKS;
+    }
+}
+
 static rey_result mark_triangle(const Marking *w, size_t i, int32_t prim, const double uv[3][2]) {
     const TextureStep *s = &ARRAY_AT(*w->steps, TextureStep, i);
     double f[3], low = INFINITY, high = -INFINITY, ends[4];
@@ -163,11 +172,7 @@ static rey_result mark_triangle(const Marking *w, size_t i, int32_t prim, const 
         low = fmin(low, f[k]);
         high = fmax(high, f[k]);
     }
-    low = fmax(ceil(low - NEARLY), s->low);
-    high = fmin(floor(high + NEARLY), s->high);
-    if (high - low > MOST_MARKS) {
-        low = high - MOST_MARKS; // as many as are too many
-    }
+    whole_levels(s, &low, &high);
     rey_result result = REY_OK;
     for (double level = low; level <= high && result == REY_OK; level++) {
         bool known;
@@ -241,8 +246,7 @@ static rey_result mark_round(const Marking *w, size_t i) {
         return mark_line(w, i, false, (double[2]){0, 0}, (double[2]){disk ? 1 : 0, disk ? 0 : 1});
     }
     double low = s->offset + fmin(s->u, 0) + fmin(s->v, 0), high = s->offset + fmax(s->u, 0) + fmax(s->v, 0), ends[2][2];
-    low = fmax(ceil(low - NEARLY), s->low);
-    high = fmin(floor(high + NEARLY), s->high);
+    whole_levels(s, &low, &high);
     rey_result result = REY_OK;
     for (double level = low; level <= high && result == REY_OK; level++) {
         bool known;
