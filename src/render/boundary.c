@@ -35,6 +35,8 @@ int rey_boundary_term(int32_t kind) {
         return REY_TERM_PRIMARY;
     case BOUNDARY_CHAINED:
     case BOUNDARY_MIRRORED:
+    case BOUNDARY_CHAINED_TERMINATOR:
+    case BOUNDARY_CHAINED_HORIZON:
         return REY_TERM_SPECULAR;
     default:
         return REY_TERM_INDIRECT;
@@ -49,6 +51,15 @@ static bool has_chains(const SceneView *view) {
         }
     }
     return false;
+}
+
+// Whether a function refracts smoothly.
+static bool refracts(const SceneView *view, int32_t bsdf) {
+    bool found = bsdf >= 0 && rey_bsdf_refracts(view->bsdfs[bsdf].kind);
+    for (int k = 0; bsdf >= 0 && k < MAX_CHILDREN && !found; k++) {
+        found = refracts(view, view->bsdfs[bsdf].child[k]);
+    }
+    return found;
 }
 
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
@@ -70,8 +81,8 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
         }
     }
     for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
-        if (view->shapes[i].flags & SHAPE_HAS_NORMALS) {
-            return (ChainObstacle){"the vertex normals of", i, -1, -1};
+        if ((view->shapes[i].flags & SHAPE_HAS_NORMALS) && refracts(view, view->shapes[i].bsdf)) {
+            return (ChainObstacle){"the vertex normals of the smooth glass", i, -1, -1};
         }
     }
     return (ChainObstacle){NULL, -1, -1, -1};
@@ -201,7 +212,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
                                                   [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
-                                                  [BOUNDARY_LINES] = 1};
+                                                  [BOUNDARY_LINES] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
+                                                  [BOUNDARY_CHAINED_HORIZON] = 4};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -257,11 +269,13 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     return result;
 }
 
-// Where the boundary terms are not computed, paths look out for shading normals that turn away.
+// Where the boundary terms are not computed, paths look out for shading normals that turn away. Indices of refraction move nothing
+// that the sensor sees itself.
 static void watch_smooth_normals(Render *r) {
     const SceneView *view = &r->scene->view;
     const int both = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
-    r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && (r->terms & both) != both;
+    bool whole = (r->terms & both) == both || (!r->def.terms && (r->terms & REY_TERM_SPECULAR));
+    r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && !whole;
     for (int64_t i = 0; i < view->shapes_count && r->job.watch_smooth; i++) {
         if (r->job.normals_at[i] >= 0 && view->shapes[i].emitter >= 0) {
             // A light's normals say into which directions it shines: light samples jump where none of its points is met.

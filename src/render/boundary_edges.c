@@ -403,7 +403,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
     }
-    bool turning = w->kind == BOUNDARY_TERMINATOR || w->kind == BOUNDARY_HORIZON;
+    bool turning = boundary_is_terminator(w->kind) || boundary_is_horizon(w->kind);
     if ((w->kind == BOUNDARY_CUT) != (e->kind == EDGE_CUT)) {
         return 0;
     }

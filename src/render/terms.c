@@ -48,7 +48,7 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
     }
     if (p->normals >= 0) {
-        return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+        return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
     if (p->to_uv >= 0) {
         return gap_of_lines(scene) ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;

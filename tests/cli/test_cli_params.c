@@ -94,12 +94,14 @@ static void refusals_name_objects(void **state) {
         {"<emitter type='spot' id='torch'><float name='cutoff_angle' value='20'/><float name='beam_width' value='19.99'/>"
          "</emitter>",
          "does not know the border of the light of spots whose beam_width is all but their cutoff_angle ('torch')"},
-        {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='obj' id='hill'><string name='filename' "
-         "value='hill.obj'/></shape>",
+        {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='rectangle' id='leaf'>"
+         "<bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='diffuse'/></bsdf></shape>",
          "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in "
-         "or through it are not found because of the vertex normals of 'hill'"},
+         "or through it are not found because of light that passes undeviated through 'leaf.bsdf'"},
+        {"<shape type='obj' id='pebble'><string name='filename' value='pebble.obj'/><bsdf type='dielectric'/></shape>",
+         "because of the vertex normals of the smooth glass 'pebble'"},
     };
-    FILE *file = fopen("hill.obj", "w");
+    FILE *file = fopen("pebble.obj", "w");
     assert_non_null(file);
     fputs("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0.1 1\nvn 0.1 0 1\nf 1//1 2//2 3//3\n", file);
     assert_int_equal(fclose(file), 0);

@@ -151,6 +151,19 @@ static const Motion motions[] = {
     {"seen_tiles.xml", "ball.to_world", TURN, {0.3f, 1, 0.4f}, 4, 4},
     {"seen_tiles.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 4},
     {"seen_tiles.xml", "coin.to_world", TURN, {0, 0.3f, 1}, 2, 3},
+    {"smooth_seen.xml", "ball.positions", SHEAR, {0}, 0.02, 1},
+    {"smooth_seen.xml", "mirror.to_world", TURN, {0.2f, 1, 0.1f}, 0.5, 1},
+    {"smooth_hill.xml", "hill.positions", SHEAR, {0}, 0.02, 1},
+    {"smooth_hill.xml", "hill.normals", SHEAR, {0}, 0.05, 1},
+    {"smooth_hill.xml", "crate.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
+    {"smooth_hill.xml", "camera.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 1},
+    {"smooth_glow.xml", "sheet.positions", SHEAR, {0}, 0.02, 1},
+    {"smooth_glow.xml", "mirror.to_world", TURN, {1, 0.3f, 0.2f}, 1, 1},
+    {"smooth_ball.xml", "ball.normals", SHEAR, {0}, 0.05, 2},
+    {"smooth_sheet.xml", "sheet.positions", SHEAR, {0}, 0.02, 2},
+    {"smooth_sheet.xml", "sheet.normals", SHEAR, {0}, 0.1, 2},
+    {"smooth_sheet.xml", "floor.to_world", SHIFT, {1, 1, 0.2f}, 0.03, 2},
+    {"smooth_lit.xml", "ball.positions", SHEAR, {0}, 0.02, 1},
     {"seen_lines.xml", "mirror.bsdf.specular_reflectance.to_uv", ADD, {0}, 0.008, 1},
     {"seen_lines.xml", "floor.bsdf.reflectance.to_uv", ADD, {0}, 0.01, 1},
     {"seen_lines.xml", "ball.emitter.radiance.to_uv", ADD, {0}, 0.01, 1},
@@ -291,7 +304,8 @@ static void test_motion(void **state) {
     const bool in_media = begins_with(m->room, "media_") || begins_with(m->room, "air_");
     assert_true(rms > 0);
     // Differences of where paths collide are noisy, and so are the edges of mirrors.
-    const double noisy = begins_with(m->room, "mirror_") ? 0.25 : begins_with(m->room, "seen_") ? 0.12 : 0;
+    const bool mirrors = begins_with(m->room, "mirror_") || begins_with(m->room, "smooth_");
+    const double noisy = mirrors ? 0.25 : begins_with(m->room, "seen_") ? 0.12 : 0;
     const double most = noisy > 0 ? noisy : begins_with(m->room, "air_") ? 0.03 : in_media ? 0.08 : 0.02;
     assert_true(sqrt(noise * sample_share()) <= most * rms);
     // At 1 % for all motions together [Sidak].
@@ -326,7 +340,8 @@ static void test_modes(void **state) {
     for (int i = 0; i < NUMBERS; i++) {
         ramp[i] = (float)(i / 3 % SIZE) / SIZE - 0.3f * (float)(i % 3);
     }
-    int last = begins_with(m->room, "mirror_") || begins_with(m->room, "seen_") ? REY_TERM_SPECULAR : REY_TERM_INDIRECT;
+    const bool chains = begins_with(m->room, "mirror_") || begins_with(m->room, "seen_") || begins_with(m->room, "smooth_");
+    int last = chains ? REY_TERM_SPECULAR : REY_TERM_INDIRECT;
     for (int term = REY_TERM_INTERIOR; term <= last; term *= 2) {
         rey_render_def def = def_make(64, 5, 2);
         def.terms = term;

@@ -8,7 +8,8 @@
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
 // along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); the planes
-// at which maps cut light off (turning.h); and lines of textures that move over their surfaces (lines.h).
+// at which maps cut light off (turning.h); and lines of textures that move over their surfaces (lines.h). CHAINED_TERMINATOR and
+// CHAINED_HORIZON are those of turning.h along such chains.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -19,6 +20,8 @@ enum {
     BOUNDARY_MIRRORED,
     BOUNDARY_CUT,
     BOUNDARY_LINES,
+    BOUNDARY_CHAINED_TERMINATOR,
+    BOUNDARY_CHAINED_HORIZON,
     BOUNDARY_KINDS
 };
 
@@ -43,6 +46,16 @@ typedef struct BoundaryJob {
     const int32_t *none;      // the offsets of a selection of nothing
     const PathJob *still;     // the job with that selection
 } BoundaryJob;
+
+// Kinds of turning.h: curves on which n . w = 0, n the shading normal of what is seen along w, or the geometric normal of what
+// looks along it; and those whose segments are pieces of chains, or begin one.
+static inline bool boundary_is_terminator(int32_t kind) {
+    return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR;
+}
+static inline bool boundary_is_horizon(int32_t kind) { return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON; }
+static inline bool boundary_is_chained(int32_t kind) {
+    return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON;
+}
 
 // Samples of one number of a `pixel` of their random numbers.
 enum { BOUNDARY_PER_SET = 1 << 24 };

@@ -2,6 +2,9 @@
 // of the line there, both sides part where F = n . e - n' . e' - (n - n') . r = 0. Of an edge, e is its point, n the normal of
 // the plane of edge and line, and n' = 0. Where two surfaces pass through each other, their points e and e' are at the same
 // distance on the line, n = N / (N . d) and n' = N' / (N' . d). Lines of textures are as edges.
+// Meshes with vertex normals add two curves on which F = n . d = 0 within one triangle (turning.h): n its shading normal, which
+// turns away from the line that meets it there; or n its plane's normal at the vertex before, in front of which or behind which
+// what is mirrored or refracted there along d begins.
 #pragma once
 
 #include "integrator/boundary/field.h"
@@ -12,6 +15,8 @@ typedef struct Crossing {
     Vec3 p;              // on the line
     Vec3 n, n_other, across; // across: n - n'
     Mask m, meeting;
+    Mask terminator, horizon; // n . view = 0 in the triangle of `hit`: where the line ends, or at the vertex before
+    Vec3 view;
     Int step;            // of the texture that jumps there, else -1: how it rises over the surface, and uv
     Vec3 rise;
     Vec2 uv;
@@ -197,6 +202,43 @@ static Mask crossing_mark(const Tracer *t, const BoundaryJob *b, const Ends *e, 
     return m;
 }
 
+// Vertices of a level at which two lines meet one triangle with vertex normals; lanes of m.
+static Mask smooth_alike(const SceneView *scene, const Hit hit[2], Mask m) {
+    m = m & mi_lt(i_set(-1), hit[0].shape) & mi_eq(hit[0].shape, hit[1].shape) & mi_eq(hit[0].prim, hit[1].prim) &
+        mi_eq(hit[0].instance, hit[1].instance);
+    return m & mi_lt(i_set(0), SHAPE_FIELD(scene, i_select(m, hit[0].shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
+}
+
+// Lanes of m in which the normal of such a triangle turns away from lines that meet it, or its plane from those that leave it.
+static void crossing_turns(const Tracer *t, const Sightline lines[2], const Ends *e, Int level, Mask m, Crossing *c) {
+    const SceneView *scene = t->scene;
+    Ends before;
+    Vec3 ng = v3_zero(), shading = ng;
+    for (int k = 0; k < 2; k++) {
+        ends_load(lines + k, level - 1, k, &before);
+    }
+    Mask left = smooth_alike(scene, before.hit, m), own = smooth_alike(scene, e->hit, m);
+    c->terminator = own & ~mi_eq(e->behind[0], e->behind[1]);
+    Hit hit = hit_select(c->terminator, e->hit, before.hit);
+    for (left = left | c->terminator; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, &hit, &left, &id, &h);
+        Interaction si = shape_interaction(scene, scene->groups[id].shape_kind, scene->groups[id].shape_flags, &h);
+        ng = v3_select(mine, si.ng, ng);
+        shading = v3_select(mine, si.sh.n, shading);
+    }
+    c->horizon = ~c->terminator & m_lt(v3_dot(ng, e->d[0]) * v3_dot(ng, e->d[1]), f_set(0));
+    Mask turns = c->terminator | c->horizon;
+    c->view = e->d[0];
+    c->hit = hit_select(turns, &hit, &c->hit);
+    c->p = v3_select(turns, e->hit[0].p, c->p);
+    c->n = v3_select(turns, v3_select(c->terminator, shading, ng), c->n);
+    c->m = c->m | turns;
+    c->meeting = c->meeting & ~turns;
+    c->step = i_select(turns, i_set(-1), c->step);
+}
+
 static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, const Sightline lines[2], Int level, Mask m) {
     Ends e;
     Miss miss[2];
@@ -235,8 +277,9 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
     c.hit = hit_select(mark, &line, &c.hit);
     c.p = v3_select(mark, line.p, c.p);
     c.n = v3_select(mark, across, c.n);
-    c.across = v3_sub(c.n, c.n_other);
     c.m = edge[0] | edge[1] | c.meeting | mark;
+    crossing_turns(t, lines, &e, level, m, &c);
+    c.across = v3_sub(c.n, c.n_other);
     return c;
 }
 
@@ -245,11 +288,21 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
 static Carried crossing_move_adj(const Tracer *t, const Crossing *c, const Sightline *line, Int level, Float worth,
                                  Sink *sink) {
     Float own = f_zero_unless(c->m, worth);
-    points_move_adj(t, &c->hit, v3_scale(c->n, own), v3_zero(), sink, c->m);
+    Mask turns = c->terminator | c->horizon;
+    Carried end = {v3_select(turns, v3_zero(), v3_scale(c->across, -own)), v3_select(turns, v3_scale(c->n, own), v3_zero())};
+    points_move_adj(t, &c->hit, v3_scale(c->n, own), v3_zero(), sink, c->m & ~turns);
     if (m_any(c->meeting)) {
         points_move_adj(t, &c->other, v3_scale(c->n_other, -own), v3_zero(), sink, c->meeting);
     }
-    return sightline_back(t, line, level, c->p, v3_scale(c->across, -own), sink, c->m);
+    if (m_any(turns)) {
+        SurfaceAdj d = surface_adj_zero();
+        d.ng = v3_scale(c->view, own);
+        surfaces_move_adj(t, &c->hit, &d, sink, c->horizon & c->m);
+        d.n = d.ng;
+        d.ng = v3_zero();
+        end.drag = v3_select(c->terminator, rays_find_adj(t, &c->hit, c->view, &d, sink, c->terminator & c->m), end.drag);
+    }
+    return sightline_back(t, line, level, c->p, &end, sink, c->m);
 }
 
 // The same of lines of textures, by their to_uv: where a step grows, its line moves back over the surface.

@@ -46,8 +46,8 @@ static void far_paths(Indirect *in, int32_t *begin) {
     Tracer *t = in->t;
     Segments *q = &in->q;
     int32_t kind = in->b->kind;
-    t->placed = kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_MEETING || kind == BOUNDARY_LINES;
-    if (kind == BOUNDARY_TERMINATOR) {
+    t->placed = boundary_is_terminator(kind) || kind == BOUNDARY_MEETING || kind == BOUNDARY_LINES;
+    if (boundary_is_terminator(kind)) {
         turning_start(t, q, far_half(q));
     } else if (kind == BOUNDARY_MEETING) {
         meetings_start(t, q);
@@ -113,8 +113,11 @@ KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
     Int kind = i_gather(q->lit, slot);
     Mask lit = mi_eq(kind, i_set(1)), full = mi_eq(i_gather(q->full, slot), i_set(1));
     Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), spec_gather(q->rungs, slot));
-    Spec all = spec_sub(spec_sub(far_reflected(in, slot, bounce), emitted), far_reflected(in, other, bounce));
-    Spec chain = spec_sub(far_chain(in, slot, bounce), far_chain(in, other, bounce));
+    Spec all = spec_sub(far_reflected(in, slot, bounce), emitted), chain = far_chain(in, slot, bounce);
+    if (in->b->kind != BOUNDARY_CHAINED_HORIZON) { // whose samples are of one side
+        all = spec_sub(all, far_reflected(in, other, bounce));
+        chain = spec_sub(chain, far_chain(in, other, bounce));
+    }
     Spec jump = spec_mul(l, spec_select(full, all, chain));
     return spec_select(lit, spec_zero_unless(full, l), jump);
 }
@@ -124,18 +127,24 @@ KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
 KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     const Segments *q = &in->q;
     Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
+    Int other = slot + far_half(q);
+    if (boundary_is_chained(in->b->kind)) {
+        return far_jump(in, slot, bounce);
+    }
+    if (in->upstream) { // what comes along chains is for those
+        reflected = spec_sub(reflected, far_chain(in, slot, bounce));
+    }
     switch (in->b->kind) {
     case BOUNDARY_TERMINATOR:
+        reflected = in->upstream ? spec_add(reflected, far_chain(in, other, bounce)) : reflected;
+        return spec_sub(reflected, far_reflected(in, other, bounce));
     case BOUNDARY_LINES:
-        return spec_sub(reflected, far_reflected(in, slot + far_half(q), bounce));
+        return spec_sub(reflected, far_reflected(in, other, bounce));
     case BOUNDARY_HORIZON:
     case BOUNDARY_CUT:
     case BOUNDARY_MEETING:
         return reflected;
-    case BOUNDARY_CHAINED:
-        return far_jump(in, slot, bounce);
     default:
-        reflected = in->upstream ? spec_sub(reflected, far_chain(in, slot, bounce)) : reflected;
         reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
         return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
     }

@@ -63,7 +63,8 @@ static Mask glimpse_alike(const Sightline *a, const Sightline *b, Int turns, Mas
 static void glimpse_slope(const Tracer *t, const Glimpse *g, Vec2 lens, Vec3 target, const Frame *across, Sink *still, Mask m,
                           Vec2 rows[2]) {
     for (int k = 0; k < 2; k++) {
-        Carried c = sightline_back(t, &g->line, g->turns, target, k ? across->t : across->s, still, m);
+        const Carried end = {k ? across->t : across->s, v3_zero()};
+        Carried c = sightline_back(t, &g->line, g->turns, target, &end, still, m);
         rows[k] = film_adj(t, g->x, g->y, lens, g->line.hit[0].p, &c);
     }
 }
@@ -141,8 +142,8 @@ static Float glimpse_again(const Indirect *in, const SampleKey *key, Vec2 lens, 
 
 // Adds what the motion of vertices at the ends of these lines is worth, drag: the adjoint of where the segment's line is there.
 static void glimpse_move_adj(const Tracer *t, const Glimpse *g, const Hit *hit, Vec3 drag, Vec2 lens, Sink *sink, Mask m) {
-    Vec3 ray = rays_meet_adj(t, hit, g->d, drag, sink, m);
-    Carried c = sightline_back(t, &g->line, g->turns, hit->p, ray, sink, m);
+    const Carried end = {rays_meet_adj(t, hit, g->d, drag, sink, m), v3_zero()};
+    Carried c = sightline_back(t, &g->line, g->turns, hit->p, &end, sink, m);
     if (sink->any_camera) {
         RayAdj adj = {g->line.hit[0].p, c.drag, c.turn};
         sensor_ray_adj(t->scene, t->sensor, g->x, g->y, lens, &adj, sink, m);

@@ -8,7 +8,7 @@
 // NOT differentiated: edges of surfaces that let light pass.
 #pragma once
 
-#include "integrator/boundary/slide.h"
+#include "integrator/boundary/segments_move.h"
 
 // ---- the near side -----------------------------------------------------------------------------------------------
 
@@ -110,7 +110,7 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
 }
 
 // Whether particles start at the near points themselves.
-KFN bool segments_at_surface(const BoundaryJob *b) { return b->kind == BOUNDARY_HORIZON || b->kind == BOUNDARY_CUT; }
+KFN bool segments_at_surface(const BoundaryJob *b) { return boundary_is_horizon(b->kind) || b->kind == BOUNDARY_CUT; }
 
 static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order, int32_t count, int32_t bounce,
                           int32_t next_count) {
@@ -138,7 +138,7 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     }
     next_count = particle_scatter(in->t, &at, bounce, -1, next_count);
     if (in->upstream) {
-        upstream_leave(in->t, &in->q, at.v.slot, bounce, in->b->kind == BOUNDARY_CHAINED, at.v.m);
+        upstream_leave(in->t, &in->q, at.v.slot, bounce, boundary_is_chained(in->b->kind), at.v.m);
     }
     return next_count;
 }
@@ -155,9 +155,6 @@ static void near_place(Tracer *t, const Segments *q, int32_t k) {
     i_store(p->medium + k, i_load(q->around + k));
     spec_store(p->beta, k, spec_load(q->flown, k));
 }
-
-static void ways_advance(Indirect *in, int32_t bounce, Sink *sink);
-static void ways_carry(Indirect *in, int32_t bounce);
 
 static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     Tracer *t = in->t;
@@ -215,247 +212,6 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     }
     t->lobes = NULL;
     t->job->scramble = scramble;
-}
-
-// ---- what moves --------------------------------------------------------------------------------------------------
-
-// The share of the near points in the motion of the segments k..., after that of everything else.
-static void segments_near_adj(Indirect *in, int32_t k, const Hit *near, Vec3 dnear, Float seen, Float unseen, Sink *sink, Mask m) {
-    const Segments *q = &in->q;
-    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
-    Mask attached = m & mi_lt(i_set(-1), near->shape); // the others are in the air
-    if (in->b->job.mode != MODE_FORWARD) {
-        points_slide_adj(in, near, v3_scale(dnear, seen), lens, sink, attached);
-        points_move_adj(in->t, near, v3_scale(dnear, unseen), v3_zero(), sink, attached);
-        return;
-    }
-    Float common = sink_taken(sink);
-    points_slide_adj(in, near, dnear, lens, sink, attached);
-    f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
-    points_move_adj(in->t, near, dnear, v3_zero(), sink, attached);
-    f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
-}
-
-// The motion of the segments k... but for their near points, worth `both`.
-static void segments_ahead_adj(const Indirect *in, int32_t k, Vec3 n, Float both, Sink *sink, Mask m) {
-    const Segments *q = &in->q;
-    Hit near = LOAD_HIT(q, k, near), edge = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
-    Float along = f_load(q->along + k);
-    Mask attached = m & mi_lt(i_set(-1), far.shape);
-    // n . (edge - lerp(near, far, along))
-    points_move_adj(in->t, &edge, v3_scale(n, both), v3_zero(), sink, m);
-    if (m_any(attached)) {
-        points_move_adj(in->t, &far, v3_scale(n, -both * along), v3_zero(), sink, attached);
-    }
-    Int light = i_load(q->source + k);
-    Mask delta = m & mi_lt(i_set(-1), light);
-    if (sink->any_places && m_any(delta)) {
-        // The direction from the near point turns the line past the edge.
-        LightMove move = light_move_zero();
-        Float behind = f_load(q->behind + k), total = f_select(m_gt(along, f_set(0)), behind * f_safe_rcp(along), f_set(1));
-        move.d = v3_scale(n, -both * behind);
-        lights_move_adj(in->t->scene, i_select(delta, light, i_set(0)), delta, near.p, record_v3(q->dx, q->dy, q->dz, k),
-                        total, &move, sink);
-    }
-}
-
-// The motion of the segments k..., worth `seen` where the sensor sees the near points, and `unseen` elsewhere: adds it to the
-// gradient, or in forward mode leaves in both what it is.
-static void segments_move_adj(Indirect *in, int32_t k, Sink *sink) {
-    const Segments *q = &in->q;
-    Mask m = m_first_n(q->count - k);
-    bool forward = in->b->job.mode == MODE_FORWARD;
-    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
-    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-    m = m & m_finite(seen + unseen);
-    Hit near = LOAD_HIT(q, k, near);
-    segments_ahead_adj(in, k, n, seen + unseen, sink, m);
-    segments_near_adj(in, k, &near, v3_scale(n, f_load(q->along + k) - 1.0f), seen, unseen, sink, m);
-}
-
-// ---- what moves upstream -----------------------------------------------------------------------------------------
-
-KFN void carried_store(const Segments *q, int32_t k, const Carried *c) {
-    f_store(q->dragx + k, c->drag.x);
-    f_store(q->dragy + k, c->drag.y);
-    f_store(q->dragz + k, c->drag.z);
-    f_store(q->turnx + k, c->turn.x);
-    f_store(q->turny + k, c->turn.y);
-    f_store(q->turnz + k, c->turn.z);
-}
-
-// Forward mode: the rates of the ways that end at the vertices of a bounce, where the particles have just arrived.
-static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
-    const Segments *q = &in->q;
-    for (int32_t k = 0; k < q->count && bounce < q->levels && in->b->job.mode == MODE_FORWARD; k += LANES) {
-        Mask m = m_first_n(q->count - k);
-        Carried c = {record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
-        Float rate = f_load(q->rate + k);
-        if (bounce == 0) {
-            Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-            segments_ahead_adj(in, k, n, f_set(1), sink, m);
-            c = (Carried){v3_scale(n, f_load(q->along + k) - 1.0f), v3_zero()};
-            rate = sink_taken(sink);
-        } else {
-            upstream_turn_adj(in->t, q, bounce - 1, k, &c, sink, m);
-            rate = rate + sink_taken(sink);
-        }
-        UpstreamVertex at = upstream_load(q, bounce, k);
-        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
-        Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
-        points_slide_adj(in, &at.hit, c.drag, lens, sink, ray);
-        f_store(q->up[bounce].seen + k, f_zero_unless(ray, rate + sink_taken(sink)));
-        points_move_adj(in->t, &at.hit, c.drag, v3_zero(), sink, ray);
-        f_store(q->up[bounce].unseen + k, f_zero_unless(ray, rate + sink_taken(sink)));
-        f_store(q->rate + k, rate);
-        carried_store(q, k, &c);
-    }
-}
-
-// Reverse mode: what is carried upstream to there, where chains lead on to the sensor.
-static void ways_carry(Indirect *in, int32_t bounce) {
-    const Segments *q = &in->q;
-    Sink still = sink_of(in->b->still);
-    for (int32_t k = 0; k < q->count && bounce < q->levels; k += LANES) {
-        Mask m = m_first_n(q->count - k);
-        Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-        Carried c = {v3_scale(n, f_load(q->along + k) - 1.0f), v3_zero()};
-        if (bounce > 0) {
-            c = (Carried){record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
-            upstream_turn_adj(in->t, q, bounce - 1, k, &c, &still, m);
-        }
-        carried_store(q, k, &c);
-    }
-}
-
-// Reverse mode: the motion of the segments k... and of their ways, by what the vertices of every level are worth.
-static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
-    const Segments *q = &in->q;
-    Mask m = m_first_n(q->count - k);
-    Float worth[MOST_UPSTREAM + 1], sum = f_set(0);
-    for (int32_t j = q->levels; j >= 0; j--) { // of a level and all that follow
-        Mask met = j < q->levels ? m & mi_lt(i_set(UPSTREAM_NONE), i_load(q->up[j].met + k)) : m_set(false);
-        Float own = j < q->levels ? f_load(q->up[j].seen + k) + f_load(q->up[j].unseen + k) + f_load(q->up[j].passed + k)
-                                  : f_set(0);
-        sum = sum + f_zero_unless(met, own);
-        worth[j] = sum;
-    }
-    m = m & m_finite(sum);
-    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-    segments_ahead_adj(in, k, n, worth[0], sink, m);
-    Carried c = {v3_scale(n, (f_load(q->along + k) - 1.0f) * worth[0]), v3_zero()};
-    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
-    for (int32_t j = 0; j < q->levels; j++) {
-        Float rcp = f_zero_unless(m_ne(worth[j], f_set(0)), 1.0f / f_select(m_ne(worth[j], f_set(0)), worth[j], f_set(1)));
-        UpstreamVertex at = upstream_load(q, j, k);
-        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
-        if (m_any(ray)) {
-            points_slide_adj(in, &at.hit, v3_scale(c.drag, f_load(q->up[j].seen + k) * rcp), lens, sink, ray);
-            points_move_adj(in->t, &at.hit, v3_scale(c.drag, f_load(q->up[j].unseen + k) * rcp), v3_zero(), sink, ray);
-        }
-        Float share = worth[j + 1] * rcp;
-        c = (Carried){v3_scale(c.drag, share), v3_scale(c.turn, share)};
-        upstream_turn_adj(in->t, q, j, k, &c, sink, m);
-    }
-}
-
-// The same of n . view / r between x and the other end of segments at right angles to n (turning.h). x slides where the sensor
-// sees it, but in the plane that its geometric normal stands for.
-static void turnings_move_adj(Indirect *in, int32_t k, Sink *sink) {
-    const Segments *q = &in->q;
-    Mask m = m_first_n(q->count - k);
-    bool forward = in->b->job.mode == MODE_FORWARD, horizon = in->b->kind == BOUNDARY_HORIZON;
-    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
-    m = m & m_finite(seen + unseen);
-    Float both = f_zero_unless(m, seen + unseen), factor = f_load(q->along + k);
-    Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero()), d = record_v3(q->dx, q->dy, q->dz, k);
-    Vec3 apart = v3_select(m, v3_scale(n, f_load(q->behind + k)), v3_zero()), turned = v3_scale(d, both * factor);
-    Hit near = LOAD_HIT(q, k, near), x = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
-    SurfaceAdj own = surface_adj_zero();
-    own.p = v3_scale(apart, -both);
-    if (horizon) {
-        own.ng = turned;
-    } else {
-        own.n = v3_neg(turned);
-    }
-    surfaces_move_adj(in->t, &x, &own, sink, m);
-    if (horizon) {
-        points_move_adj(in->t, &far, v3_scale(apart, both), v3_zero(), sink, m & mi_lt(i_set(-1), far.shape));
-        if (forward) {
-            Float all = sink_taken(sink);
-            f_store(q->seen + k, all);
-            f_store(q->unseen + k, all);
-        }
-        return;
-    }
-    segments_near_adj(in, k, &near, apart, seen, unseen, sink, m);
-}
-
-// The same where maps cut light off. The plane of the shading normal turns where x slides.
-static void cuts_move_adj(Indirect *in, int32_t k, Sink *sink) {
-    const Segments *q = &in->q;
-    bool forward = in->b->job.mode == MODE_FORWARD;
-    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(1) : f_load(q->unseen + k);
-    Mask m = m_first_n(q->count - k) & m_finite(seen + unseen);
-    Vec3 apart = v3_scale(record_v3(q->nx, q->ny, q->nz, k), f_load(q->behind + k));
-    Vec3 turned = v3_scale(record_v3(q->dx, q->dy, q->dz, k), f_load(q->along + k));
-    apart = v3_select(m, apart, v3_zero());
-    Hit x = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
-    Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
-    Mask attached = m & mi_lt(i_set(-1), far.shape);
-    points_move_adj(in->t, &far, v3_scale(apart, forward ? f_set(1) : seen + unseen), v3_zero(), sink, attached);
-    Float common = forward ? sink_taken(sink) : f_set(0);
-    SurfaceAdj own = surface_adj_zero();
-    own.p = v3_scale(apart, -seen);
-    own.n = v3_select(m, v3_scale(turned, seen), v3_zero());
-    surfaces_slide_adj(in, &x, &own, lens, sink, m);
-    if (forward) {
-        f_store(q->seen + k, f_zero_unless(m, common + sink_taken(sink)));
-    }
-    own.p = v3_scale(apart, -unseen);
-    own.n = v3_select(m, v3_scale(turned, unseen), v3_zero());
-    surfaces_move_adj(in->t, &x, &own, sink, m);
-    if (forward) {
-        f_store(q->unseen + k, f_zero_unless(m, common + sink_taken(sink)));
-    }
-}
-
-// The same of the two surfaces of meetings. Where near points are has no part in it.
-static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
-    const Segments *q = &in->q;
-    bool forward = in->b->job.mode == MODE_FORWARD;
-    Mask m = m_first_n(q->count - k);
-    Float worth = forward ? f_set(1) : f_load(q->seen + k) + f_load(q->unseen + k);
-    m = m & m_finite(worth);
-    Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
-    Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
-    points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
-    Mask attached = m & mi_lt(i_set(-1), other.shape);
-    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, attached);
-    if (sink->any_places) {
-        borders_move_adj(in->t->scene, other.prim, other.p, w, sink, m & ~attached);
-    }
-    if (forward) {
-        Float all = sink_taken(sink);
-        f_store(q->seen + k, all);
-        f_store(q->unseen + k, all);
-    }
-}
-
-static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
-    if (in->upstream) {
-        ways_move_adj(in, k, sink);
-    } else if (in->b->kind == BOUNDARY_INDIRECT) {
-        segments_move_adj(in, k, sink);
-    } else if (in->b->kind == BOUNDARY_MEETING) {
-        meetings_move_adj(in, k, sink);
-    } else if (in->b->kind == BOUNDARY_LINES) {
-        lines_move_adj(&in->q, in->b->job.mode == MODE_FORWARD, k, sink);
-    } else if (in->b->kind == BOUNDARY_CUT) {
-        cuts_move_adj(in, k, sink);
-    } else {
-        turnings_move_adj(in, k, sink);
-    }
 }
 
 // Samples first... of a chunk.

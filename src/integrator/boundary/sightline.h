@@ -121,9 +121,9 @@ static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
     to->last = from->last > to->last ? from->last : to->last;
 }
 
-// Carries the adjoint of the position of the ray that comes to vertex `level`, at p, back to the sensor.
-static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Vec3 p, Vec3 drag, Sink *sink, Mask m) {
-    Carried c = {v3_select(m, drag, v3_zero()), v3_zero()};
+// Carries the adjoints of the position of the ray that comes to vertex `level`, at p, and of its direction back to the sensor.
+static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Vec3 p, const Carried *end, Sink *sink, Mask m) {
+    Carried c = {v3_select(m, end->drag, v3_zero()), v3_select(m, end->turn, v3_zero())};
     for (int32_t i = s->last - 2; i >= 0; i--) {
         Mask on = m & mi_lt(i_set(i), level);
         if (!m_any(on)) {

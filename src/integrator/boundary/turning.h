@@ -6,6 +6,11 @@
 //   dI += integral dA_x dphi f |n_s . w| (n' . w + n . (b' - x') / r) L W              horizon, -L from below
 // over the points x of meshes, for the first two smooth ones, and the directions w at right angles to n:
 // docs/derivations/boundary.md.
+// Along chains of smooth mirrors and glass (chained.h) F = n . w is carried back with the ray, whose direction at the vertex before
+// the chain is fixed. Terminator: F' is that of where the ray meets the surface. Horizon: x begins the chain, or w is what it makes
+// of a ray that comes back along v,
+//   dI += integral dA_x dphi |n_g . w| F' (L+ - L-) W                                  terminator
+//   dI += integral dA_x dphi f |n_g . v| (dv / dw) F' L W                              horizon, -L from below
 // Cut: maps without a shadowing function scatter what comes from one side of the plane of the surface's own shading normal n
 // only, f with the cosine of the map's normal: as the horizon, f on either side.
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
@@ -90,13 +95,13 @@ static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Tu
     Vec2 way = rng_2d(&key, DIMENSION_SEGMENT_END);
     Float probability;
     Vec3 cross, shading = turning_point(t->scene, b, &key, out, &cross, &probability);
-    bool horizon = b->kind == BOUNDARY_HORIZON;
+    bool horizon = boundary_is_horizon(b->kind);
     out->n = horizon ? out->ng : shading;
     Float around = b->kind == BOUNDARY_CUT ? cut_directions(way, out)
                                            : turning_directions(way, horizon ? shading : out->ng, horizon, out);
     out->weight = 0.5f * v3_length(cross) * around * f_safe_rcp(probability);
     out->factor = f_set(1);
-    if (b->kind != BOUNDARY_TERMINATOR) { // what comes from above or from below, each with its own distance
+    if (!boundary_is_terminator(b->kind)) { // what comes from above or from below, each with its own distance
         Mask above = m_lt(rng_1d(&key, DIMENSION_TURNING_SIDE), f_set(0.5f));
         out->factor = f_select(above, f_set(2), f_set(-2));
     }
@@ -146,7 +151,7 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {
-            turning_trace(t, &s, b->kind != BOUNDARY_TERMINATOR, i_iota() + i, q);
+            turning_trace(t, &s, !boundary_is_terminator(b->kind), i_iota() + i, q);
         }
     }
 }

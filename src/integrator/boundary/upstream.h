@@ -114,8 +114,8 @@ KFN real *upstream_row(const Segments *q, int32_t slot, int32_t bounce) {
 
 // ---- motion ------------------------------------------------------------------------------------------------------
 
-// Points where a ray along d meets their surfaces, with the adjoint dp of their positions: returns that of the ray's.
-static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink *sink, Mask m) {
+// Where rays along d meet surfaces, with the adjoint `worth` of what they find: returns that of the rays' positions.
+static Vec3 rays_find_adj(const Tracer *t, const Hit *hit, Vec3 d, const SurfaceAdj *worth, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     Vec3 drag = v3_zero();
     for (Mask left = m; m_any(left);) {
@@ -125,9 +125,8 @@ static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink
         const Group *group = scene->groups + id;
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Slide slide[2];
-        SurfaceAdj a = surface_adj_zero();
+        SurfaceAdj a = *worth;
         shape_slide(scene, group->shape_kind, group->shape_flags, &h, &si, slide);
-        a.p = dp;
         Vec3 position = slide_adj(slide, d, &a);
         a.p = v3_sub(a.p, position);
         if (t->job->live[id] & LIVE_MOTION) {
@@ -136,6 +135,13 @@ static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink
         drag = v3_select(mine, position, drag);
     }
     return drag;
+}
+
+// Of the positions of what they find.
+static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink *sink, Mask m) {
+    SurfaceAdj worth = surface_adj_zero();
+    worth.p = dp;
+    return rays_find_adj(t, hit, d, &worth, sink, m);
 }
 
 // Rays along d that are mirrored or refracted into wo, to meet something at a distance: carries the adjoints of their
