@@ -207,7 +207,8 @@ static void test_meetings(void **state) {
         assert_true(bent || v3_length(v3_sub(si.p, e.p)) < 1e-4f);
         assert_near_v3("hit of the other one", e.met.p, e.p, 0);
         assert_int_equal(e.met.shape, SPHERE);
-        assert_true(!edge_is_silhouette(&w.scene, &w.job, &e, v3_cross(e.tangent, random_vector(&random))));
+        Vec3 d = random_vector(&random), n = v3_normalize(v3_cross(e.tangent, d));
+        assert_true(!edge_is_silhouette(&w.scene, &w.job, &e, n, d));
         check_tangent(&w, &e, u, v3_zero(), false);
     }
 }

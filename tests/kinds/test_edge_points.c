@@ -33,9 +33,18 @@ static void test_mesh_edges(void **state) {
         const int32_t fan[2] = {apex, 3};
         w.job.fans = fan;
         e.fan_count = round % 7 ? 0 : 2;
-        Vec3 n = v3_cross(e.tangent, random_vector(&random));
+        Vec3 d = random_vector(&random), n = v3_normalize(v3_cross(e.tangent, d));
         bool alike = v3_dot(e.side[0], n) * v3_dot(v3_sub(p[3], p[from]), n) > 0;
-        assert_true((edge_is_silhouette(&w.scene, &w.job, &e, n) != 0) == ((e.open && !e.fan_count) || alike));
+        assert_true((edge_is_silhouette(&w.scene, &w.job, &e, n, d) != 0) == ((e.open && !e.fan_count) || alike));
+        // What is seen edge-on is an outline at the edge that rays pass first, not at the one behind.
+        const int edge_on = round % 2;
+        if (!e.open) {
+            d = e.side[edge_on];
+            n = v3_normalize(v3_cross(e.tangent, d));
+            assert_true(edge_is_silhouette(&w.scene, &w.job, &e, n, d));
+            assert_true(!edge_is_silhouette(&w.scene, &w.job, &e, n, v3_neg(d)));
+            assert_true((edge_first_rise(&e, n) > 0) == (v3_dot(e.side[!edge_on], n) > 0));
+        }
     }
 }
 

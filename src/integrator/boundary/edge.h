@@ -398,11 +398,32 @@ KFN Vec3 edge_reference(const SceneView *scene, const EdgePoint *e) {
     return v3_select(e->round, middle, e->p);
 }
 
-// Whether all triangles at an edge lie on one side of the plane with normal n through it: a silhouette for rays in that
-// plane. Elsewhere such rays pass from one of its faces to another.
-static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, const EdgePoint *e, Vec3 n) {
-    Float first = v3_dot(e->side[0], n);
-    Mask silhouette = e->open | m_gt(first * v3_dot(e->side[1], n), f_set(0));
+// How far a surface at an edge rises above the plane with the unit normal n through it; 0 where it lies in the plane as far as
+// floats can tell.
+KFN Float edge_rise(const EdgePoint *e, Vec3 side, Vec3 n) {
+    Float rise = v3_dot(side, n), least = 1e-6f * v3_length(side) + 1e-7f * v3_length(e->p);
+    return f_zero_unless(m_gt(f_abs(rise), least), rise);
+}
+
+// That of the first surface that does not lie in the plane.
+KFN Float edge_first_rise(const EdgePoint *e, Vec3 n) {
+    Float rise = edge_rise(e, e->side[0], n);
+    return f_select(m_gt(f_abs(rise), f_set(0)), rise, f_zero_unless(~e->open, edge_rise(e, e->side[1], n)));
+}
+
+// Whether a surface at an edge lies on the same side as `first`. What rays along d meet edge-on is an outline once, at the edge
+// that they pass first: a noon sun on an upright wall, a plan of it.
+KFN Mask edge_goes_with(const EdgePoint *e, Vec3 side, Vec3 n, Vec3 d, Float first) {
+    Float rise = edge_rise(e, side, n);
+    return m_gt(rise * first, f_set(0)) | (m_le(f_abs(rise), f_set(0)) & m_gt(v3_dot(side, d), f_set(0)));
+}
+
+// Whether all triangles at an edge lie on one side of the plane with normal n through it and d: a silhouette for rays in that
+// plane along d. Elsewhere such rays pass from one of its faces to another.
+static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, const EdgePoint *e, Vec3 n, Vec3 d) {
+    Float first = edge_first_rise(e, n);
+    Mask silhouette = e->open | (edge_goes_with(e, e->side[0], n, d, first) & edge_goes_with(e, e->side[1], n, d, first));
+    silhouette = silhouette & m_gt(f_abs(first), f_set(0));
     Mask left = silhouette & mi_lt(i_set(0), e->fan_count);
     for (int32_t i = 0; m_any(left); i++, left = left & mi_lt(i_set(i), e->fan_count)) {
         Hit hit = e->hit;
@@ -415,7 +436,7 @@ static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, con
             hit.instance = i_select(inside, hit.instance, i_set(0));
             side = v3_select(inside, edge_to_world(scene, &hit, side), side);
         }
-        silhouette = silhouette & (~left | m_gt(first * v3_dot(side, n), f_set(0)));
+        silhouette = silhouette & (~left | edge_goes_with(e, side, n, d, first));
     }
     return silhouette;
 }
@@ -435,7 +456,7 @@ static Mask edge_is_seen(Tracer *t, const EdgePoint *e, const Ray rays[2], Mask 
 // Lanes of m in which two rays, the second one on the side of n, pass an edge between the surfaces that meet or end there. Next
 // to a corner a path may miss them; what it meets instead belongs to another edge's jump.
 static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
-    Mask own[2], clear[2], grazed[2], above = m_gt(v3_dot(e->side[0], n), f_set(0));
+    Mask own[2], clear[2], grazed[2], above = m_gt(edge_first_rise(e, n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
         Hit hit = trace_closest(t->scene, &ray, m, false);

@@ -42,7 +42,7 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->nx = f_copysign(rcp, turn) * -along.y;
     out->ny = f_copysign(rcp, turn) * along.x;
     out->weight = f_abs(turn) * f_safe_rcp(e.probability);
-    out->silhouette = edge_is_silhouette(t->scene, b, &e, n);
+    out->silhouette = edge_is_silhouette(t->scene, b, &e, n, s.d);
     out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
              m_gt(out->weight, f_set(0)) & (out->silhouette | e.crease);
     // The film ends where no samples are taken.
@@ -129,7 +129,7 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     for (int32_t k = 0; k < count && b->round; k += LANES) {
         PrimarySample s;
         primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
-        Mask above = m_gt(v3_dot(s.edge.side[0], s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
+        Mask above = m_gt(edge_first_rise(&s.edge, s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
         for (int side = 0; side < 2 && m_any(round | s.edge.mark); side++) {
             int32_t at = side * half + k;
             Mask inside = round & (side ? above : ~above);

@@ -182,10 +182,10 @@ static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, b
     Vec3 across = v3_cross(s->d, s->edge.tangent);
     Float length = v3_length(across);
     Vec3 n = v3_scale(across, f_safe_rcp(length));
-    Float into = v3_dot(s->edge.side[0], n);
+    Float into = edge_first_rise(&s->edge, n);
     s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
     s->weight = length * share * f_safe_rcp(s->edge.probability);
-    s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n);
+    s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n, s->d);
     Mask jumps = b->kind == BOUNDARY_CHAINED && !lit ? s->silhouette | s->edge.crease : s->silhouette;
     s->m = s->m & jumps & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
            m_gt(s->edge.probability, f_set(0));
