@@ -228,7 +228,7 @@ static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info 
     if (!values) {
         return REY_ERROR_MEMORY;
     }
-    rey_result result = cli_npy_read(ctx, op->file, info->count, values);
+    rey_result result = cli_npy_read_tangent(ctx, op->file, info, values);
     for (int64_t i = 0; i < info->count && !result; i++) {
         tangent[i] += values[i];
     }

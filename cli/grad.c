@@ -298,7 +298,10 @@ static rey_result differentiate(Grad *g) {
                                .values = g->shares, .direction = g->direction.tangent};
     g->needed = cli_direction_terms(s->scene, &g->direction);
     g->used = s->options->terms ? s->options->terms : g->needed;
-    return s->options->reverse ? reverse(g) : forward(g);
+    rey_result result = s->options->reverse ? reverse(g) : forward(g);
+    bool finite = isfinite(g->value) && isfinite(g->standard_error);
+    return result || finite ? result : rey_fail(s->ctx, REY_ERROR_ARGUMENT, "the derivative is not finite: the direction or the "
+                                                "adjoint is too large, expected numbers of which sums are below 1e38");
 }
 
 // Which terms a restricted gradient lacks, and why all of them together cannot be had, where that is so.

@@ -89,22 +89,26 @@ static rey_result read_values(rey_context *ctx, FILE *file, const char *path, co
     return REY_OK;
 }
 
-// shape: that the array must have, null = any.
-static rey_result npy_read(rey_context *ctx, const char *path, int64_t count, const char *name, const char *shape,
-                           float *values) {
+// flat: an array of one dimension will do as well.
+static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_info *info, bool flat, float *values) {
     FILE *file = fopen(path, "rb");
     if (!file) {
         return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
     }
-    Header header = {0};
+    Header header = {.shape = ""};
     rey_result result = read_header(ctx, file, path, &header);
-    if (!result && shape && strcmp(shape, header.shape[0] ? header.shape : "1") != 0) {
-        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s as in the scene", path, name,
+    char shape[64] = "1";
+    for (int i = 0, used = 0; i < info->dims; i++) {
+        used += snprintf(shape + used, sizeof shape - (size_t)used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
+    }
+    flat = flat && !strchr(header.shape, 'x');
+    if (!result && !flat && strcmp(shape, header.shape[0] ? header.shape : "1") != 0) {
+        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s as in the scene", path, info->name,
                           header.shape[0] ? header.shape : "1", shape);
     }
-    if (!result && header.count != count) {
+    if (!result && header.count != info->count) {
         result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: holds %lld numbers, the parameter has %lld", path,
-                          (long long)header.count, (long long)count);
+                          (long long)header.count, (long long)info->count);
     }
     if (!result) {
         result = read_values(ctx, file, path, &header, values);
@@ -113,15 +117,10 @@ static rey_result npy_read(rey_context *ctx, const char *path, int64_t count, co
     return result;
 }
 
-rey_result cli_npy_read(rey_context *ctx, const char *path, int64_t count, float *values) {
-    return npy_read(ctx, path, count, NULL, NULL, values);
+rey_result cli_npy_read_param(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
+    return npy_read(ctx, path, info, false, values);
 }
 
-rey_result cli_npy_read_param(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
-    char shape[64] = "";
-    for (int i = 0; i < info->dims; i++) {
-        size_t used = strlen(shape);
-        snprintf(shape + used, sizeof shape - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
-    }
-    return npy_read(ctx, path, info->count, info->name, info->dims ? shape : "1", values);
+rey_result cli_npy_read_tangent(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
+    return npy_read(ctx, path, info, true, values);
 }

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 enum { WIDTH = 32, HEIGHT = 24, FLOATS = WIDTH * HEIGHT * 3 };
 
@@ -87,6 +88,9 @@ static void nulls_are_refused(void **state) {
     CALL(rey_jvp(scene, &def, selection, NULL, image, NULL, NULL), bad, true);
     CALL(rey_jvp(scene, &def, selection, values, NULL, NULL, NULL), bad, true);
     CALL(rey_jvp(scene, &def, selection, values, image, NULL, NULL), REY_OK, true);
+    const float infinite[3] = {1, INFINITY, 1};
+    CALL(rey_jvp(scene, &def, selection, infinite, image, NULL, NULL), bad, true);
+    assert_non_null(strstr(rey_error(ctx), "not finite at entry 1"));
     assert_null(none);
 }
 

@@ -214,8 +214,9 @@ static rey_result build_single(Builder *b, rey_xml_node *node, const char *path,
     }
 }
 
-// What every sensor has. shape: that it belongs to, else -1.
-static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, const char *path, SensorRecord *s);
+// What every sensor has. shape: that it belongs to, else -1; batch: that it is one of, or null.
+static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, const SensorRecord *batch, const char *path,
+                               SensorRecord *s);
 
 static rey_result build_batch(Builder *b, rey_xml_node *node, const char *path, SensorRecord *s) {
     int n = rey_xml_count_children(node, REY_XML_BIT(REY_XML_SENSOR));
@@ -233,7 +234,7 @@ static rey_result build_batch(Builder *b, rey_xml_node *node, const char *path, 
         rey_xml_child *child = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SENSOR), i);
         snprintf(number, sizeof number, "sensor_%d", i);
         build_join(name, path, number);
-        TRY(build_record(b, child->node, -1, name, &part));
+        TRY(build_record(b, child->node, -1, s, name, &part));
         if (part.kind == SENSOR_BATCH) {
             return rey_xml_fail(b->ctx, child->at, REY_ERROR_SCENE, "a batch cannot stand inside of a batch");
         }
@@ -243,7 +244,8 @@ static rey_result build_batch(Builder *b, rey_xml_node *node, const char *path, 
     return REY_OK;
 }
 
-static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, const char *path, SensorRecord *s) {
+static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, const SensorRecord *batch, const char *path,
+                               SensorRecord *s) {
     bool first;
     *s = (SensorRecord){.kind = -1, .to_world = -1, .fov = -1, .lens = -1, .shape = shape, .medium = -1};
     TRY(build_visit(b, node, path, &first));
@@ -262,6 +264,11 @@ static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, co
     rey_xml_child *film = rey_xml_child_of(node, REY_XML_BIT(REY_XML_FILM), 0);
     rey_xml_child *sampler = rey_xml_child_of(node, REY_XML_BIT(REY_XML_SAMPLER), 0);
     TRY(build_film(b, film ? film->node : NULL, s));
+    if (batch) { // it sees its slice of the batch's film, whatever film it brings
+        s->crop_x = s->crop_y = 0;
+        s->width = s->crop_width = batch->width / batch->batch_count;
+        s->height = s->crop_height = batch->height;
+    }
     TRY(build_sampler(b, sampler ? sampler->node : NULL, s));
     TRY(s->kind == SENSOR_BATCH ? build_batch(b, node, path, s) : build_single(b, node, path, s));
     TRY(build_check_unused(b, node));
@@ -270,7 +277,7 @@ static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, co
 
 rey_result build_sensor(Builder *b, rey_xml_node *node, int32_t shape, const char *path) {
     SensorRecord s;
-    TRY(build_record(b, node, shape, path, &s));
+    TRY(build_record(b, node, shape, NULL, path, &s));
     node->built = rey_scene_append(b->scene, &b->scene->build.sensors, sizeof s, 1);
     if (node->built < 0) {
         return REY_ERROR_MEMORY;

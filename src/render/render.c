@@ -395,7 +395,12 @@ static rey_result prepare_tangent(Render *r, const float *tangent) {
     if (!r->tangent) {
         return REY_ERROR_MEMORY;
     }
-    memcpy(r->tangent, tangent, (size_t)r->selection_size * sizeof *tangent);
+    for (int64_t i = 0; i < r->selection_size; i++) {
+        r->tangent[i] = tangent[i];
+        if (!isfinite(tangent[i])) {
+            return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "the tangent is not finite at entry %lld", (long long)i);
+        }
+    }
     r->job.tangent = r->tangent;
     return rey_motion_tangent(r, r->tangent);
 }

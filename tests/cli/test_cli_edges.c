@@ -184,6 +184,19 @@ static void inputs_are_not_written(void **state) {
     assert_int_equal(system("cmp -s sky.exr before.exr"), 0);
     // Tangents are read as well.
     expect(f, 0, "grad lit.xml --param sky.scale --mode reverse --adjoint 1 -o slopes --spp 16");
+    expect(f, 0, "grad lit.xml --param sky.data --mode reverse --adjoint 1 -o slopes --spp 16");
+    expect(f, 0, "grad lit.xml --param sky.data:file=slopes/sky.data.npy --spp 16");
+    expect_words(f, 1, "grad lit.xml --param sky.data:file=slopes/sky.scale.npy --spp 16", "the parameter has");
+    // Same numbers, other shape: a picture on its side.
+    FILE *aside = fopen("aside.npy", "wb");
+    const char header[] = "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 1), }\n";
+    const float numbers[3] = {1, 2, 3};
+    assert_non_null(aside);
+    fprintf(aside, "\x93NUMPY\x01%c%c%c%s", 0, (int)strlen(header), 0, header);
+    fwrite(numbers, sizeof numbers, 1, aside);
+    fclose(aside);
+    expect_words(f, 1, "grad %s --param red.reflectance.value:file=aside.npy --spp 16", "has the shape 3x1, expected 3");
+    expect_words(f, 2, "grad lit.xml --param sky.scale --mode reverse --adjoint 3e38 --spp 16", "is not finite");
     expect_words(f, 2, "grad lit.xml --param sky.scale:file=slopes/sky.scale.npy -o slopes/sky.scale.npy --spp 16",
                  "slopes/sky.scale.npy is both read and written");
     expect_words(f, 2, "grad lit.xml --param sky.scale:file=slopes/sky.scale.npy --mode reverse --adjoint 1 -o slopes --spp 16",
