@@ -135,6 +135,15 @@ int main(int argc, char **argv) {
         printf("reynolds %s\n", rey_version());
         return cli_finish_output();
     }
+    if (!strcmp(word, "help") && argc > 2) {
+        for (int i = 0; i < COMMAND_COUNT; i++) {
+            if (!strcmp(argv[2], command_rows[i].name)) {
+                char *help[] = {argv[2], (char[]){"--help"}, NULL};
+                return command_rows[i].run(2, help);
+            }
+        }
+        return unknown_word(argv[2], false);
+    }
     if (!strcmp(word, "-h") || !strcmp(word, "--help") || !strcmp(word, "help")) {
         print_help(stdout);
         return cli_finish_output();

@@ -193,6 +193,10 @@ static void test_foreign_folder(void **state) {
     assert_int_equal(run_fit(f, OVERWRITE, 9, NULL), REY_OK);
     path_of(f, "out/checkpoint.bin", path);
     assert_int_equal(unlink(path), 0);
+    for (int how = ANEW; how <= RESUME; how++) { // what it recovered is still a fit's
+        assert_int_equal(run_fit(f, how, 9, NULL), REY_ERROR_ARGUMENT);
+        assert_non_null(strstr(rey_error(f->ctx), "not its checkpoint.bin"));
+    }
     path_of(f, "out/job.resolved.yaml", path);
     assert_int_equal(unlink(path) || write_text(f, "out/events.out.tfevents.1.host", "mine"), 0);
     assert_int_equal(run_fit(f, ANEW, 1, NULL), REY_ERROR_ARGUMENT); // its names are taken

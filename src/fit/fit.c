@@ -92,7 +92,9 @@ static rey_result resume(Fit *fit) {
     if (!result && access(path, F_OK) != 0 && access(job, F_OK) != 0) {
         result = rey_fail(fit->ctx, REY_ERROR_IO, "%s: this folder holds no fit to resume", fit->output);
     }
-    if (!result && access(path, F_OK) == 0) {
+    if (!result && access(path, F_OK) != 0) {
+        result = rey_fit_keep_recovered(fit);
+    } else if (!result) {
         result = rey_checkpoint_read(path, (FitOrigin){fit->flat, fit->inputs}, &fit->unknowns, &fit->state);
     }
     rey_free(fit->ctx, path);

@@ -120,6 +120,8 @@ char *rey_fit_output_path(const Fit *fit, const char *name);
 rey_result rey_fit_make_folder(rey_context *ctx, const char *path);
 // Makes the folder, locks it against other fits, and refuses to replace an earlier fit unasked.
 rey_result rey_fit_folder_open(Fit *fit);
+// An error where the folder holds what a fit recovered.
+rey_result rey_fit_keep_recovered(Fit *fit);
 void rey_fit_folder_close(Fit *fit);
 // How table and report render a view; the user may cancel.
 rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set, int spp);

@@ -93,15 +93,32 @@ static rey_result refuse_foreign(Fit *fit) {
     return result;
 }
 
+// A fit that failed or was killed before its first checkpoint left nothing to lose; what one recovered is kept.
+rey_result rey_fit_keep_recovered(Fit *fit) {
+    char *path = rey_fit_output_path(fit, "recovered.xml");
+    rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
+    if (path && access(path, F_OK) == 0) {
+        result = rey_fail(fit->ctx, REY_ERROR_ARGUMENT, "%s holds what a fit recovered, and not its checkpoint.bin; --overwrite "
+                          "starts again, -o writes elsewhere", fit->output);
+    }
+    rey_free(fit->ctx, path);
+    return result;
+}
+
 static rey_result take_over(Fit *fit) {
     char *path = rey_fit_output_path(fit, "checkpoint.bin");
     rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
         result = fit->def->overwrite ? REY_OK : refuse_former(fit, path);
     }
+    bool checkpoint = !result && access(path, F_OK) == 0;
     rey_free(fit->ctx, path);
-    if (result || rey_former_exists(fit)) {
+    if (!result && rey_former_exists(fit)) {
+        result = checkpoint || fit->def->overwrite ? REY_OK : rey_fit_keep_recovered(fit);
         return result ? result : rey_former_remove(fit);
+    }
+    if (result) {
+        return result;
     }
     return fit->def->overwrite ? REY_OK : refuse_foreign(fit);
 }

@@ -77,6 +77,9 @@ static void help_and_version(void **state) {
         assert_non_null(strstr(f->out, "--json"));
         run(f, "--help");
     }
+    expect(f, 0, "help render");
+    assert_non_null(strstr(f->out, "reynolds render SCENE"));
+    expect(f, 2, "help rendr");
 }
 
 static void failures_exit_with_one(void **state) {
