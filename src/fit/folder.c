@@ -106,21 +106,19 @@ rey_result rey_fit_keep_recovered(Fit *fit) {
 }
 
 static rey_result take_over(Fit *fit) {
+    if (fit->def->overwrite) {
+        return rey_former_exists(fit) ? rey_former_remove(fit) : REY_OK;
+    }
     char *path = rey_fit_output_path(fit, "checkpoint.bin");
     rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
     if (!result && access(path, F_OK) == 0) {
-        result = fit->def->overwrite ? REY_OK : refuse_former(fit, path);
+        result = refuse_former(fit, path);
     }
-    bool checkpoint = !result && access(path, F_OK) == 0;
     rey_free(fit->ctx, path);
-    if (!result && rey_former_exists(fit)) {
-        result = checkpoint || fit->def->overwrite ? REY_OK : rey_fit_keep_recovered(fit);
-        return result ? result : rey_former_remove(fit);
+    if (!result) {
+        result = rey_former_exists(fit) ? rey_fit_keep_recovered(fit) : refuse_foreign(fit);
     }
-    if (result) {
-        return result;
-    }
-    return fit->def->overwrite ? REY_OK : refuse_foreign(fit);
+    return !result && rey_former_exists(fit) ? rey_former_remove(fit) : result;
 }
 
 rey_result rey_fit_folder_open(Fit *fit) {

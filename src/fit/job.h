@@ -34,8 +34,8 @@ typedef struct JobPlace { // of an entry of the job
 } JobPlace;
 
 typedef struct JobView {
-    int sensor;         // of the scene, where it has no
-    const char *sensor_id; // id or name, null = by number
+    int sensor;            // of the scene, unless there is an id
+    const char *sensor_id; // id or name of the sensor, null = by number
     const char *target; // picture file
     const char *mask;   // picture file of weights, null = 1 everywhere
     const char *silhouette; // picture file that is above 0 where something is seen, null = none (carve.h)

@@ -52,17 +52,24 @@ static const char *word_at(void *user, int i) {
     return names[i];
 }
 
+static void list_words(const char *(*next)(void *user, int i), void *user, char *text, size_t size) {
+    text[0] = 0;
+    for (int i = 0; next(user, i); i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%s", i ? ", " : "", next(user, i));
+    }
+}
+
 static rey_result read_choice(Job *job, const YamlNode *node, const char *what, const char *const *names, int *out) {
     const char *text = node->kind == YAML_SCALAR && node->text ? node->text : "";
-    char all[256] = "";
     for (int i = 0; names[i]; i++) {
         if (!strcmp(text, names[i])) {
             *out = i;
             return REY_OK;
         }
-        size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", names[i]);
     }
+    char all[256];
+    list_words(word_at, (void *)(uintptr_t)names, all, sizeof all);
     const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
     return nearest ? rey_job_fail(job, blamed(node), "%s: unknown value '%s', did you mean '%s'?", what, text, nearest)
                    : rey_job_fail(job, blamed(node), "%s: unknown value '%s', expected one of %s", what, text, all);
@@ -112,11 +119,8 @@ static const char *key_at(void *user, int i) {
 
 static rey_result unknown_key(Job *job, const YamlNode *node, const char *what, const Field *fields) {
     const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
-    char all[512] = "";
-    for (int i = 0; fields[i].key; i++) {
-        size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", fields[i].key);
-    }
+    char all[512];
+    list_words(key_at, (void *)(uintptr_t)fields, all, sizeof all);
     return nearest ? rey_job_fail(job, node, "unknown key '%s', did you mean '%s'?", node->key, nearest)
                    : rey_job_fail(job, node, "unknown key '%s' in %s, expected one of %s", node->key, what, all);
 }
