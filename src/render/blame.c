@@ -103,17 +103,17 @@ void rey_name_obstacle(const rey_scene *scene, const SensorRecord *sensor, char 
     snprintf(text, OBJECT_NAME, name[0] ? "%s '%.120s'" : "%s", o.what ? o.what : "nothing", name);
 }
 
-static bool bends(const SceneView *view, int32_t bsdf) {
-    bool found = bsdf >= 0 && rey_bsdf_bends(view->bsdfs[bsdf].kind);
+bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind)) {
+    bool found = bsdf >= 0 && is(view->bsdfs[bsdf].kind);
     for (int k = 0; bsdf >= 0 && k < MAX_CHILDREN && !found; k++) {
-        found = bends(view, view->bsdfs[bsdf].child[k]);
+        found = rey_bsdf_holds(view, view->bsdfs[bsdf].child[k], is);
     }
     return found;
 }
 
 bool rey_name_bender(const rey_scene *scene, char name[OBJECT_NAME]) {
     for (int64_t i = 0; i < scene->view.shapes_count; i++) {
-        if (bends(&scene->view, scene->view.shapes[i].bsdf)) {
+        if (rey_bsdf_holds(&scene->view, scene->view.shapes[i].bsdf, rey_bsdf_bends)) {
             rey_name_shape(scene, (int32_t)i, name);
             return true;
         }

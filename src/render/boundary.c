@@ -53,15 +53,6 @@ static bool has_chains(const SceneView *view) {
     return false;
 }
 
-// Whether a function refracts smoothly.
-static bool refracts(const SceneView *view, int32_t bsdf) {
-    bool found = bsdf >= 0 && rey_bsdf_refracts(view->bsdfs[bsdf].kind);
-    for (int k = 0; bsdf >= 0 && k < MAX_CHILDREN && !found; k++) {
-        found = refracts(view, view->bsdfs[bsdf].child[k]);
-    }
-    return found;
-}
-
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
@@ -81,7 +72,7 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
         }
     }
     for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
-        if ((view->shapes[i].flags & SHAPE_HAS_NORMALS) && refracts(view, view->shapes[i].bsdf)) {
+        if ((view->shapes[i].flags & SHAPE_HAS_NORMALS) && rey_bsdf_holds(view, view->shapes[i].bsdf, rey_bsdf_refracts)) {
             return (ChainObstacle){"the vertex normals of the smooth glass", i, -1, -1};
         }
     }
