@@ -288,18 +288,6 @@ static char **job_overrides(const Options *o, int *count) {
     return texts;
 }
 
-// A name that -D gives twice, as `render` refuses it; null when there is none.
-static const char *defined_twice(const Options *o) {
-    for (int i = 0; i < o->define_count; i++) {
-        for (int k = 0; k < i; k++) {
-            if (!strcmp(o->defines[i].name, o->defines[k].name)) {
-                return o->defines[i].name;
-            }
-        }
-    }
-    return NULL;
-}
-
 // The command line, with what a shell would split in quotes.
 static char *command_text(int argc, char **argv) {
     size_t size = sizeof "reynolds";
@@ -416,8 +404,7 @@ int cli_fit(int argc, char **argv) {
         return status;
     }
     cli_catch_terminations();
-    const char *twice = defined_twice(&options);
-    status = twice ? cli_usage_error(&options, "-D: '%s' is defined twice", twice) : cli_context_open(&options, &session);
+    status = cli_context_open(&options, &session);
     if (!status) {
         char *command = command_text(argc, argv);
         status = run(&options, &session, command);

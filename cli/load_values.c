@@ -22,11 +22,8 @@ static rey_result read_picture(rey_context *ctx, const char *path, const rey_par
     }
     if (result == REY_OK && (info->dims != 3 || image.height != info->shape[0] || image.width != info->shape[1] ||
                              image.channels != info->shape[2])) {
-        char expected[64] = "";
-        for (int i = 0; i < info->dims; i++) {
-            size_t used = strlen(expected);
-            snprintf(expected + used, sizeof expected - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
-        }
+        char expected[64];
+        cli_shape_text(info, expected, sizeof expected);
         result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %dx%dx%d, expected %s as in the scene", path,
                           info->name, image.height, image.width, image.channels, info->dims ? expected : "one number");
     }

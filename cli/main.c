@@ -94,6 +94,15 @@ static const char *command_name_at(void *user, int i) {
     return i < COMMAND_COUNT ? command_rows[i].name : NULL;
 }
 
+// COMMAND_COUNT where there is none of this name.
+static int find_command(const char *name) {
+    int i = 0;
+    while (i < COMMAND_COUNT && strcmp(name, command_rows[i].name) != 0) {
+        i++;
+    }
+    return i;
+}
+
 static int unknown_word(const char *word, bool as_json) {
     const char *nearest = rey_nearest_word(word, command_name_at, NULL);
     const char *what = word[0] == '-' ? "option" : "command";
@@ -125,24 +134,22 @@ int main(int argc, char **argv) {
         return EXIT_USAGE;
     }
     const char *word = argv[1];
-    for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (!strcmp(word, command_rows[i].name)) {
-            cli_catch_interrupts();
-            return command_rows[i].run(argc - 1, argv + 1);
-        }
+    int command = find_command(word);
+    if (command < COMMAND_COUNT) {
+        cli_catch_interrupts();
+        return command_rows[command].run(argc - 1, argv + 1);
     }
     if (!strcmp(word, "--version")) {
         printf("reynolds %s\n", rey_version());
         return cli_finish_output();
     }
     if (!strcmp(word, "help") && argc > 2) {
-        for (int i = 0; i < COMMAND_COUNT; i++) {
-            if (!strcmp(argv[2], command_rows[i].name)) {
-                char *help[] = {argv[2], (char[]){"--help"}, NULL};
-                return command_rows[i].run(2, help);
-            }
+        int asked = find_command(argv[2]);
+        if (asked == COMMAND_COUNT) {
+            return unknown_word(argv[2], false);
         }
-        return unknown_word(argv[2], false);
+        cli_command_help((Command)asked);
+        return cli_finish_output();
     }
     if (!strcmp(word, "-h") || !strcmp(word, "--help") || !strcmp(word, "help")) {
         print_help(stdout);

@@ -9,6 +9,14 @@
 #include <string.h>
 #include <stdio.h>
 
+void cli_shape_text(const rey_param_info *info, char *text, size_t size) {
+    snprintf(text, size, "%s", info->dims ? "" : "1");
+    for (int i = 0; i < info->dims; i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
+    }
+}
+
 typedef struct Header {
     int item_bytes; // 4 or 8
     int64_t count;
@@ -97,10 +105,8 @@ static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_i
     }
     Header header = {.shape = ""};
     rey_result result = read_header(ctx, file, path, &header);
-    char shape[64] = "1";
-    for (int i = 0, used = 0; i < info->dims; i++) {
-        used += snprintf(shape + used, sizeof shape - (size_t)used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
-    }
+    char shape[64];
+    cli_shape_text(info, shape, sizeof shape);
     flat = flat && !strchr(header.shape, 'x');
     if (!result && !flat && strcmp(shape, header.shape[0] ? header.shape : "1") != 0) {
         result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s as in the scene", path, info->name,

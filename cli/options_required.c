@@ -30,6 +30,18 @@ static bool is_scene_name(const char *path) {
     return length > 4 && !strcasecmp(path + length - 4, ".xml");
 }
 
+// A name that -D gives twice, null when there is none.
+static const char *defined_twice(const Options *o) {
+    for (int i = 0; i < o->define_count; i++) {
+        for (int k = 0; k < i; k++) {
+            if (!strcmp(o->defines[i].name, o->defines[k].name)) {
+                return o->defines[i].name;
+            }
+        }
+    }
+    return NULL;
+}
+
 bool cli_options_required(const Options *o) {
     static const int needed[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     Command c = o->command;
@@ -58,6 +70,8 @@ bool cli_options_required(const Options *o) {
         cli_usage_error(o, "-o: '%s' ends in none of .exr, .png, .npy", o->output);
     } else if (c == COMMAND_FIT && (o->load_count > 1 || (o->load_count && strchr(o->loads[0], '=')))) {
         cli_usage_error(o, "--load: a fit takes one saved scene; `start` of its parameters takes files");
+    } else if (defined_twice(o)) {
+        cli_usage_error(o, "-D: '%s' is defined twice", defined_twice(o));
     } else if (o->resume && o->overwrite) {
         cli_usage_error(o, "--resume continues and --overwrite starts again: give one of them");
     } else if (c == COMMAND_CONVERT && !strcmp(o->files[1], "-")) {

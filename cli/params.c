@@ -1,5 +1,6 @@
 // params.c: `reynolds params`: every parameter of a scene, and whether it has a gradient.
 #include "cli.h"
+#include "npy.h"
 #include "reasons.h"
 
 #include "render/term_request.h"
@@ -110,14 +111,6 @@ static void json_param(Json *json, const Listing *l, int param) {
     json_object_end(json);
 }
 
-static void shape_text(const rey_param_info *info, char *text, size_t size) {
-    snprintf(text, size, "%s", info->dims ? "" : "1");
-    for (int i = 0; i < info->dims; i++) {
-        size_t used = strlen(text);
-        snprintf(text + used, size - used, "%s%lld", i ? "x" : "", (long long)info->shape[i]);
-    }
-}
-
 static void value_text(const rey_param_info *info, const float *values, char *text, size_t size) {
     text[0] = 0;
     if (info->count > 4) {
@@ -161,7 +154,7 @@ static void param_cells(Listing *l, int param, char cells[PARAM_CELLS][CELL_BYTE
         return;
     }
     snprintf(cells[0], CELL_BYTES, "%s", info.name);
-    shape_text(&info, cells[1], CELL_BYTES);
+    cli_shape_text(&info, cells[1], CELL_BYTES);
     snprintf(cells[2], CELL_BYTES, "%s", info.unit[0] ? info.unit : "-");
     snprintf(cells[3], CELL_BYTES, "[%g, %g]", (double)info.low, (double)info.high);
     value_text(&info, rey_param_values(s->scene, param), cells[4], CELL_BYTES);
