@@ -31,6 +31,7 @@ FILES = [("src/bsdf/*.h", ADJOINTS), ("src/math/fresnel.h", ADJOINTS), ("src/mat
          ("src/scene/volume.h", ADJOINTS + "|volume_to_world_adj"), ("src/scene/texture*.h", ADJOINTS),
          ("src/scene/attribute.h", ADJOINTS), ("src/shape/*.h", ADJOINTS + r"|curve_twist|pose_\w+_inverse|matrix_\w+"),
          ("src/shape/normals_adj.c", r"\w+"), ("src/integrator/path_adj.h", r"\w+"),
+         ("src/integrator/kept.h", r"kept_\w+"),
          ("src/integrator/path_move.h", r"\w+"), ("src/integrator/passage_move.h", r"\w+"),
          ("src/integrator/flight_adj.h", r"\w+"), ("src/integrator/border.h", r"\w+"),
          ("src/integrator/collision_adj.h", r"\w+"), ("src/integrator/walk_adj.h", r"\w+"),
@@ -53,7 +54,9 @@ EDGES = SEEN + [BOUNDARY + " boundary_lamp.xml lamp", BOUNDARY + " boundary_lamp
                 BOUNDARY + " meeting_slide.xml ball", BOUNDARY + " meeting_lamp.xml bulb", BOUNDARY + " turning_lamp.xml ball",
                 BOUNDARY + " turning_light.xml ball.positions", BOUNDARY + " mirror_wall", BOUNDARY + " air_beam.xml bulb",
                 BOUNDARY + " marks_bump.xml tile"]
-TESTS = [("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_adjoint principledthin"]),
+DROPPED = ["test_differences dropped.xml", "test_dropped"]
+TESTS = [("src/bsdf/shares.h", DROPPED), ("src/integrator/kept.h", DROPPED),
+         ("src/bsdf/principled", ["test_kinds_adjoint principled", "test_kinds_adjoint principledthin"]),
          ("src/bsdf/", ["test_kinds_adjoint {stem}", "test_kinds_adjoint"] + LOCAL + MOVING[:4]),
          ("src/math/", ["test_math_leaves", "test_kinds_adjoint"]),
          ("src/emitter/", ["test_lights test_adjoints"] + LOCAL[3:4] + [BOUNDARY + " boundary_bulb", BOUNDARY + " air_", "test_chains chains_sky.xml"]),

@@ -48,8 +48,8 @@ static void xyz_squares(const double *rgb, double *out) {
     }
 }
 
-// Whether a sample brings nothing for having met only surfaces that let it pass (SceneView.drops).
-KFN bool film_drops(const Tracer *t, int32_t i) { return t->scene->drops && t->ws.coverage[i] <= 0; }
+// Whether a sample brings nothing for having met only surfaces that let it pass (SceneView.drops). Derivatives: kept.h.
+KFN bool film_drops(const Tracer *t, int32_t i) { return t->scene->drops && !t->derivative && t->ws.coverage[i] <= 0; }
 
 // Adds the chunk's radiances (or derivatives) to the tile's film.
 static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
@@ -101,7 +101,7 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
         film_worth(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i],
                    t->ws.pixel[i] % stride - margin, t->ws.pixel[i] / stride - margin, delta);
         for (int c = 0; c < SPEC_N; c++) {
-            t->ws.adjoint[c][i] = film_drops(t, i) ? 0 : delta[c];
+            t->ws.adjoint[c][i] = delta[c];
         }
     }
 }
@@ -134,6 +134,9 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         }
         if (t->job->corner_at) {
             corner_stage(t, begin);
+        }
+        if (t->scene->drops) {
+            kept_stage(t, t->job->mode == MODE_REPLAY ? t->job->moved : t->scene, count);
         }
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);

@@ -66,10 +66,10 @@ enum {
     }                                                                                                                  \
     slot++;
 
-// With hidden emitters `path` drops a path by what it chose where surfaces let light pass: derivatives must choose as pictures do.
+// With hidden emitters `path` drops a path by what it chose where surfaces let light pass; of thin glass, whose coefficient
+// is not the probability of passing (kept.h), derivatives choose as pictures do.
 KFN real bsdf_floor(const BsdfCall *call, const BsdfNode *node) {
-    bool chooses = node->kind == BSDF_MASK || node->kind == BSDF_BLENDBSDF || node->kind == BSDF_THINDIELECTRIC;
-    return call->scene->drops && chooses ? 0 : call->floor;
+    return call->scene->drops && node->kind == BSDF_THINDIELECTRIC ? 0 : call->floor;
 }
 
 #define DEFINE_FETCH(prefix, Record, PARAMS, CONFIG)                                                                   \

@@ -52,7 +52,13 @@ bool rey_bsdf_refracts(int kind) { return kind == BSDF_DIELECTRIC; }
 
 bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
-bool rey_bsdf_shares(int kind) { return kind == BSDF_THINDIELECTRIC || kind == BSDF_MASK || kind == BSDF_BLENDBSDF; }
+bool rey_bsdf_tints(int kind) { return kind == BSDF_THINDIELECTRIC; }
+
+bool rey_bsdf_draws(int kind, int param) {
+    ParamType type = rey_bsdf_kinds[kind].params[param].type;
+    bool one_lobe = kind == BSDF_DIFFUSE || kind == BSDF_ROUGHCONDUCTOR, rough = type == PARAM_ALPHA_U || type == PARAM_ALPHA_V;
+    return one_lobe ? rough : kind == BSDF_PLASTIC || !(rey_bsdf_bends(kind) || rey_bsdf_kinds[kind].adapter);
+}
 
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 

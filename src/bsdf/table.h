@@ -29,10 +29,12 @@ bool rey_bsdf_bends(int kind);
 bool rey_bsdf_refracts(int kind);
 // Kinds that let a part of the light pass undeviated.
 bool rey_bsdf_opens(int kind);
-// Kinds that choose between light that passes undeviated and other light, or between children that may.
-bool rey_bsdf_shares(int kind);
+// Kinds of which more or less light passes undeviated than paths do.
+bool rey_bsdf_tints(int kind);
 // Whether light passes it undeviated and undimmed.
 bool rey_bsdf_passes(int kind);
+// Whether the density of the smooth lobe of a function that has no children depends on one of its parameters.
+bool rey_bsdf_draws(int kind, int param);
 // Whether a kind turns the shading normal of the function inside it.
 bool rey_bsdf_turns(int kind);
 // Whether it drops light abruptly at the plane of the normal that it turns: without use_shadowing_function.

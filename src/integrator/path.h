@@ -38,6 +38,14 @@ KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex 
     return scattered_weight(t, v, surface_light_pdf(t->scene, e, v->origin, v->d, si) * e->weight);
 }
 
+// The density with which pictures draw directions: where paths are dropped, pictures depend on the weights of MIS (kept.h),
+// and derivatives weigh as pictures do. pdf: the density of the call.
+KFN Float picture_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Float pdf) {
+    BsdfCall picture = *call;
+    picture.floor = 0;
+    return call->scene->drops && call->floor > 0 ? bsdf_pdf(&picture, wi, wo, lobe) : pdf;
+}
+
 // Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
 KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call,
                         Vec3 wi, const SampleKey *key, int32_t bounce, int32_t record) {
@@ -58,7 +66,7 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     Float scatter_pdf;
     Spec f = bsdf_eval_pdf(call, wi, wo, smooth, &scatter_pdf);
     Float pdf = s.pdf * choice;
-    Float other_pdf = scatter_pdf, own_pdf = pdf;
+    Float other_pdf = picture_pdf(call, wi, wo, smooth, scatter_pdf), own_pdf = pdf;
     Mask drawn = v->m;
     if (scene->split) {
         own_pdf = pdf * split.light_pdf;
@@ -81,6 +89,7 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     append_shadows(t, &ray, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
     if (record >= 0) {
         record_light(t, record, light, &s, f_zero_unless(m, weight), f);
+        f_store(t->ws.records.light_pdf + record, f_zero_unless(~light_is_delta(scene, light), own_pdf));
     }
 }
 
@@ -114,6 +123,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     }
     onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
+    w.pdf = picture_pdf(call, wi, w.sample.wo, w.sample.lobe, w.pdf);
     w.d = frame_to_world(&si->sh, w.sample.wo);
     Vec3 o = interaction_offset(si, w.d);
     if (scene->has_media) {

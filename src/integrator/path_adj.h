@@ -8,6 +8,7 @@
 
 #include "integrator/collision_adj.h"
 #include "integrator/corner.h"
+#include "integrator/kept.h"
 
 static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     const Records *r = &t->ws.records;
@@ -45,7 +46,7 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
 KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, int32_t live, Spec weight,
                          VertexAdj *d, Sink *sink) {
     bool moves = sink->any_places || sink->any_motion;
-    Spec both = spec_mul(weight, s->light_weight);
+    Spec both = spec_scale(spec_mul(weight, s->light_weight), s->kept);
     Vec2 *at = sink->at;
     sink->at = NULL; // light samples are attached
     if (t->job->live_lights) {
@@ -95,6 +96,9 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     }
     if (m_any(s->connected)) {
         connections_adj(t, s, &call, live, weight, &d, sink);
+    }
+    if ((live & LIVE_SCATTERING) && t->scene->drops) {
+        kept_adj(t, s, &call, delta, weight, &d, sink);
     }
     Mask scattered = sink->any_motion ? s->scattered & ~s->chained : s->scattered;
     if ((live & LIVE_SCATTERING) && m_any(scattered)) {
@@ -146,11 +150,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     Walk walk;
     SurfaceSweep s = surface_load(t, batch, slot, suffix);
     s.attached = attached;
-    s.call.uv.hit = &s.hit;
-    if (t->scene->bsdfs[s.group->bsdf].surface) {
-        find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
-        s.call.surface = &s.surface;
-    }
+    surface_parameterise(t, &s);
     if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, &s, sink);
     }

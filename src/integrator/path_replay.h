@@ -18,11 +18,7 @@ static Spec replay_escape(Tracer *t, const RecordBatch *batch) {
 static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
     SurfaceSweep s = surface_load(t, batch, slot, suffix);
     Spec l = spec_zero();
-    s.call.uv.hit = &s.hit;
-    if (t->scene->bsdfs[s.group->bsdf].surface) {
-        find_surface(t->scene, s.group, &s.hit, &s.surface, &s.dp_dv);
-        s.call.surface = &s.surface;
-    }
+    surface_parameterise(t, &s);
     if (s.emitter) {
         Spec emission = emitter_eval(t->scene, s.emitter, texcoord(s.si.uv, &s.hit), f_set(1));
         l = spec_zero_unless(s.lit, spec_scale(emission, s.mis));
@@ -37,6 +33,7 @@ static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec s
             Int medium = medium_behind(s.group, s.si.ng, s.light_d, i_load(t->ws.records.medium + s.at));
             weight = spec_mul(weight, walk_again(t, &ray, slot, medium, batch->bounce, s.connected, &walk));
         }
+        weight = t->scene->drops ? kept_replay(t, &s, weight) : weight;
         l = spec_add(l, spec_zero_unless(s.connected, spec_mul(spec_mul(f, value), weight)));
     }
     if (m_any(s.scattered)) {

@@ -29,11 +29,12 @@ enum {
 // scattering function),
 // the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
 // camera, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
-// radiance arriving along the sampled direction. corner: see corner.h.
+// radiance arriving along the sampled direction. corner: see corner.h; keep, slope, met and the density
+// of the light sample: see kept.h.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
-    F(sw)
-#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(corner)
+    F(sw) F(keep) F(slope) F(light_pdf)
+#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(corner) S(met)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)
 
 // Of a camera sample: where it lies on the film, and its alpha.
@@ -103,6 +104,10 @@ typedef struct Workspace {
     int32_t *border, *border_side, *border_medium, *border_depth;
     BORDER_FLOATS(DECLARE_FLOAT)
     SpecRows border_scattered;
+    // per slot, where paths are dropped (kept.h): whether nothing is decided, how far what was met is kept, the sum of that,
+    // and the throughput of pictures
+    real *undecided, *kept;
+    SpecRows met, throughput;
     // per slot: aovs
     real *channel[MOST_AOV_CHANNELS];
 } Workspace;
@@ -146,6 +151,15 @@ static inline size_t workspace_layout_probes(Workspace *ws, char *block, size_t 
     CARVE(ws->border_depth, n)
     BORDER_FLOATS(CARVE_SAMPLE)
     CARVE_SPEC(ws->border_scattered, n)
+    return at;
+}
+
+// What derivatives keep per slot where paths are dropped.
+static inline size_t workspace_layout_kept(Workspace *ws, char *block, size_t at, size_t n) {
+    CARVE(ws->undecided, n)
+    CARVE(ws->kept, n)
+    CARVE_SPEC(ws->met, n)
+    CARVE_SPEC(ws->throughput, n)
     return at;
 }
 
@@ -196,6 +210,7 @@ static inline size_t workspace_layout(Workspace *ws, char *block, int32_t mode) 
     CARVE(ws->sample, n)
     at = derivative ? workspace_layout_moves(ws, block, at, n) : at;
     at = derivative ? workspace_layout_probes(ws, block, at, n) : at;
+    at = derivative ? workspace_layout_kept(ws, block, at, n) : at;
     for (int c = 0; c < MOST_AOV_CHANNELS && mode == MODE_AOV; c++) {
         CARVE(ws->channel[c], n)
     }

@@ -35,7 +35,7 @@ typedef struct SurfaceSweep {
     Mask slides, chained;  // see record; lanes that are mirrored or refracted
     Int slot, light, light_prim, lobe;
     Spec beta, suffix, attached, light_weight, light_value, f_light;
-    Float mis, scatter_weight, light_distance;
+    Float mis, scatter_weight, light_distance, kept;
     Vec2 light_uv;
     Vec3 d, wi, light_d, wo_d, wl, wo;
     Hit hit;
@@ -80,6 +80,7 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.scatter_weight = f_load(r->sw + at);
     s.lit = s.m & m_gt(s.mis, f_set(0));
     s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
+    s.kept = t->scene->drops ? f_load(r->keep + at) : f_set(1);
     s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
     s.light = i_load(r->light + at);
     s.light_prim = i_load(r->lprim + at);
@@ -100,6 +101,15 @@ KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slo
     s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
     s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
     return s;
+}
+
+// What the scattering function of a batch asks of the surface; s must stay where it is.
+KFN void surface_parameterise(const Tracer *t, SurfaceSweep *s) {
+    s->call.uv.hit = &s->hit;
+    if (t->scene->bsdfs[s->group->bsdf].surface) {
+        find_surface(t->scene, s->group, &s->hit, &s->surface, &s->dp_dv);
+        s->call.surface = &s->surface;
+    }
 }
 
 // The door through which the derivatives of a job leave.

@@ -5,6 +5,7 @@
 #include "emitter/emitter.h"
 #include "render/boundary.h"
 #include "render/cuts.h"
+#include "render/dropped.h"
 #include "render/motion.h"
 #include "render/particles.h"
 #include "scene/sink.h"
@@ -168,31 +169,6 @@ static const char *gap_of_score(const SceneView *view, const Param *p) {
     return NULL;
 }
 
-// Whether a parameter is, or is read by, a texture.
-static bool texture_reads(const SceneView *view, int32_t id, const Param *p) {
-    if (id < 0) {
-        return false;
-    }
-    const TextureNode *t = view->textures + id;
-    return p->texture == id || p->to_uv == id || (t->kind == TEXTURE_ATTRIBUTE && p->attribute >= 0) ||
-           (t->kind == TEXTURE_VOLUME && p->theta == view->volumes[t->volume].theta) ||
-           texture_reads(view, t->child[0], p) || texture_reads(view, t->child[1], p);
-}
-
-// What of a parameter's derivative is not known where light is dropped (SceneView.drops): what changes which paths pass
-// surfaces, and what moves.
-static bool gap_of_drops(const SceneView *view, const Param *p, int terms) {
-    bool chooses = p->normals >= 0 || (terms & (REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR));
-    for (int64_t i = 0; i < view->bsdfs_count && !chooses; i++) {
-        const BsdfNode *bsdf = view->bsdfs + i;
-        bool turns = rey_bsdf_turns(bsdf->kind), shares = rey_bsdf_shares(bsdf->kind);
-        for (int k = 0; k < (turns ? MAX_SLOTS : shares); k++) {
-            chooses = chooses || texture_reads(view, bsdf->slot[k], p);
-        }
-    }
-    return view->drops && chooses;
-}
-
 static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
     char object[OBJECT_NAME];
     const char *gap = rey_cuts_gap(scene, sensor, p, object);
@@ -217,11 +193,11 @@ static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int c
 
 // What is not known of a parameter's derivative whatever terms are asked for, null where there is no such thing.
 static const char *find_gap(const SceneView *view, const rey_render_def *def, const Param *p, int terms, bool volumes) {
-    if (gap_of_drops(view, p, terms)) {
-        return "with hide_emitters, 'path' drops light of surfaces that let a part of it pass, and this parameter decides how "
-               "much. 'volpath' drops none";
+    const char *gap = rey_dropped_gap(view, p, terms);
+    if (gap) {
+        return gap;
     }
-    const char *gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
+    gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
     gap = gap ? gap : gap_in_media(view, p);
     bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                   (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));

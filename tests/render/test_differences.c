@@ -286,7 +286,8 @@ static const RoomCase rooms[] = {{"tiles.xml", true, false},        {"edges.xml"
                                  {"lights.xml", false, false},      {"moving_ball.xml", false, false},
                                  {"moving_box.xml", false, false},  {"moving_dome.xml", true, false},
                                  {"moving_disk.xml", true, false},  {"moving_tube.xml", true, false},
-                                 {"fog.xml", false, true},          {"smoke.xml", false, true}};
+                                 {"fog.xml", false, true},          {"smoke.xml", false, true},
+                                 {"dropped.xml", false, false}};
 
 static void test_differences(void **state) {
     const RoomCase *r = *state;

@@ -441,60 +441,11 @@ static void test_hidden_sky(void **state) {
     }
 }
 
-// With hidden emitters, `path` drops what a path brought that met only surfaces that let it pass, as the format's
-// renderer does: 0.714 of the light of a mask of opacity 0.4 under a sky remains there. `volpath` drops nothing, and
-// `direct` shows the sky behind. As far as light from the mask goes, pictures are proportional to its reflectance.
-static void test_dropped_light(void **state) {
-    static const char *const names[] = {"path", "volpath", "direct", "path"};
-    double mean[4] = {0}, slope[4] = {0};
-    (void)state;
-    for (int i = 0; i < 4; i++) {
-        char integrator[128], rest[512];
-        rey_context *ctx;
-        float image[4 * 4 * 3], derivative[4 * 4 * 3], one[3] = {1, 1, 1};
-        double gradient[3], sum = 0;
-        rey_render_def def = rey_default_render_def();
-        def.spp = 1024;
-        snprintf(integrator, sizeof integrator, "<integrator type='%s'><boolean name='hide_emitters' value='true'/></integrator>",
-                 names[i]);
-        snprintf(rest, sizeof rest, "<emitter type='constant'/><shape type='rectangle'><transform name='to_world'>"
-                                    "<scale value='50'/><rotate y='1' angle='180'/><translate z='3'/></transform>"
-                                    "<bsdf type='mask' id='holes'><float name='opacity' value='%g'/><bsdf type='diffuse' "
-                                    "id='grey'/></bsdf></shape>", i < 3 ? 0.4 : 1.0);
-        assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
-        rey_scene *scene = load_text(ctx, integrator, rest);
-        int param = rey_param_find(scene, "grey.reflectance.value"), opacity = rey_param_find(scene, "holes.opacity.value");
-        const rey_selection grey = {&param, 1}, holes = {&opacity, 1};
-        assert_true(param >= 0 && opacity >= 0);
-        assert_int_equal(rey_render(scene, &def, image, NULL), REY_OK);
-        assert_int_equal(rey_jvp(scene, &def, grey, one, derivative, NULL, NULL), REY_OK);
-        assert_int_equal(rey_vjp(scene, &def, grey, derivative, gradient, NULL, NULL), REY_OK);
-        for (int k = 0; k < 48; k++) {
-            mean[i] += (double)image[k] / 48;
-            slope[i] += 0.5 * (double)derivative[k] / 48;
-            sum += (double)derivative[k] * (double)derivative[k];
-        }
-        near("reverse", i, 0, (gradient[0] + gradient[1] + gradient[2]) / sum, 1, 1e-4);
-        def.spp = 16;
-        // How much `path` drops depends on the opacity.
-        assert_int_equal(rey_vjp(scene, &def, holes, image, gradient, NULL, NULL), i % 3 ? REY_OK : REY_ERROR_INCOMPLETE);
-        rey_scene_destroy(scene);
-        rey_context_destroy(ctx);
-    }
-    near("volpath", 0, 0, mean[1], 0.2, 0.002);
-    near("path", 0, 0, mean[0] / mean[1], 0.714, 0.02);
-    near("direct", 0, 0, mean[2], 0.8, 0.005);
-    near("slope of path", 0, 0, slope[0] / mean[0], 1, 0.01);
-    near("slope of volpath", 0, 0, slope[1], 0.2, 0.002);
-    near("slope of direct", 0, 0, slope[2], 0.2, 0.002);
-    near("slope of path, closed", 0, 0, slope[3], 0.5, 0.005);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_corridor), cmocka_unit_test(test_corridor_roulette),
                                        cmocka_unit_test(test_through), cmocka_unit_test(test_through_gradient),
                                        cmocka_unit_test(test_split),            cmocka_unit_test(test_layers),
                                        cmocka_unit_test(test_moments),          cmocka_unit_test(test_depth),
-                                       cmocka_unit_test(test_hidden_sky), cmocka_unit_test(test_dropped_light)};
+                                       cmocka_unit_test(test_hidden_sky)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
