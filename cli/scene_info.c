@@ -110,6 +110,13 @@ static void print_info(const Session *s) {
     if (info.integrator[0]) {
         printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
     }
+    if (rey_channel_count(s->scene) > 3) {
+        printf("%-17s", "channels");
+        for (int i = 0; i < rey_channel_count(s->scene); i++) {
+            printf(" %s", rey_channel_name(s->scene, i));
+        }
+        printf("\n");
+    }
     if (info.sensors > 0) {
         printf("%-17s %d\n", "samples per pixel", info.sample_count);
     }
@@ -160,6 +167,11 @@ static void print_info_json(const Session *s) {
     json_string(&json, "integrator", info.integrator[0] ? info.integrator : NULL);
     json_number(&json, "max_depth", info.integrator[0] ? info.max_depth : (double)NAN);
     json_number(&json, "rr_depth", info.integrator[0] ? info.rr_depth : (double)NAN);
+    json_array(&json, "channels");
+    for (int i = 0; i < rey_channel_count(s->scene); i++) {
+        json_string(&json, NULL, rey_channel_name(s->scene, i));
+    }
+    json_array_end(&json);
     json_number(&json, "sample_count", info.sensors ? info.sample_count : (double)NAN);
     json_missing(&json, &info);
     json_array(&json, "films");

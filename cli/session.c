@@ -240,7 +240,9 @@ static rey_result load_scene(Session *s) {
     }
     for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
         const char *note = rey_scene_note(s->scene, i);
-        if (o->command != COMMAND_INFO && !strncmp(note, "warning: ", 9)) {
+        bool derivative = o->command == COMMAND_GRAD || o->command == COMMAND_CHECK;
+        if (o->command != COMMAND_INFO &&
+            (!strncmp(note, "warning: ", 9) || (derivative && !strncmp(note, "derivatives: ", 13)))) {
             cli_note("%s", note);
         }
     }

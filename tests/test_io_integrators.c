@@ -95,8 +95,25 @@ static void test_integrators(void **state) {
         {"<integrator type='direct'><integer name='shading_samples' value='0'/></integrator>", REY_ERROR_SCENE,
          "shading_samples"},
         {"<integrator type='direct'><integer name='max_depth' value='2'/></integrator>", REY_ERROR_SCENE, "max_depth"},
-        {"<integrator type='moment'/>", REY_ERROR_SCENE, "needs a nested integrator"},
         {"<integrator type='depth'/>", REY_OK, ""},
+        {"<integrator type='prb_basic'><integer name='max_depth' value='4'/></integrator>", REY_OK, ""},
+        {"<integrator type='prb_projective'><integer name='sppi' value='0'/><string name='guiding' value='no'/></integrator>",
+         REY_OK, ":2: 'prb_projective' is read as 'path' with its max_depth: every integrator finds the terms of moving edges"},
+        {"<integrator type='direct_projective'><string name='project_seed' value='bsdf'/></integrator>", REY_OK,
+         "read as 'direct'"},
+        {"<integrator type='prb'><integer name='sppi' value='0'/></integrator>", REY_ERROR_SCENE, "sppi"},
+        {"<integrator type='pathtracing-of-light'/>", REY_ERROR_SCENE,
+         "there is no integrator 'pathtracing-of-light', expected path, direct, moment,"},
+        {"<integrator type='volpaht'/>", REY_ERROR_SCENE, "did you mean 'volpath'?"},
+    };
+    check_cases(false, cases, sizeof cases / sizeof *cases);
+}
+
+// Those that hold others.
+static void test_nested(void **state) {
+    (void)state;
+    static const Case cases[] = {
+        {"<integrator type='moment'/>", REY_ERROR_SCENE, "needs a nested integrator"},
         {"<integrator type='aov'><string name='aovs' value='a:depth'/></integrator>", REY_OK, ""},
         {"<integrator type='aov'/>", REY_ERROR_SCENE, "aovs"},
         {"<integrator type='aov'><string name='aovs' value='a:depth, a:depth'/></integrator>", REY_ERROR_SCENE,
@@ -107,18 +124,35 @@ static void test_integrators(void **state) {
          "'depth' in 'aovs', expected NAME:QUANTITY"},
         {"<integrator type='aov'><string name='aovs' value='a:depth'/><integrator type='path'/><integrator type='path'/>"
          "</integrator>",
-         REY_ERROR_UNSUPPORTED, "'aov' takes one nested integrator, found two"},
-        {"<integrator type='moment'><integrator type='moment'><integrator type='path'/></integrator></integrator>",
-         REY_ERROR_UNSUPPORTED, "'moment' inside 'moment'"},
-        {"<integrator type='prb_basic'><integer name='max_depth' value='4'/></integrator>", REY_OK, ""},
-        {"<integrator type='prb_projective'><integer name='sppi' value='0'/><string name='guiding' value='no'/></integrator>",
-         REY_OK, ":2: 'prb_projective' is read as 'path' with its max_depth: every integrator finds the terms of moving edges"},
-        {"<integrator type='direct_projective'><string name='project_seed' value='bsdf'/></integrator>", REY_OK,
-         "read as 'direct'"},
-        {"<integrator type='prb'><integer name='sppi' value='0'/></integrator>", REY_ERROR_SCENE, "sppi"},
-        {"<integrator type='pathtracing-of-light'/>", REY_ERROR_SCENE,
-         "there is no integrator 'pathtracing-of-light', expected path, direct, moment,"},
-        {"<integrator type='volpaht'/>", REY_ERROR_SCENE, "did you mean 'volpath'?"},
+         REY_OK, "derivatives: "},
+        {"<integrator type='aov'><string name='aovs' value='a:depth'/>\n<integrator type='path' name='p'/>\n<integrator "
+         "type='direct' name='p'/></integrator>",
+         REY_ERROR_SCENE, ":4:1: 'p' is given twice in integrator 'aov'"},
+        {"<integrator type='aov'><string name='aovs' value='a:depth, b:albedo'/><integrator type='path' name='c'/><integrator "
+         "type='direct' name='b'/></integrator>",
+         REY_ERROR_SCENE, "two channels have the name 'b.R'"},
+        {"<integrator type='aov'><string name='aovs' value='a:depth'/><integrator type='path'/>\n<integrator type='voldepth'/>"
+         "</integrator>",
+         REY_ERROR_SCENE, ":3:1: there is no integrator 'voldepth', did you mean 'volpath'?"},
+        {"<integrator type='aov'><integrator type='path'/><integrator type='direct'/></integrator>", REY_ERROR_SCENE,
+         "'aov' lacks 'aovs', a list of NAME:QUANTITY"},
+        {"<integrator type='aov'><string name='aovs' value='a:depth'/><integrator type='path'><integer name='maxdepth' value='2'/>"
+         "</integrator></integrator>",
+         REY_ERROR_SCENE, "did you mean 'max_depth'?"},
+        {"<integrator type='moment'><integrator type='moment'><integrator type='path'/></integrator></integrator>", REY_OK, ""},
+        {"<integrator type='moment'><integrator type='moment'><integrator type='moment'><integrator type='path'/></integrator>"
+         "</integrator></integrator>",
+         REY_ERROR_UNSUPPORTED, "'moment' inside 'moment' inside 'moment'"},
+        {"<integrator type='moment'><integrator type='path'/><integrator type='moment' name='n'/></integrator>", REY_ERROR_SCENE,
+         "'moment' needs a nested integrator"},
+        {"<integrator type='moment'><integrator type='path'/><integrator type='ptracer'/></integrator>", REY_ERROR_UNSUPPORTED,
+         "'ptracer' inside 'moment' is not supported"},
+        {"<integrator type='moment'><integrator type='aov'><string name='aovs' value='a:uv'/><integrator type='ptracer'/>"
+         "</integrator></integrator>",
+         REY_ERROR_UNSUPPORTED, "'ptracer' inside 'moment' is not supported"},
+        {"<integrator type='moment'><integrator type='direct'><integer name='emitter_samples' value='3'/></integrator>"
+         "</integrator>",
+         REY_OK, "the moments of 'direct' are those of single samples, of which it takes 3 where the format takes one"},
     };
     check_cases(false, cases, sizeof cases / sizeof *cases);
 }
@@ -167,6 +201,7 @@ static void test_threads(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_samplers), cmocka_unit_test(test_integrators),
-                                       cmocka_unit_test(test_depths), cmocka_unit_test(test_threads)};
+                                       cmocka_unit_test(test_nested), cmocka_unit_test(test_depths),
+                                       cmocka_unit_test(test_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -126,7 +126,7 @@ REY_API void rey_scene_get_info(const rey_scene *scene, rey_scene_info *info);
 
 /* What a user should know about how the scene was read: plugins that another one stands for, and the like. */
 REY_API int rey_scene_note_count(const rey_scene *scene);
-/* One note, "FILE:LINE: text"; null when there is no such note. Lives as long as the scene. */
+/* One note, "FILE:LINE: text", some behind "warning: " or "derivatives: "; null when there is none. Lives as long as the scene. */
 REY_API const char *rey_scene_note(const rey_scene *scene, int note);
 
 /* ---- parameters ---------------------------------------------------------------------------------------- */

@@ -38,14 +38,27 @@ KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const doub
     }
 }
 
-// CIE XYZ of linear sRGB (white D65), squared.
-static void xyz_squares(const double *rgb, double *out) {
+// CIE XYZ of linear sRGB (white D65).
+static void rgb_to_xyz(const double *rgb, double *out) {
     out[0] = 0.412453 * rgb[0] + 0.357580 * rgb[1] + 0.180423 * rgb[2];
     out[1] = 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
     out[2] = 0.019334 * rgb[0] + 0.119193 * rgb[1] + 0.950227 * rgb[2];
-    for (int c = 0; c < 3; c++) {
-        out[c] *= out[c];
+}
+
+// Adds alpha of a sample, and its weight.
+static void film_add_coverage(Tracer *t, const FilterTable *filter, int32_t slot) {
+    const double coverage[2] = {(double)t->ws.coverage[slot], 1};
+    film_add(t, filter, slot, coverage, 2, t->job->coverage);
+}
+
+// Adds the n numbers of a sample, raised to the power that is asked for.
+static void film_add_powers(Tracer *t, const FilterTable *filter, int32_t slot, double *l, int32_t n) {
+    for (int32_t power = 1; power < t->job->power; power *= 2) {
+        for (int32_t c = 0; c < n; c++) {
+            l[c] *= l[c];
+        }
     }
+    film_add(t, filter, slot, l, n, t->job->powers);
 }
 
 // Whether a sample brings nothing for having met only surfaces that let it pass (SceneView.drops). Derivatives: kept.h.
@@ -66,13 +79,12 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
         }
         film_add(t, filter, i, l, SPEC_N, job->film);
         if (job->coverage) {
-            const double coverage[2] = {(double)t->ws.coverage[i], 1};
-            film_add(t, filter, i, coverage, 2, job->coverage);
+            film_add_coverage(t, filter, i);
         }
-        if (job->squares) {
-            double squares[3];
-            xyz_squares(l, squares);
-            film_add(t, filter, i, squares, SPEC_N, job->squares);
+        if (job->powers) {
+            double xyz[SPEC_N];
+            rgb_to_xyz(l, xyz);
+            film_add_powers(t, filter, i, job->powers_of_xyz ? xyz : l, SPEC_N);
         }
     }
 }
@@ -90,6 +102,12 @@ static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count)
             t->job->nonfinite += value - value != 0;
         }
         film_add(t, filter, i, l, n, t->job->film);
+        if (t->job->coverage) {
+            film_add_coverage(t, filter, i);
+        }
+        if (t->job->powers) {
+            film_add_powers(t, filter, i, l, n);
+        }
     }
 }
 

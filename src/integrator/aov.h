@@ -94,18 +94,25 @@ static void aov_store(Tracer *t, int32_t kind, int32_t row, const Group *group, 
     case AOV_SHAPE_INDEX:
         f_scatter(t->ws.channel[row], v->slot, f_from_i(v->hit.shape + 1), v->m);
         break;
-    case AOV_ALBEDO:
-        aov_store_3(t, row, v->slot, aov_albedo(t, group, v, si), v->m);
-        break;
     default:
-        f_scatter(t->ws.channel[row], v->slot, f_set(1), v->m);
+        aov_store_3(t, row, v->slot, aov_albedo(t, group, v, si), v->m);
     }
 }
 
-// Stores the quantities that do, or do not, say what the picture shows: alpha knows of hidden lights, the others do not.
-static void aov_surfaces(Tracer *t, int32_t *begin, bool shown) {
+// Fills ws.channel, and ws.coverage with 1 where a surface is, for the chunk's `count` samples. begin: scratch of group count + 2
+// entries. Lights that pictures hide are surfaces here.
+static void aov_forward(Tracer *t, int32_t *begin, int32_t count) {
     const SceneView *scene = t->scene;
+    SceneView all = *scene;
     int32_t groups = (int32_t)scene->groups_count + 1;
+    for (int32_t i = 0, row = 0; i < scene->aov_count; row += aov_components(scene->aovs[i]), i++) {
+        for (int32_t c = 0; c < aov_components(scene->aovs[i]); c++) {
+            memset(t->ws.channel[row + c], 0, (size_t)count * sizeof(real));
+        }
+    }
+    memset(t->ws.coverage, 0, (size_t)count * sizeof(real));
+    all.hide_emitters = false;
+    t->scene = &all;
     trace_stage(t, 0);
     sort_stage(t, begin, groups);
     for (int32_t g = 1; g < groups; g++) {
@@ -114,36 +121,10 @@ static void aov_surfaces(Tracer *t, int32_t *begin, bool shown) {
             Vertex v = vertex_load(t, t->ws.order + k, begin[g + 1] - k < LANES ? begin[g + 1] - k : LANES, 0);
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &v.hit);
             for (int32_t i = 0, row = 0; i < scene->aov_count; row += aov_components(scene->aovs[i]), i++) {
-                if ((scene->aovs[i] == AOV_ALPHA) == shown) {
-                    aov_store(t, scene->aovs[i], row, group, &v, &si);
-                }
+                aov_store(t, scene->aovs[i], row, group, &v, &si);
             }
+            cover(t, v.slot, v.m);
         }
     }
-}
-
-// Fills ws.channel for the chunk's `count` samples. begin: scratch of group count + 2 entries.
-static void aov_forward(Tracer *t, int32_t *begin, int32_t count) {
-    const SceneView *scene = t->scene;
-    SceneView all = *scene;
-    bool sky = scene->environment >= 0 && !scene->hide_emitters, alpha = false, others = false;
-    for (int32_t i = 0, row = 0; i < scene->aov_count; row += aov_components(scene->aovs[i]), i++) {
-        bool is_alpha = scene->aovs[i] == AOV_ALPHA;
-        for (int32_t c = 0; c < aov_components(scene->aovs[i]); c++) {
-            for (int32_t k = 0; k < count; k++) {
-                t->ws.channel[row + c][k] = is_alpha && sky ? 1 : 0;
-            }
-        }
-        alpha = alpha || is_alpha;
-        others = others || !is_alpha;
-    }
-    if (alpha) {
-        aov_surfaces(t, begin, true);
-    }
-    if (others) {
-        all.hide_emitters = false;
-        t->scene = &all;
-        aov_surfaces(t, begin, false);
-        t->scene = scene;
-    }
+    t->scene = scene;
 }

@@ -27,7 +27,9 @@ typedef struct PathJob {
     bool score;                   // extinctions are differentiated by collisions alone (probe.h)
     // Film of the tile: (width + 2 border) x (height + 2 border) x 3, sums of filter weight times radiance.
     double *film;
-    double *squares;              // the same of the squares of the radiance in XYZ; may be null
+    double *powers;               // the same of the samples' powers, of RGB or of XYZ; may be null
+    int32_t power;                // 2, 4, ...
+    bool powers_of_xyz;
     double *coverage;             // the same of alpha and of 1, two numbers per pixel; may be null
     int32_t border;               // pixels by which filters reach over the tile's edge
     // Derivatives: adjoint of the film's sums, for the delivered picture (crop window), and the compact vectors.

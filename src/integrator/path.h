@@ -274,7 +274,7 @@ static void fork_store(Tracer *t, int32_t count) {
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
     for (int32_t i = 0; keeps_coverage(t) && i < t->active; i++) {
-        t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters;
+        t->ws.coverage[i] = scene->environment >= 0 && !scene->hide_emitters && !scene->solid && scene->max_depth != 0;
     }
     const int32_t surfaces = (int32_t)scene->groups_count + 1;
     const int32_t groups = surfaces + (scene->has_media ? (int32_t)scene->media_count : 0);

@@ -178,3 +178,5 @@ rey_result build_direction(Builder *b, rey_xml_node *node, double matrix[16]);
 rey_result build_film(Builder *b, rey_xml_node *node, SensorRecord *s); // node may be null
 rey_result build_sampler(Builder *b, rey_xml_node *node, SensorRecord *s);
 rey_result build_integrator(Builder *b, rey_xml_node *node);
+rey_result build_default_integrator(Builder *b); // in the place of what could not be read
+rey_result build_channels(Builder *b, rey_xml_node *integrator); // that it adds to pictures

@@ -170,9 +170,13 @@ rey_result build_media_use(Builder *b) {
     for (size_t i = 0; i < scene->build.batch_sensors.count; i++) {
         used = used || ARRAY_AT(scene->build.batch_sensors, SensorRecord, i).medium >= 0;
     }
-    b->scene->view.has_media = used && scene->view.through;
-    return !used || scene->view.through || !scene->integrator
-               ? REY_OK
-               : rey_scene_add_note(b->scene, "%s:%d: '%s' sees no participating media: 'volpath' does", at.file, at.line,
-                                    scene->integrator);
+    for (size_t i = 0; i < scene->integrators.count && used; i++) {
+        Integrator *integrator = &ARRAY_AT(scene->integrators, Integrator, i);
+        integrator->has_media = integrator->through;
+        if (!integrator->through) {
+            TRY(rey_scene_add_note(b->scene, "%s:%d: '%s' sees no participating media: 'volpath' does", at.file, at.line,
+                                   integrator->name));
+        }
+    }
+    return REY_OK;
 }

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { EXR_MOST_CHANNELS = 64 };
+enum { EXR_MOST_CHANNELS = 256 };
 
 // What the library's callbacks see.
 typedef struct Stream {
@@ -363,6 +363,10 @@ rey_result rey_exr_write_as(rey_context *ctx, const char *path, const float *dat
     exr_context_t file = NULL;
     if (!names) {
         names = channels == 1 ? grey : rgb;
+    }
+    if (channels > EXR_MOST_CHANNELS) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: a picture of %d channels, expected up to %d", path, channels,
+                        EXR_MOST_CHANNELS);
     }
     options.error_handler_fn = on_write_error;
     options.user_data = &stream;

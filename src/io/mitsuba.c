@@ -221,15 +221,12 @@ static void name_further_terms(Builder *b) {
 }
 
 // A scene whose integrator could not be read is rendered by the usual one.
-static rey_result build_default_integrator(Builder *b, const rey_xml_node *root) {
+static rey_result replace_integrator(Builder *b, const rey_xml_node *root) {
     bool ignored = false;
     for (int i = 0; i < root->child_count; i++) {
         ignored = ignored || (root->children[i].ignored && root->children[i].node->tag == REY_XML_INTEGRATOR);
     }
-    if (ignored && !b->scene->integrator) {
-        b->scene->integrator = rey_strdup(b->ctx, "path");
-    }
-    return ignored && !b->scene->integrator ? REY_ERROR_MEMORY : REY_OK;
+    return ignored && !b->scene->integrator ? build_default_integrator(b) : REY_OK;
 }
 
 // Does a scattering function let light pass and scatter it, too?
@@ -250,7 +247,10 @@ static void find_drops(Builder *b) {
     for (size_t i = 0; i < b->scene->build.bsdfs.count; i++) {
         passes(b, (int32_t)i, &mixed);
     }
-    b->scene->view.drops = b->scene->view.drops && b->scene->view.hide_emitters && mixed;
+    for (size_t i = 0; i < b->scene->integrators.count; i++) {
+        Integrator *integrator = &ARRAY_AT(b->scene->integrators, Integrator, i);
+        integrator->drops = integrator->drops && integrator->hide_emitters && mixed;
+    }
 }
 
 const char *rey_mitsuba_file(const rey_scene *scene) {
@@ -284,7 +284,7 @@ static rey_result build_scene(Builder *b) {
         rey_xml_child *child = &root->children[i];
         TRY(build_forgive(b, &s, child, "", build_child(b, child, counts), NULL));
     }
-    TRY(build_default_integrator(b, root));
+    TRY(replace_integrator(b, root));
     const char *note;
     for (int i = 0; (note = rey_xml_note(b->source->document, i)); i++) {
         TRY(rey_scene_add_note(b->scene, "%s", note));
@@ -294,6 +294,9 @@ static rey_result build_scene(Builder *b) {
     TRY(build_attribute_tables(b));
     find_drops(b);
     TRY(build_media_use(b));
+    if (b->scene->integrator) {
+        rey_scene_use(b->scene, 0);
+    }
     name_further_terms(b);
     b->scene->view.emitter_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float),
                                                   (int64_t)b->scene->build.emitters.count);

@@ -21,8 +21,6 @@ typedef struct FilmPlan {
 FilmPlan rey_film_plan(const SensorRecord *sensor, int32_t channels);
 // Makes it one tile that covers the whole picture.
 void rey_film_plan_whole(FilmPlan *plan);
-// Makes it one tile that covers the whole picture.
-void rey_film_plan_whole(FilmPlan *plan);
 Tile rey_film_tile(const FilmPlan *plan, int32_t index);
 
 // Sums of the filter over the region in which samples are drawn, one per column and per row of the delivered picture:

@@ -51,8 +51,7 @@ static float xyz_of(const float *rgb, int row) {
     return rows[row][0] * rgb[0] + rows[row][1] * rgb[1] + rows[row][2] * rgb[2];
 }
 
-// Alpha is normalised by the weights of the samples, not by their expectation as colours are: what is opaque gets 1.
-static double alpha_of(const double sums[2]) { return sums[1] > 0 ? fmin(fmax(sums[0] / sums[1], 0), 1) : 0; }
+double rey_film_alpha(const double sums[2]) { return sums[1] > 0 ? fmin(fmax(sums[0] / sums[1], 0), 1) : 0; }
 
 static void convert_pixel(int32_t format, const float *rgb, double alpha, float *out) {
     PixelFormat f = pixel_format(format);
@@ -83,7 +82,8 @@ rey_result rey_render_film(rey_scene *scene, const rey_render_def *def, float *i
     result = picture && (alpha || !format.alpha) ? REY_OK : REY_ERROR_MEMORY;
     result = result ? result : rey_render_picture(scene, def, from, picture, alpha, stats);
     for (size_t i = 0; i < pixels && result == REY_OK; i++) {
-        convert_pixel(s->pixel_format, picture + i * (size_t)from, alpha ? alpha_of(alpha + 2 * i) : 1, image + i * (size_t)to);
+        double a = alpha ? rey_film_alpha(alpha + 2 * i) : 1;
+        convert_pixel(s->pixel_format, picture + i * (size_t)from, a, image + i * (size_t)to);
         memcpy(image + i * (size_t)to + format.channels, picture + i * (size_t)from + 3, (size_t)more * sizeof *image);
     }
     rey_free(ctx, picture);

@@ -23,7 +23,7 @@ typedef struct Particles {
 } Particles;
 
 bool rey_traces_particles(const rey_scene *scene) {
-    return scene->integrator && strcmp(scene->integrator, "ptracer") == 0;
+    return scene->view.particles;
 }
 
 // Refuses sensors that see one direction only.

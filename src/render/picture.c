@@ -4,13 +4,17 @@
 #include "render/particles.h"
 #include "render/render_parts.h"
 
+#include <math.h>
 #include <string.h>
 
-// One pass: a picture of so many channels, assigned, and the second moments of its colours and its alpha, or null.
+// One pass of one integrator: its colours, or its quantities of the first surface; and powers of the same samples.
 typedef struct Pass {
-    int32_t mode, channels;
-    int part, parts;
-    double *picture, *squares, *alpha;
+    int32_t integrator, mode, channels;
+    int32_t power;    // of `powers`; 0 = none
+    bool xyz;         // they are those of XYZ
+    double *picture, *powers;
+    double *alpha;    // 2 numbers per pixel, whose ratio it is; or null
+    bool needs_alpha;
 } Pass;
 
 static void add_stats(rey_stats *sum, const rey_stats *part) {
@@ -22,24 +26,27 @@ static void add_stats(rey_stats *sum, const rey_stats *part) {
     sum->nonfinite += part->nonfinite;
 }
 
-static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pass, rey_stats *stats) {
+// Number `part` of `parts`.
+static rey_result run_pass(rey_scene *scene, const rey_render_def *def, const Pass *pass, int part, int parts, rey_stats *stats) {
     double start = rey_seconds();
     Render r;
     rey_stats one = {0};
-    rey_result result = rey_render_begin(&r, scene, def, pass.mode, pass.channels);
+    rey_result result = rey_render_begin(&r, scene, def, pass->mode, pass->channels);
     SceneView lights = scene->view;
-    if (result == REY_OK && pass.squares) {
-        r.squares = rey_alloc_array(scene->ctx, (size_t)r.tiles * (size_t)r.plan.tile_floats, sizeof(double));
-        result = r.squares ? REY_OK : REY_ERROR_MEMORY;
+    if (result == REY_OK && pass->power) {
+        r.powers = rey_alloc_array(scene->ctx, (size_t)r.tiles * (size_t)r.plan.tile_floats, sizeof(double));
+        r.job.power = pass->power;
+        r.job.powers_of_xyz = pass->xyz;
+        result = r.powers ? REY_OK : REY_ERROR_MEMORY;
     }
-    if (result == REY_OK && pass.alpha) {
+    if (result == REY_OK && pass->alpha) {
         size_t numbers = (size_t)(r.plan.tile_floats / r.plan.channels) * 2;
         r.coverage = rey_alloc_array(scene->ctx, (size_t)r.tiles * numbers, sizeof(double));
         result = r.coverage ? REY_OK : REY_ERROR_MEMORY;
     }
     if (result == REY_OK) {
-        r.part = pass.part;
-        r.parts = pass.parts;
+        r.part = part;
+        r.parts = parts;
         r.job.spp = r.def.spp;
         r.job.scramble = rng_scramble(def->seed, def->set, (uint32_t)def->sensor, 0);
         r.total = r.tiles;
@@ -49,13 +56,13 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
             r.job.scene = &lights;
         }
         rey_parallel_for(scene->ctx->def.threads, r.tiles, rey_render_film_unit, &r);
-        rey_film_merge(&r.plan, r.films, r.columns, r.rows, 1.0 / r.def.spp, pass.picture);
-        if (pass.squares) {
-            rey_film_merge(&r.plan, r.squares, r.columns, r.rows, 1.0 / r.def.spp, pass.squares);
+        rey_film_merge(&r.plan, r.films, r.columns, r.rows, 1.0 / r.def.spp, pass->picture);
+        if (r.powers) {
+            rey_film_merge(&r.plan, r.powers, r.columns, r.rows, 1.0 / r.def.spp, pass->powers);
         }
-        if (pass.alpha) {
+        if (r.coverage) {
             FilmPlan two = rey_film_plan(r.plan.sensor, 2);
-            rey_film_merge(&two, r.coverage, r.columns, r.rows, 1.0 / r.def.spp, pass.alpha);
+            rey_film_merge(&two, r.coverage, r.columns, r.rows, 1.0 / r.def.spp, pass->alpha);
         }
     }
     result = rey_render_end(&r, result, start, &one);
@@ -63,87 +70,166 @@ static rey_result run_pass(rey_scene *scene, const rey_render_def *def, Pass pas
     return result;
 }
 
-static int32_t aov_channels(const SceneView *view) {
+static int32_t aov_channels(const Integrator *integrator) {
     int32_t n = 0;
-    for (int32_t i = 0; i < view->aov_count; i++) {
-        n += aov_components(view->aovs[i]);
+    for (int32_t i = 0; i < integrator->aov_count; i++) {
+        n += aov_components(integrator->aovs[i]);
     }
     return n;
 }
 
-// What the passes found, for all pixels.
-typedef struct Layers {
-    double *colour, *squares, *aovs; // 3, 3 and aov_count numbers per pixel
-    double *alpha;                   // 2, the caller's; or null
-    int32_t aov_count;
-} Layers;
-
 // CIE XYZ of linear sRGB, white D65.
+static const double xyz_rows[3][3] = {
+    {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
+
+// What the integrator `depth` finds is not a colour, but stands for one: grey.
+static double xyz_of_grey(int32_t component) {
+    return xyz_rows[component][0] + xyz_rows[component][1] + xyz_rows[component][2];
+}
+
 static double xyz_of(const double *rgb, int32_t component) {
-    static const double rows[3][3] = {
-        {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
-    return rows[component][0] * rgb[0] + rows[component][1] * rgb[1] + rows[component][2] * rgb[2];
+    const double *row = xyz_rows[component];
+    return row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2];
 }
 
-static double channel_value(const Layers *layers, const Channel *channel, int64_t pixel) {
-    switch (channel->source) {
-    case CHANNEL_AOV:
-        return layers->aovs[pixel * layers->aov_count + channel->component];
-    case CHANNEL_MEAN:
-        return xyz_of(layers->colour + 3 * pixel, channel->component);
-    case CHANNEL_SECOND:
-        return layers->squares[3 * pixel + channel->component];
-    default:
-        return layers->colour[3 * pixel + channel->component];
-    }
+// ---- which passes a picture takes --------------------------------------------------------------------------------------
+
+static const Integrator *integrator_of(const rey_scene *scene, int32_t i) {
+    return &ARRAY_AT(scene->integrators, Integrator, i);
 }
 
-static void assemble(const rey_scene *scene, const Layers *layers, int32_t channels, int64_t pixels, float *image) {
-    for (int64_t i = 0; i < pixels; i++) {
-        for (int32_t c = 0; c < channels; c++) {
-            Channel colour = {NULL, CHANNEL_COLOUR, c};
-            const Channel *channel = c < 3 ? &colour : &ARRAY_AT(scene->channels, Channel, c - 3);
-            image[i * channels + c] = (float)channel_value(layers, channel, i);
+// A channel of the picture: R G B, and those that the integrators add.
+static Channel picture_channel(const rey_scene *scene, int32_t c) {
+    Channel colour = {.source = CHANNEL_RGB, .component = c, .power = 1};
+    return c < 3 ? colour : ARRAY_AT(scene->channels, Channel, c - 3);
+}
+
+// What a pass must keep for a channel.
+static Pass pass_for(const rey_scene *scene, Channel channel) {
+    const Integrator *integrator = integrator_of(scene, channel.integrator);
+    bool surface = channel.source == CHANNEL_AOV || integrator->colour_is_depth, alpha = channel.source == CHANNEL_ALPHA;
+    return (Pass){.integrator = channel.integrator,
+                  .mode = surface ? MODE_AOV : MODE_PRIMAL,
+                  .channels = surface ? aov_channels(integrator) : 3,
+                  .power = alpha || channel.power == 1 ? 0 : channel.power,
+                  .xyz = !surface && channel.source == CHANNEL_XYZ,
+                  .needs_alpha = alpha};
+}
+
+// The pass that has it: samples are the same in all passes of one integrator and mode.
+static Pass *find_pass(const Array *passes, const Pass *wanted) {
+    for (size_t i = 0; i < passes->count; i++) {
+        Pass *pass = &ARRAY_AT(*passes, Pass, i);
+        bool powers = !wanted->power || (pass->power == wanted->power && pass->xyz == wanted->xyz);
+        if (pass->integrator == wanted->integrator && pass->mode == wanted->mode && powers) {
+            return pass;
         }
     }
+    return NULL;
 }
 
-static rey_result render_layers(rey_scene *scene, const rey_render_def *def, int32_t channels, int64_t pixels,
-                                Layers *layers, rey_stats *stats) {
-    const SceneView *view = &scene->view;
-    rey_context *ctx = scene->ctx;
-    bool wide = channels > 3, aovs = view->aov_count && (wide || view->colour_is_depth);
-    bool particles = rey_traces_particles(scene) && (view->max_depth < 0 || view->max_depth > 1);
-    int parts = !view->colour_is_depth + aovs + particles;
-    layers->aov_count = aov_channels(view);
-    layers->colour = rey_alloc_array(ctx, (size_t)pixels * 3, sizeof(double));
-    layers->squares = wide && view->moments ? rey_alloc_array(ctx, (size_t)pixels * 3, sizeof(double)) : NULL;
-    layers->aovs = aovs ? rey_alloc_array(ctx, (size_t)pixels * (size_t)layers->aov_count, sizeof(double)) : NULL;
-    if (!layers->colour || (wide && view->moments && !layers->squares) || (aovs && !layers->aovs)) {
-        return REY_ERROR_MEMORY;
+// One that keeps no powers yet takes these up, too.
+static rey_result want(rey_context *ctx, Array *passes, Pass wanted) {
+    Pass plain = wanted, *pass = find_pass(passes, &wanted);
+    plain.power = 0;
+    if (!pass) {
+        pass = find_pass(passes, &plain);
+        pass = pass && !pass->power ? pass : NULL;
     }
-    rey_result result = REY_OK;
-    if (!view->colour_is_depth) {
-        result = run_pass(scene, def, (Pass){MODE_PRIMAL, 3, 0, parts, layers->colour, layers->squares, layers->alpha}, stats);
+    if (!pass) {
+        pass = rey_array_push(ctx, passes, sizeof *pass, 1);
+        if (!pass) {
+            return REY_ERROR_MEMORY;
+        }
+        *pass = plain;
     }
-    if (result == REY_OK && particles) {
-        rey_stats one = {0};
-        result = rey_render_particles(scene, def, 1, parts, layers->colour, &one);
-        add_stats(stats, &one);
+    if (wanted.power) {
+        pass->power = wanted.power;
+        pass->xyz = wanted.xyz;
     }
-    if (result == REY_OK && aovs) {
-        Pass pass = {MODE_AOV, layers->aov_count, parts - 1, parts, layers->aovs, NULL, NULL};
-        result = run_pass(scene, def, pass, stats);
+    pass->needs_alpha |= wanted.needs_alpha;
+    return REY_OK;
+}
+
+static rey_result plan_passes(rey_scene *scene, int32_t channels, int64_t pixels, bool alpha, Array *passes) {
+    Channel first = {.source = alpha ? CHANNEL_ALPHA : CHANNEL_RGB, .power = 1};
+    rey_result result = want(scene->ctx, passes, pass_for(scene, first));
+    for (int32_t c = 0; c < channels && result == REY_OK; c++) {
+        result = want(scene->ctx, passes, pass_for(scene, picture_channel(scene, c)));
     }
-    for (int64_t i = 0; i < pixels * 3 && result == REY_OK && view->colour_is_depth; i++) {
-        layers->colour[i] = layers->aovs[i / 3 * layers->aov_count];
+    for (size_t i = 0; i < passes->count && result == REY_OK; i++) {
+        Pass *pass = &ARRAY_AT(*passes, Pass, i);
+        size_t numbers = (size_t)pixels * (size_t)pass->channels;
+        pass->picture = rey_alloc_array(scene->ctx, numbers, sizeof(double));
+        pass->powers = pass->power ? rey_alloc_array(scene->ctx, numbers, sizeof(double)) : NULL;
+        pass->alpha = pass->needs_alpha ? rey_alloc_array(scene->ctx, (size_t)pixels * 2, sizeof(double)) : NULL;
+        bool room = pass->picture && (pass->powers || !pass->power) && (pass->alpha || !pass->needs_alpha);
+        result = room ? REY_OK : REY_ERROR_MEMORY;
     }
     return result;
 }
 
+// Whether particles bring what paths of one segment do not.
+static bool particles_follow(const Integrator *integrator, const Pass *pass) {
+    return integrator->particles && pass->mode == MODE_PRIMAL && (integrator->max_depth < 0 || integrator->max_depth > 1);
+}
+
+// Each as if its integrator stood alone: with the same random numbers.
+static rey_result run_passes(rey_scene *scene, const rey_render_def *def, const Array *passes, rey_stats *stats) {
+    int part = 0, parts = 0;
+    rey_result result = REY_OK;
+    for (size_t i = 0; i < passes->count; i++) {
+        const Pass *pass = &ARRAY_AT(*passes, Pass, i);
+        parts += 1 + particles_follow(integrator_of(scene, pass->integrator), pass);
+    }
+    for (size_t i = 0; i < passes->count && result == REY_OK; i++) {
+        const Pass *pass = &ARRAY_AT(*passes, Pass, i);
+        rey_scene_use(scene, pass->integrator);
+        result = run_pass(scene, def, pass, part++, parts, stats);
+        if (result == REY_OK && particles_follow(integrator_of(scene, pass->integrator), pass)) {
+            rey_stats one = {0};
+            result = rey_render_particles(scene, def, part++, parts, pass->picture, &one);
+            add_stats(stats, &one);
+        }
+    }
+    rey_scene_use(scene, 0);
+    return result;
+}
+
+// ---- channels ----------------------------------------------------------------------------------------------------------
+
+// Its value at a pixel, from the pass that has it.
+static double channel_value(const Channel *channel, const Pass *pass, bool is_depth, int64_t pixel) {
+    const bool power = channel->power > 1;
+    const double *values = (power && pass->powers ? pass->powers : pass->picture) + pixel * pass->channels;
+    switch (channel->source) {
+    case CHANNEL_AOV:
+        return values[channel->component];
+    case CHANNEL_ALPHA: // of a sample 0 or 1, and so are its powers
+        return rey_film_alpha(pass->alpha + 2 * pixel);
+    case CHANNEL_XYZ:
+        return is_depth ? values[0] * pow(xyz_of_grey(channel->component), channel->power)
+               : power  ? values[channel->component]
+                        : xyz_of(values, channel->component);
+    default:
+        return values[is_depth ? 0 : channel->component];
+    }
+}
+
+static void assemble(const rey_scene *scene, const Array *passes, int32_t channels, int64_t pixels, float *image) {
+    for (int32_t c = 0; c < channels; c++) {
+        const Channel channel = picture_channel(scene, c);
+        const Pass wanted = pass_for(scene, channel), *pass = find_pass(passes, &wanted);
+        const bool is_depth = integrator_of(scene, channel.integrator)->colour_is_depth;
+        for (int64_t i = 0; i < pixels; i++) {
+            image[i * channels + c] = (float)channel_value(&channel, pass, is_depth, i);
+        }
+    }
+}
+
 rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image, double *alpha,
                               rey_stats *stats) {
-    Layers layers = {.alpha = alpha};
+    Array passes = {0};
     rey_stats sum = {0};
     int width = 0, height = 0;
     rey_result result = rey_begin(scene ? scene->ctx : NULL, image != NULL);
@@ -153,14 +239,27 @@ rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32
     result = rey_scene_film_size(scene, def ? def->sensor : 0, &width, &height);
     int64_t pixels = (int64_t)width * height;
     if (result == REY_OK) {
-        result = render_layers(scene, def, channels, pixels, &layers, &sum);
+        result = rey_render_check(scene, def);
     }
     if (result == REY_OK) {
-        assemble(scene, &layers, channels, pixels, image);
+        result = plan_passes(scene, channels, pixels, alpha != NULL, &passes);
     }
-    rey_free(scene->ctx, layers.colour);
-    rey_free(scene->ctx, layers.squares);
-    rey_free(scene->ctx, layers.aovs);
+    if (result == REY_OK) {
+        result = run_passes(scene, def, &passes, &sum);
+    }
+    if (result == REY_OK) {
+        assemble(scene, &passes, channels, pixels, image);
+    }
+    if (result == REY_OK && alpha) {
+        memcpy(alpha, ARRAY_AT(passes, Pass, 0).alpha, (size_t)pixels * 2 * sizeof *alpha);
+    }
+    for (size_t i = 0; i < passes.count; i++) {
+        const Pass *pass = &ARRAY_AT(passes, Pass, i);
+        rey_free(scene->ctx, pass->picture);
+        rey_free(scene->ctx, pass->powers);
+        rey_free(scene->ctx, pass->alpha);
+    }
+    rey_array_free(scene->ctx, &passes);
     if (stats) {
         *stats = sum;
     }

@@ -28,7 +28,7 @@ static void render_free(Render *r) {
     rey_free(ctx, r->workspaces);
     rey_boundaries_free(r);
     rey_free(ctx, r->films);
-    rey_free(ctx, r->squares);
+    rey_free(ctx, r->powers);
     rey_free(ctx, r->coverage);
     rey_free(ctx, r->gradients);
     rey_free(ctx, r->normal_sums);
@@ -40,7 +40,7 @@ static void render_free(Render *r) {
     pthread_mutex_destroy(&r->lock);
 }
 
-static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
+rey_result rey_render_check(rey_scene *scene, const rey_render_def *def) {
     rey_context *ctx = scene->ctx;
     if (!def || def->size != sizeof *def) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "rey_render_def must come from rey_default_render_def");
@@ -54,7 +54,7 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
     }
     if (rey_traces_particles(scene) && scene->view.media_count > 0) {
         return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                        "'%s' knows no participating media, 'volpath' does", scene->integrator);
+                        "'ptracer' knows no participating media, 'volpath' does");
     }
     if (def->sensor < 0 || def->sensor >= scene->view.sensors_count) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", def->sensor,
@@ -80,7 +80,7 @@ static rey_result check_def(rey_scene *scene, const rey_render_def *def) {
 static rey_result render_plan(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels) {
     *r = (Render){.scene = scene, .parts = 1};
     pthread_mutex_init(&r->lock, NULL);
-    rey_result result = check_def(scene, def);
+    rey_result result = rey_render_check(scene, def);
     if (result != REY_OK) {
         return result;
     }
@@ -194,7 +194,7 @@ void rey_render_film_unit(void *argument, int64_t item, int worker) {
     Render *r = argument;
     PathJob job = r->job;
     job.film = r->films + item * r->plan.tile_floats;
-    job.squares = r->squares ? r->squares + item * r->plan.tile_floats : NULL;
+    job.powers = r->powers ? r->powers + item * r->plan.tile_floats : NULL;
     job.coverage = r->coverage ? r->coverage + item * (r->plan.tile_floats / r->plan.channels * 2) : NULL;
     run_tile(r, &job, (int32_t)item, worker);
 }
@@ -316,7 +316,8 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     r->request = request;
     if (result == REY_OK && scene->view.colour_is_depth) {
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                          "the integrator '%s' has no derivatives, 'path' has", scene->integrator);
+                          "the integrator '%s' has no derivatives, 'path' has%s", scene->integrator,
+                          scene->integrators.count > 1 ? ": of several, put one such first" : "");
     }
     int needed = 0;
     if (result == REY_OK) {

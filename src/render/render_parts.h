@@ -32,7 +32,7 @@ typedef struct Render {
     SceneView lights;      // then: the scene for paths of one segment
     void **workspaces;     // one per worker
     double *films;         // primal and forward: one per tile
-    double *squares;       // the same of second moments, or null
+    double *powers;        // the same of powers of the samples, or null
     double *coverage;      // the same of alpha and of 1, or null
     double *gradients;     // reverse: one per shard
     int64_t gradient_size, selection_size; // numbers selected, and what is gathered behind them for others
@@ -62,6 +62,8 @@ typedef struct Render {
     pthread_mutex_t lock;   // of stats and done, and around progress
 } Render;
 
+// Whether the scene can be rendered so.
+rey_result rey_render_check(rey_scene *scene, const rey_render_def *def);
 // Checks, brings the scene up to date and prepares what every mode needs. rey_render_end follows in any case.
 rey_result rey_render_begin(Render *r, rey_scene *scene, const rey_render_def *def, int32_t mode, int32_t channels);
 rey_result rey_render_end(Render *r, rey_result result, double start, rey_stats *stats);
@@ -77,5 +79,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker);
 // or null.
 rey_result rey_render_picture(rey_scene *scene, const rey_render_def *def, int32_t channels, float *image, double *alpha,
                               rey_stats *stats);
+// Alpha is normalised by the weights of the samples, not by their expectation as colours are: what is opaque gets 1.
+double rey_film_alpha(const double sums[2]);
 // One tile into its film; fits rey_parallel_for.
 void rey_render_film_unit(void *render, int64_t tile, int worker);

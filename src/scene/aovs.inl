@@ -11,4 +11,3 @@ AOV(DUV_DY, "duv_dy", "UV")
 AOV(PRIM_INDEX, "prim_index", "I")
 AOV(SHAPE_INDEX, "shape_index", "I") // from 1 in the order of the file, 0 = none
 AOV(ALBEDO, "albedo", "RGB")
-AOV(ALPHA, "", "A")                 // 1 where a surface or the environment is seen; no list names it

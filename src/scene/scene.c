@@ -24,6 +24,23 @@ rey_result rey_scene_new(rey_context *ctx, rey_scene **out) {
     return REY_OK;
 }
 
+void rey_scene_use(rey_scene *scene, int integrator) {
+    const Integrator *from = &ARRAY_AT(scene->integrators, Integrator, integrator);
+    SceneView *to = &scene->view;
+#define SETTING(type, name, comment) memcpy(&to->name, &from->name, sizeof to->name);
+#include "scene/settings.inl"
+#undef SETTING
+}
+
+void rey_scene_forget_integrators(rey_scene *scene) {
+    for (size_t i = 0; i < scene->channels.count; i++) {
+        rey_free(scene->ctx, ARRAY_AT(scene->channels, Channel, i).name);
+    }
+    rey_free(scene->ctx, scene->integrator);
+    scene->integrator = NULL;
+    scene->channels.count = scene->integrators.count = 0;
+}
+
 int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n) {
     if (n < 0 || (uint64_t)n + array->count > INT32_MAX) {
         rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the scene holds more than 2^31 numbers of one kind");
@@ -142,9 +159,8 @@ void rey_scene_destroy(rey_scene *scene) {
         rey_free(ctx, ARRAY_AT(scene->notes, char *, i));
     }
     rey_array_free(ctx, &scene->notes);
-    for (size_t i = 0; i < scene->channels.count; i++) {
-        rey_free(ctx, ARRAY_AT(scene->channels, Channel, i).name);
-    }
+    rey_scene_forget_integrators(scene);
+    rey_array_free(ctx, &scene->integrators);
     rey_array_free(ctx, &scene->channels);
     rey_array_free(ctx, &scene->params);
     rey_array_free(ctx, &scene->aliases);
@@ -156,7 +172,6 @@ void rey_scene_destroy(rey_scene *scene) {
     rey_free(ctx, scene->dirty_volumes);
     rey_free(ctx, scene->dirty_media);
     rey_free(ctx, scene->dirty_phases);
-    rey_free(ctx, scene->integrator);
     if (scene->document_free) {
         scene->document_free(scene->document);
     }

@@ -177,12 +177,26 @@ static inline int32_t aov_components(int32_t kind) {
     return counts[kind];
 }
 
-// Where the numbers of a picture's channel beyond the first three come from.
-enum { CHANNEL_COLOUR, CHANNEL_AOV, CHANNEL_MEAN, CHANNEL_SECOND }; // the last two: first and second moments in XYZ
+typedef int32_t AovKinds[MOST_AOVS];
+
+// What one integrator decides. Those inside of `aov` and `moment` render one after the other.
+typedef struct Integrator {
+    const char *name;
+#define SETTING(type, name, comment) type name;
+#include "scene/settings.inl"
+#undef SETTING
+} Integrator;
+
+// Where the numbers of a picture's channel beyond the first three come from: linear sRGB, CIE XYZ, alpha, or the quantities
+// of the first surface.
+enum { CHANNEL_RGB, CHANNEL_XYZ, CHANNEL_ALPHA, CHANNEL_AOV };
+enum { MOST_CHANNELS = 240 };
 
 typedef struct Channel {
     char *name;
-    int32_t source, component; // aov: counted through all of them
+    int32_t source, component; // component: of quantities counted through all of the integrator's
+    int32_t integrator;        // that it shows, among the scene's
+    int32_t power;             // of the samples, whose mean it is: 1, and 2 for second moments
 } Channel;
 
 // What changed of a shape.
@@ -205,16 +219,9 @@ typedef struct SceneView {
 #include "scene/arrays.inl"
 #undef ARRAY
     int32_t environment;      // emitter index of the constant or envmap light, -1 = none
-    int32_t max_depth, rr_depth, hide_emitters;
-    bool solid;               // surfaces that let a ray pass hide nothing behind them, and count in alpha (direct)
-    bool drops;               // with hidden emitters, a path that met only surfaces that let it pass brings nothing (path)
-    bool has_media;           // paths go through participating media
-    bool through;             // passing a surface undeviated counts in no depth, and shadow rays do it (volpath)
-    // direct: of `split` samples in a row, the first light_samples sample a light and the first scatter_samples the
-    // scattering function; 0 = every sample does both.
-    int32_t split, light_samples, scatter_samples;
-    int32_t aovs[MOST_AOVS], aov_count;
-    bool colour_is_depth, moments; // integrators `depth` and `moment`
+#define SETTING(type, name, comment) type name; // of the integrator at work
+#include "scene/settings.inl"
+#undef SETTING
     float bounds_centre[3], bounds_half[3], bounds_radius;
     void *embree;             // RTCScene
     // Spheres that stand in the scene by themselves and that kernels meet instead of Embree: all of them, or none.
@@ -259,6 +266,7 @@ struct rey_scene {
     SceneView view;
     Array params, aliases;
     Names param_names, alias_names;
+    Array integrators;        // of Integrator: the one whose picture R G B are and derivatives follow, then the others
     Array channels;           // of Channel: what a picture holds behind R G B
     Array notes;              // of char *: what a user should know about how the scene was read
     // Loading: each array grows by itself; rey_scene_freeze makes them fit, and the view points to them.
@@ -275,7 +283,7 @@ struct rey_scene {
     // Derived data to rebuild before the next kernel runs.
     uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters, *dirty_volumes, *dirty_media, *dirty_phases;
     bool dirty;
-    char *integrator;
+    char *integrator;         // name of the first
     void *document;           // io's source document, owned; freed through document_free
     void (*document_free)(void *document);
 };
@@ -286,6 +294,10 @@ rey_result rey_scene_new(rey_context *ctx, rey_scene **out);
 int32_t rey_scene_append(rey_scene *scene, Array *array, size_t item_bytes, int64_t n);
 // The build arrays become what the view shows; theta never moves from here on. `arena` stands for empty arrays.
 rey_result rey_scene_freeze(rey_scene *scene);
+// The view takes over what an integrator of the scene decides.
+void rey_scene_use(rey_scene *scene, int integrator);
+// Forgets all integrators, and the channels that they brought.
+void rey_scene_forget_integrators(rey_scene *scene);
 // Records something that a user should know about how the scene was read; once, however often it is said.
 rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Terms of a list of names with commas between them; 0, and *wrong at its first word that names none.
