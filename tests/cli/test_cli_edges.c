@@ -226,6 +226,38 @@ static void pictures_out_of_range_are_told(void **state) {
     expect_words(f, 2, "render picture.xml -D file=within.pfm -o out.exr --spp 1 --sensor sensor_0", "no sensor 'sensor_0'");
 }
 
+// All channels go into EXR and NPY files, the first picture into PNG; readers of R G B find that one, and so do derivatives.
+static void several_integrators(void **state) {
+    Fixture *f = *state;
+    static const char head[] = "<scene version='3.0.0'>", inside[] = "<integrator type='$first' name='a'/><integrator type='direct' "
+                               "name='b'/><string name='aovs' value='dd:depth'/></integrator>",
+                      rest[] = "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='6'/><integer "
+                               "name='height' value='4'/></film></sensor><emitter type='constant'/><shape type='sphere'><point "
+                               "name='center' x='0' y='0' z='4'/><bsdf type='diffuse' id='grey'/></shape></scene>";
+    char text[1024];
+    snprintf(text, sizeof text, "%s<default name='first' value='path'/><integrator type='aov'>%s%s", head, inside, rest);
+    write_words("several.xml", text);
+    snprintf(text, sizeof text, "%s<integrator type='path'/>%s", head, rest);
+    write_words("alone.xml", text);
+    expect(f, 0, "render several.xml -o several.exr --spp 4");
+    expect(f, 0, "render several.xml -o several.png --spp 4");
+    expect(f, 0, "render several.xml -o several.npy --spp 4");
+    expect(f, 0, "render alone.xml -o alone.exr --spp 4");
+    JsonNode *node = run_json(f, 0, "compare several.exr alone.exr --json");
+    assert_true(json_value(node, "mse", 1) == 0);
+    json_free(node);
+    expect_said(f, 0, "info several.xml", "channels          R G B a.R a.G a.B a.A b.R b.G b.B b.A dd.T");
+    node = run_json(f, 0, "info alone.xml --json");
+    assert_string_equal(json_get(node, "channels")->first->text, "R");
+    json_free(node);
+    expect_words(f, 0, "grad several.xml --param grey.reflectance.value --spp 16",
+                 "derivatives: several.xml:1: 'aov' holds 2 integrators: R G B and derivatives are those of the first, 'path'");
+    expect_words(f, 1, "grad several.xml -D first=depth --param grey.reflectance.value --spp 16",
+                 "'depth' has no derivatives, 'path' has: of several, put one such first");
+    expect(f, 0, "render several.xml -o several.exr --spp 4");
+    assert_null(strstr(f->words, "derivatives"));
+}
+
 // Parameters have the further names of what they belong to.
 static void aliases_name_parameters(void **state) {
     Fixture *f = *state;
@@ -432,6 +464,7 @@ int main(void) {
         cmocka_unit_test(inputs_are_not_written), cmocka_unit_test(patterns_pass_over_bounds),
         cmocka_unit_test(aliases_name_parameters),
         cmocka_unit_test(pictures_out_of_range_are_told),
+        cmocka_unit_test(several_integrators),
         cmocka_unit_test(fits_replace_no_foreign_files),
         cmocka_unit_test(fresh_paths_are_compared_where_others_were),
         cmocka_unit_test(ends_of_fits_are_told),
