@@ -229,8 +229,9 @@ static void pictures_out_of_range_are_told(void **state) {
 // All channels go into EXR and NPY files, the first picture into PNG; readers of R G B find that one, and so do derivatives.
 static void several_integrators(void **state) {
     Fixture *f = *state;
-    static const char head[] = "<scene version='3.0.0'>", inside[] = "<integrator type='$first' name='a'/><integrator type='direct' "
-                               "name='b'/><string name='aovs' value='dd:depth'/></integrator>",
+    static const char head[] = "<scene version='3.0.0'>",
+                      inside[] = "<integrator type='$first' name='a'/><integrator type='direct' name='b'/><string name='aovs' "
+                                 "value='dd:depth'/></integrator>",
                       rest[] = "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='6'/><integer "
                                "name='height' value='4'/></film></sensor><emitter type='constant'/><shape type='sphere'><point "
                                "name='center' x='0' y='0' z='4'/><bsdf type='diffuse' id='grey'/></shape></scene>";

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -115,7 +116,8 @@ static void check_alone(rey_context *ctx, const char *rest, const char *const *i
         }
         free(alone);
     }
-    float *alone = film_of(ctx, "<integrator type='aov'><string name='aovs' value='dd:depth,nn:sh_normal'/></integrator>", rest, &one);
+    static const char quantities[] = "<integrator type='aov'><string name='aovs' value='dd:depth,nn:sh_normal'/></integrator>";
+    float *alone = film_of(ctx, quantities, rest, &one);
     assert_int_equal(one, 4 + QUANTITIES);
     for (int i = 0; i < PIXELS; i++) { // no colour, and no sky in alpha
         assert_true(alone[i * one] == 0 && alone[i * one + 3] == 0);
@@ -164,8 +166,8 @@ static void test_orders(void **state) {
         }
         check_alone(ctx, rest, order, NESTED);
     }
-    snprintf(rest, sizeof rest, "%s<shape type='sphere'/><emitter type='point'><point name='position' x='1' y='2' z='4'/></emitter>",
-             sensor);
+    snprintf(rest, sizeof rest,
+             "%s<shape type='sphere'/><emitter type='point'><point name='position' x='1' y='2' z='4'/></emitter>", sensor);
     check_alone(ctx, rest, particles, 3);
     particles[0] = particles[1], particles[1] = nested[0];
     check_alone(ctx, rest, particles, 3);
@@ -275,9 +277,9 @@ static void test_many(void **state) {
 static const char coin[] =
     "<shape type='rectangle'><transform name='to_world'><scale value='50'/><translate z='-1'/></transform><bsdf type='mask'>"
     "<float name='opacity' value='0.5'/><bsdf type='diffuse'><rgb name='reflectance' value='0 0 0'/></bsdf></bsdf></shape>"
-    "<emitter type='constant'><rgb name='radiance' value='2 1 0.5'/></emitter><sensor type='orthographic'><transform name='to_world'>"
-    "<lookat origin='0, 0, 2' target='0, 0, 0' up='0, 1, 0'/></transform><film type='hdrfilm'><integer name='width' value='4'/>"
-    "<integer name='height' value='4'/></film></sensor>";
+    "<emitter type='constant'><rgb name='radiance' value='2 1 0.5'/></emitter><sensor type='orthographic'>"
+    "<transform name='to_world'><lookat origin='0, 0, 2' target='0, 0, 0' up='0, 1, 0'/></transform><film type='hdrfilm'>"
+    "<integer name='width' value='4'/><integer name='height' value='4'/></film></sensor>";
 enum { COIN_PIXELS = 16 };
 
 static void test_powers(void **state) {
@@ -326,6 +328,47 @@ static void test_powers(void **state) {
     }
     free(image);
     rey_scene_destroy(scene);
+    rey_context_destroy(ctx);
+}
+
+// Half of the film sees a surface. Alpha is what Mitsuba 3.9.1 gives: of the sky and of what scatters; of surfaces alone for
+// `direct` and `depth`; of nothing without a path.
+static void test_alpha(void **state) {
+    (void)state;
+    static const char inside[] =
+        AOV "<integrator type='path' name='a'/><integrator type='path' name='h'><boolean name='hide_emitters' value='true'/>"
+            "</integrator><integrator type='direct' name='b'/><integrator type='depth' name='z'/><integrator type='path' name='n'>"
+            "<integer name='max_depth' value='0'/></integrator>" END;
+    enum { A = 3, H = 7, B = 11, Z = 15, N = 19, CHANNELS = 3 + 5 * 4 + 1 }; // the first ones counted behind R G B
+    rey_context *ctx = context(0, 1);
+    for (int k = 0; k < 4; k++) {
+        bool sky = k & 1, passes = k & 2;
+        float image[16 * CHANNELS];
+        char rest[2048];
+        int seen = 0;
+        rey_scene *scene;
+        rey_render_def def = rey_default_render_def();
+        def.spp = SPP;
+        snprintf(rest, sizeof rest,
+                 "<shape type='rectangle'><transform name='to_world'><translate x='1'/></transform><bsdf type='%s'/></shape>%s"
+                 "<sensor type='orthographic'><transform name='to_world'><lookat origin='0, 0, 2' target='0, 0, 0' up='0, 1, 0'/>"
+                 "</transform><film type='hdrfilm'><integer name='width' value='4'/><integer name='height' value='4'/><rfilter "
+                 "type='box'/></film></sensor>",
+                 passes ? "null" : "diffuse", sky ? "<emitter type='constant'/>" : "");
+        ok(ctx, load(ctx, inside, rest, &scene));
+        assert_int_equal(rey_channel_count(scene), CHANNELS);
+        ok(ctx, rey_render_channels(scene, &def, image, NULL));
+        for (int i = 0; i < 16; i++) {
+            const float *alpha = image + i * CHANNELS + 3;
+            float surface = alpha[Z];
+            seen += surface == 1;
+            assert_true(surface == 0 || surface == 1);
+            assert_true(alpha[A] == (sky ? 1 : passes ? 0 : surface) && alpha[H] == (passes ? 0 : surface));
+            assert_true(alpha[B] == surface && alpha[N] == 0);
+        }
+        assert_int_equal(seen, 8);
+        rey_scene_destroy(scene);
+    }
     rey_context_destroy(ctx);
 }
 
@@ -428,7 +471,7 @@ static void test_kept(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_alone), cmocka_unit_test(test_orders), cmocka_unit_test(test_threads),
                                        cmocka_unit_test(test_names), cmocka_unit_test(test_many),
-                                       cmocka_unit_test(test_powers), cmocka_unit_test(test_first),
+                                       cmocka_unit_test(test_powers), cmocka_unit_test(test_alpha), cmocka_unit_test(test_first),
                                        cmocka_unit_test(test_kept)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
