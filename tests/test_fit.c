@@ -113,11 +113,11 @@ static void test_job_errors(void **state) {
     expect_error(f, HEAD "optimizer: {type: lbfgs}\n", "optimizer.momentum=0", "--set optimizer.momentum=0: 'momentum' is a key of "
                  "sgd; lbfgs has learning_rate and memory");
     expect_error(f, HEAD "iterations: 2.5\n", NULL, "job.yaml:4: iterations = 2.5, expected a whole number");
-    expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: expected a number");
+    expect_error(f, HEAD "iterations: nan\n", NULL, "job.yaml:4: iterations: 'nan', expected a number");
     expect_error(f, HEAD "loss: l3\n", NULL, "job.yaml:4: loss: unknown value 'l3', did you mean");
     expect_error(f, HEAD "loss: l2\nloss: l1\n", NULL, "job.yaml:5: key 'loss' is given twice");
     expect_error(f, HEAD "spp: [1, 2]\n", NULL, "expected a number, or a list of {from: ITERATION, spp: NUMBER}");
-    expect_error(f, HEAD "spp: [{from: 0, spp: 4}, {from: 0, spp: 8}]\n", NULL, "'from' must rise");
+    expect_error(f, HEAD "spp: [{from: 0, spp: 4}, {from: 0, spp: 8}]\n", NULL, "from = 0, expected more than in the entry before");
     expect_error(f, HEAD "views_per_iteration: 2\n", NULL, "the job has 1 view");
     expect_error(f, HEAD "defines: {'a b': 1}\n", NULL, "is not a name");
     expect_error(f, "scene: a.xml\n", NULL, "key 'views' is missing");
@@ -127,14 +127,15 @@ static void test_job_errors(void **state) {
     expect_error(f, "", NULL, "key 'scene' is missing");
     expect_error(f, HEAD, "optimizer.lerning_rate=3", "--set optimizer.lerning_rate=3: unknown key 'lerning_rate'");
     expect_error(f, HEAD, "parameters.0.bounds=[1,0]", "--set parameters.0.bounds=[1,0]: bounds: 1 is not below 0");
-    expect_error(f, HEAD, "seed=[", "--set seed=[: did not find");
+    expect_error(f, HEAD, "seed=[", "--set seed=[: the value, which is read as YAML: did not find");
     expect_error(f, HEAD, "views.1.weight=2", "--set views.1.weight=2: views: key 'target' is missing");
-    expect_error(f, HEAD, "views.0.sensor=[0]", "sensor: expected a number from 0 or an id");
-    expect_error(f, "scene: a.xml\nviews:\n  - t.exr\n", NULL, "job.yaml:3: views: expected entries such as {sensor: 0,");
-    expect_error(f, "parameters: [[a]]\n", NULL, "job.yaml:1: parameters: expected 'key: value' lines");
-    expect_error(f, "parameters: ['']\n", NULL, "job.yaml:1: entry: expected a text");
-    expect_error(f, HEAD, "parameters.2.name=b", "'2' is not an index from 0 to 1");
-    expect_error(f, HEAD, "x..y=1", "malformed key");
+    expect_error(f, HEAD, "views.0.sensor=[0]", "sensor: a list, expected a number from 0 or an id");
+    expect_error(f, "scene: a.xml\nviews:\n  - t.exr\n", NULL, "job.yaml:3: views: 't.exr', expected entries such as {sensor: 0,");
+    expect_error(f, "parameters: [[a]]\n", NULL, "job.yaml:1: parameters: a list, expected 'key: value' lines");
+    expect_error(f, "parameters: ['']\n", NULL, "job.yaml:1: entry: nothing, expected a text");
+    expect_error(f, HEAD, "parameters.2.name=b",
+                 "parameters is a list of 1, and '2' is no index of it, expected 0 or 1, which appends");
+    expect_error(f, HEAD, "x..y=1", "expected a key whose parts are joined by dots");
     char deep[128];
     memset(deep, '[', sizeof deep - 1);
     deep[sizeof deep - 1] = 0;

@@ -26,13 +26,13 @@ static void test_keys_are_named(void **state) {
         {HEAD "views_of: 1\n", "job.yaml:4: unknown key 'views_of', did you mean 'views'?"},
         {HEAD "loss: {type: l2, x: 1}\n", "job.yaml:4: unknown key 'x' in loss, expected one of type, epsilon"},
         {HEAD "loss: l3\n", "job.yaml:4: loss: unknown value 'l3', did you mean 'l1'?"},
-        {HEAD "loss: []\n", "job.yaml:4: loss: expected 'key: value' lines"},
+        {HEAD "loss: []\n", "job.yaml:4: loss: an empty list, expected 'key: value' lines"},
         {HEAD "optimizer: {schedule: fast}\n", "job.yaml:4: schedule: unknown value 'fast', expected one of constant, cosine,"},
         {"scene: a\nviews: [{target: t, held_out: yes}]\n",
          "job.yaml:2: held_out: unknown value 'yes', expected one of false, true"},
-        {"parameters: [{name: a, bounds: [0, x]}]\n", "job.yaml:1: bounds: expected a number"},
+        {"parameters: [{name: a, bounds: [0, x]}]\n", "job.yaml:1: bounds: 'x', expected a number"},
         {"parameters: [{name: a, bounds: [0, 1e99]}]\n", "job.yaml:1: bounds = 1e+99, expected -1e+30 to 1e+30"},
-        {"parameters: [{name: a, start: [0, x]}]\n", "job.yaml:1: start: expected a number"},
+        {"parameters: [{name: a, start: [0, x]}]\n", "job.yaml:1: start: 'x', expected a number"},
         {HEAD "iterations: 12345678.5\n", "job.yaml:4: iterations = 12345678.5, expected a whole number"},
     };
     for (int i = 0; i < COUNT_OF(cases); i++) {
@@ -56,11 +56,43 @@ static void test_keys_of_schedules(void **state) {
 // An entry of what is no map or list was made by the override.
 static void test_overrides_are_blamed(void **state) {
     rey_context *ctx = *state;
-    expect_error(ctx, HEAD, "scene.a=1", "--set scene.a=1: scene: expected a text");
-    expect_error(ctx, HEAD, "views.0.target.b=1", "--set views.0.target.b=1: target: expected a text");
-    expect_error(ctx, HEAD "iterations: 3\n", "iterations.0=1", "--set iterations.0=1: iterations: expected a number");
+    expect_error(ctx, HEAD, "scene.a=1", "--set scene.a=1: scene: a map, expected a text");
+    expect_error(ctx, HEAD, "views.0.target.b=1", "--set views.0.target.b=1: target: a map, expected a text");
+    expect_error(ctx, HEAD "iterations: 3\n", "iterations.0=1", "--set iterations.0=1: iterations: a map, expected a number");
     expect_error(ctx, HEAD "optimizer: {schedule: {type: cosine}}\n", "optimizer.schedule.type.x=1",
-                 "--set optimizer.schedule.type.x=1: type: unknown value ''");
+                 "--set optimizer.schedule.type.x=1: type: a map, expected one of constant, cosine, exponential, step");
+}
+
+// Of two keys that do not go together, the override is to blame; without one the key is.
+static void test_overrides_among_others(void **state) {
+    rey_context *ctx = *state;
+    static const char *const cases[][3] = {
+        {HEAD, "views.0.held_out=true", "--set views.0.held_out=true: views: all are held out"},
+        {HEAD "spp: 4\n", "spp.0.spp=8", "--set spp.0.spp=8: spp: a map, expected a number, or a list"},
+        {HEAD "spp: [{from: 0, spp: 4}]\n", "spp.0.from=3", "--set spp.0.from=3: from = 3, expected 0 in the first entry"},
+        {HEAD "optimizer: {beta1: 0.5}\n", "optimizer.type=sgd", "--set optimizer.type=sgd: 'beta1' is a key of adam"},
+        {HEAD "optimizer: {schedule: {type: step, every: 3}}\n", "optimizer.schedule.type=cosine",
+         "--set optimizer.schedule.type=cosine: 'every' is a key of step, not of cosine"},
+        {HEAD "optimizer: {average: 1}\n", "optimizer.type=lbfgs", "--set optimizer.type=lbfgs: lbfgs ends at its best point"},
+        {HEAD "optimizer: lbfgs\n", "gradient_spp=2", "--set gradient_spp=2: lbfgs needs the gradient"},
+        {HEAD "optimizer: lbfgs\ngradient_spp: 2\n", NULL, "job.yaml:4: lbfgs needs the gradient"},
+        {HEAD, "levels.0={from: 0, edge_length: 1}", "--set levels.0={from: 0, edge_length: 1}: edge_length is for parameters"},
+        {"parameters: [{name: a, smoothness: 3, parameterisation: laplacian}]\n", "parameters.0.parameterisation=log",
+         "--set parameters.0.parameterisation=log: smoothness is for 'parameterisation: laplacian'"},
+        {HEAD, "iterations=", "--set iterations=: iterations: nothing, expected a number"},
+        {HEAD, "optimizer=", "--set optimizer=: optimizer: nothing, expected one of adam, sgd, lbfgs"},
+        {HEAD, "iterations={", "--set iterations={: the value, which is read as YAML: "},
+        {HEAD, "views.target=t", "--set views.target=t: views is a list of 1, and 'target' is no index of it, expected 0 or 1"},
+        {HEAD, "levels.1.from=3", "levels is a list of 0, and '1' is no index of it, expected 0, which appends an entry"},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        expect_error(ctx, cases[i][0], cases[i][1], cases[i][2]);
+    }
+    const char text[] = HEAD, *set = "levels.0={from: 0, reduce: 2}"; // the first entry makes the list
+    Job job;
+    assert_int_equal(rey_job_read_memory(ctx, "job.yaml", (const unsigned char *)text, strlen(text), &set, 1, &job), REY_OK);
+    assert_int_equal(job.level_count, 1);
+    rey_job_free(&job);
 }
 
 // What is no text at all is found by its offset.
@@ -86,6 +118,7 @@ int main(void) {
         cmocka_unit_test(test_keys_are_named),
         cmocka_unit_test(test_keys_of_schedules),
         cmocka_unit_test(test_overrides_are_blamed),
+        cmocka_unit_test(test_overrides_among_others),
         cmocka_unit_test(test_bytes_have_lines),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

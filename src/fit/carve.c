@@ -10,6 +10,10 @@
 
 static const double SLACK = 1e-3; // pixels, for rounding
 
+static JobPlace carve_place(const Fit *fit, const Unknown *p) {
+    return rey_job_place_of(fit->job.parameters[p->entry].node, "carve", "name");
+}
+
 static bool carves(const Fit *fit, const Unknown *p) { return p->param >= 0 && fit->job.parameters[p->entry].carve; }
 
 rey_result rey_silhouette_load(Fit *fit, const JobView *job_view, FitView *view) {
@@ -129,7 +133,7 @@ static rey_result check_still(Fit *fit, const rey_scene *scene, const Unknowns *
         const Unknown *other = &ARRAY_AT(u->items, Unknown, k);
         const Param *param = other->param >= 0 ? &ARRAY_AT(scene->params, Param, other->param) : NULL;
         if (param && (param->camera >= 0 || param->volume >= 0)) {
-            return rey_job_fail_at(&fit->job, fit->job.parameters[p->entry].at, REY_ERROR_PARAM,
+            return rey_job_fail_at(&fit->job, carve_place(fit, p), REY_ERROR_PARAM,
                                    "parameter '%s': carve needs cameras and grids that stand still, and '%s' is unknown", p->name,
                                    other->name);
         }
@@ -151,7 +155,7 @@ static rey_result carve_grid(Fit *fit, const rey_scene *scene, Unknowns *u, Unkn
             views++;
         }
     }
-    JobPlace at = fit->job.parameters[p->entry].at;
+    JobPlace at = carve_place(fit, p);
     if (views == 0) {
         return rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM, "parameter '%s': carve needs views with a 'silhouette'", p->name);
     }
@@ -174,7 +178,7 @@ rey_result rey_carve(Fit *fit, rey_scene *scene, Unknowns *u) {
             continue;
         }
         rey_result result = p->grid.nx ? check_still(fit, scene, u, p)
-                                       : rey_job_fail_at(&fit->job, fit->job.parameters[p->entry].at, REY_ERROR_PARAM,
+                                       : rey_job_fail_at(&fit->job, carve_place(fit, p), REY_ERROR_PARAM,
                                                          "parameter '%s': carve is for grids of voxels", p->name);
         if (!result) {
             result = carve_grid(fit, scene, u, p);

@@ -14,8 +14,9 @@ static rey_result refuse(const Fit *fit, const Unknown *unknown, rey_result resu
     if (result == REY_ERROR_MEMORY) {
         return result;
     }
-    return rey_job_fail_at(&fit->job, fit->job.parameters[unknown->entry].at, REY_ERROR_PARAM, "parameter '%s': %s%s",
-                           unknown->name, why, strstr(why, "--terms interior") ? " (in a job, 'terms: interior')" : "");
+    JobPlace at = rey_job_place_of(fit->job.parameters[unknown->entry].node, "name", NULL);
+    return rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM, "parameter '%s': %s%s", unknown->name, why,
+                           strstr(why, "--terms interior") ? " (in a job, 'terms: interior')" : "");
 }
 
 static rey_result check_view(Fit *fit, int view) {

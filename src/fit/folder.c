@@ -126,6 +126,9 @@ rey_result rey_fit_folder_open(Fit *fit) {
     if (!result) {
         result = lock_folder(fit);
     }
+    if (!fit->def->output) { // which is no place of the job
+        result = rey_job_named_file(&fit->job, fit->job.output_at, result);
+    }
     if (!result) {
         result = rey_former_refuse_inputs(fit);
     }

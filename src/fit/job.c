@@ -20,9 +20,8 @@ static bool is_name(const char *text) {
 static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
     JobDefines *defines = target;
     if (node->kind != YAML_MAP) {
-        return node->child || (node->text && node->text[0])
-                   ? rey_job_fail(job, node, "defines: expected 'name: value' lines")
-                   : REY_OK;
+        bool empty = node->kind == YAML_SCALAR && !(node->text && node->text[0]);
+        return empty ? REY_OK : rey_job_fail_kind(job, node, "defines", "'name: value' lines");
     }
     int count = rey_yaml_count(node), i = 0;
     defines->list = rey_job_alloc(job, (size_t)count, sizeof *defines->list);
@@ -32,7 +31,8 @@ static rey_result read_defines(Job *job, const YamlNode *node, void *target) {
         defines->list[i].name = entry->key;
         defines->at[i] = rey_job_place(entry);
         result = is_name(entry->key) ? rey_job_read_text(job, entry, &defines->list[i].value)
-                                     : rey_job_fail(job, entry, "defines: '%s' is not a name", entry->key);
+                                     : rey_job_fail(job, entry, "defines: '%s' is not a name, expected letters, digits and _",
+                                                  entry->key);
     }
     defines->count = i;
     return result;
@@ -55,12 +55,12 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
         job->spp_count = 1;
         return *steps ? rey_job_read_field(job, &fields[1], node, (char *)*steps) : REY_ERROR_MEMORY;
     }
-    bool steps_alone = node->kind == YAML_LIST;
-    for (const YamlNode *entry = node->child; entry && steps_alone; entry = entry->next) {
-        steps_alone = entry->kind == YAML_MAP;
+    const YamlNode *odd = node->kind == YAML_LIST ? node->child : node;
+    while (odd && odd != node && odd->kind == YAML_MAP) {
+        odd = odd->next;
     }
-    if (!steps_alone) {
-        return rey_job_fail(job, node, "'spp': expected a number, or a list of {from: ITERATION, spp: NUMBER}");
+    if (odd) {
+        return rey_job_fail_kind(job, odd, "spp", "a number, or a list of {from: ITERATION, spp: NUMBER}");
     }
     void *items;
     rey_result result = rey_job_open_list(job, node, sizeof **steps, &items, &job->spp_count);
@@ -72,7 +72,8 @@ static rey_result read_spp(Job *job, const YamlNode *node, void *target) {
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         result = rey_job_read_map(job, entry, "spp", fields, &(*steps)[i]);
         if (!result && (i ? (*steps)[i].from <= (*steps)[i - 1].from : (*steps)[0].from != 0)) {
-            result = rey_job_fail(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
+            result = rey_job_fail_at(job, rey_job_place_of(entry, "from", NULL), REY_ERROR_FORMAT, "from = %d, expected %s",
+                                     (*steps)[i].from, i ? "more than in the entry before" : "0 in the first entry");
         }
     }
     return result;
@@ -88,15 +89,17 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
     };
     JobLevel **levels = target;
     void *items = NULL;
-    job->levels_at = rey_job_place(node);
     rey_result result = rey_job_open_list(job, node, sizeof **levels, &items, &job->level_count);
     *levels = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*levels)[i].reduce = 1;
+        (*levels)[i].reduce_at = rey_job_place_of(entry, "reduce", NULL);
+        (*levels)[i].resolution_at = rey_job_place_of(entry, "resolution", NULL);
         result = rey_job_read_map(job, entry, "levels", fields, &(*levels)[i]);
         if (!result && (i ? (*levels)[i].from <= (*levels)[i - 1].from : (*levels)[0].from != 0)) {
-            result = rey_job_fail(job, entry, i ? "'from' must rise from entry to entry" : "the first 'from' must be 0");
+            result = rey_job_fail_at(job, rey_job_place_of(entry, "from", NULL), REY_ERROR_FORMAT, "from = %d, expected %s",
+                                     (*levels)[i].from, i ? "more than in the entry before" : "0 in the first entry");
         }
     }
     return result;
@@ -111,7 +114,7 @@ static rey_result read_sensor(Job *job, const YamlNode *node, void *target) {
     }
     bool text = node->kind == YAML_SCALAR && node->text && node->text[0];
     return text ? rey_job_read_text(job, node, &((JobView *)target)->sensor_id)
-                : rey_job_fail(job, node, "sensor: expected a number from 0 or an id");
+                : rey_job_fail_kind(job, node, "sensor", "a number from 0 or an id");
 }
 
 static rey_result read_views(Job *job, const YamlNode *node, void *target) {
@@ -128,26 +131,27 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
     };
     JobView **views = target;
     void *items = NULL;
+    JobPlace held_out = rey_job_place(node);
     rey_result result = rey_job_open_list(job, node, sizeof **views, &items, &job->view_count);
     *views = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         JobView *view = &(*views)[i];
-        *view = (JobView){.sensor = i, .weight = 1, .exposure = 1, .at = rey_job_place(entry)};
+        *view = (JobView){.sensor = i, .weight = 1, .exposure = 1};
         result = entry->kind == YAML_MAP
                      ? rey_job_read_map(job, entry, "views", fields, view)
-                     : rey_job_fail(job, entry, "views: expected entries such as {sensor: 0, target: photo.exr}");
+                     : rey_job_fail_kind(job, entry, "views", "entries such as {sensor: 0, target: photo.exr}");
         if (!result) {
             view->target_at = rey_job_place(rey_yaml_find(entry, "target"));
-            const YamlNode *sensor = rey_yaml_find(entry, "sensor");
-            view->sensor_at = sensor ? rey_job_place(sensor) : view->at;
+            view->sensor_at = rey_job_place_of(entry, "sensor", NULL);
+            held_out = rey_job_blame(held_out, rey_job_place_of(entry, "held_out", NULL));
             view->mask_at = rey_job_place(rey_yaml_find(entry, "mask"));
             view->silhouette_at = rey_job_place(rey_yaml_find(entry, "silhouette"));
             job->fitted_count += !view->held_out;
         }
     }
     if (!result && job->fitted_count == 0) {
-        return rey_job_fail(job, node, "views: all are held out, expected at least one to fit");
+        return rey_job_fail_at(job, held_out, REY_ERROR_FORMAT, "views: all are held out, expected at least one to fit");
     }
     return result;
 }
@@ -173,8 +177,9 @@ static rey_result check_schedule_keys(Job *job, const YamlNode *node, ScheduleKi
         bool of_falls = !strcmp(entry->key, "end") || !strcmp(entry->key, "length");
         bool of_steps = !strcmp(entry->key, "factor") || !strcmp(entry->key, "every");
         if (kind == SCHEDULE_STEP ? of_falls : kind != SCHEDULE_CONSTANT && of_steps) {
-            return rey_job_fail(job, entry, "'%s' is a key of %s, not of %s", entry->key,
-                                of_steps ? "step" : "cosine and exponential", rey_schedule_name((int)kind));
+            return rey_job_fail_at(job, rey_job_place_of(node, entry->key, "type"), REY_ERROR_FORMAT,
+                                   "'%s' is a key of %s, not of %s", entry->key, of_steps ? "step" : "cosine and exponential",
+                                   rey_schedule_name((int)kind));
         }
     }
     return REY_OK;
@@ -212,8 +217,9 @@ static rey_result check_optimizer_keys(Job *job, const YamlNode *node, Optimizer
     for (const YamlNode *entry = node->child; entry; entry = entry->next) {
         for (int i = 0; i < COUNT_OF(owned); i++) {
             if (!strcmp(entry->key, owned[i].key) && kind != owned[i].owner) {
-                return rey_job_fail(job, entry, "'%s' is a key of %s; %s has %s", entry->key,
-                                    rey_optimizer_name((int)owned[i].owner), rey_optimizer_name((int)kind), keys[kind]);
+                return rey_job_fail_at(job, rey_job_place_of(node, entry->key, "type"), REY_ERROR_FORMAT,
+                                       "'%s' is a key of %s; %s has %s", entry->key, rey_optimizer_name((int)owned[i].owner),
+                                       rey_optimizer_name((int)kind), keys[kind]);
             }
         }
     }
@@ -339,37 +345,49 @@ static rey_result set_defaults(Job *job) {
 
 static rey_result check_levels(Job *job) {
     bool meshes = false;
+    JobPlace kinds = {0};
     for (int i = 0; i < job->parameter_count; i++) {
         meshes = meshes || job->parameters[i].parameterisation == PARAMETERISATION_LAPLACIAN;
+        kinds = rey_job_blame(kinds, rey_job_place_of(job->parameters[i].node, "parameterisation", NULL));
     }
-    for (int i = 0; i < job->level_count && !meshes; i++) {
-        if (job->levels[i].edge_length > 0) {
-            return rey_job_fail(job, rey_yaml_find(job->tree, "levels"),
-                                "edge_length is for parameters of 'parameterisation: laplacian', and the job has none");
+    const YamlNode *levels = rey_yaml_find(job->tree, "levels");
+    for (const YamlNode *entry = levels ? levels->child : NULL; entry && !meshes; entry = entry->next) {
+        const YamlNode *length = rey_yaml_find(entry, "edge_length");
+        if (length) {
+            return rey_job_fail_at(job, rey_job_blame(rey_job_place(length), kinds), REY_ERROR_FORMAT,
+                                   "edge_length is for parameters of 'parameterisation: laplacian', and the job has none");
         }
     }
     return REY_OK;
 }
 
+// A key of an entry (of the job itself, of its optimizer, of a parameter) that lbfgs does not go with.
+static rey_result fail_lbfgs(Job *job, const YamlNode *entry, const char *key, const char *why) {
+    JobPlace kind = rey_job_place_of(rey_yaml_find(job->tree, "optimizer"), "type", NULL);
+    return rey_job_fail_at(job, rey_job_blame(kind, rey_job_place_of(entry, key, NULL)), REY_ERROR_FORMAT, "lbfgs %s", why);
+}
+
 // L-BFGS needs one function, and takes its steps by itself.
 static rey_result check_lbfgs(Job *job) {
-    const YamlNode *node = rey_yaml_find(job->tree, "optimizer");
+    const YamlNode *optimizer = rey_yaml_find(job->tree, "optimizer");
     if (job->optimizer.schedule.kind != SCHEDULE_CONSTANT) {
-        return rey_job_fail(job, node, "lbfgs finds the lengths of its steps by itself: it has no schedule");
+        return fail_lbfgs(job, optimizer, "schedule", "finds the lengths of its steps by itself: it has no schedule");
     }
     for (int i = 0; i < job->parameter_count; i++) {
         if (job->parameters[i].parameterisation == PARAMETERISATION_SIMPLEX) {
-            return rey_job_fail(job, node, "lbfgs does not move what is on a simplex: adam and sgd do");
+            return fail_lbfgs(job, job->parameters[i].node, "parameterisation",
+                              "does not move what is on a simplex: adam and sgd do");
         }
     }
     if (job->optimizer.average > 0) {
-        return rey_job_fail(job, node, "lbfgs ends at its best point: it has no average");
+        return fail_lbfgs(job, optimizer, "average", "ends at its best point: it has no average");
     }
     if (job->views_per_iteration && job->views_per_iteration != job->fitted_count) {
-        return rey_job_fail(job, node, "lbfgs needs all views in every iteration");
+        return fail_lbfgs(job, job->tree, "views_per_iteration", "needs all views in every iteration");
     }
     if (job->gradient_spp) {
-        return rey_job_fail(job, node, "lbfgs needs the gradient of the pictures that it compares: it has no gradient_spp");
+        return fail_lbfgs(job, job->tree, "gradient_spp",
+                          "needs the gradient of the pictures that it compares: it has no gradient_spp");
     }
     return REY_OK;
 }
@@ -396,6 +414,8 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     }
     if (!result) {
         const YamlNode *truth = rey_yaml_find(job->tree, "truth");
+        job->folder_at = rey_job_place(rey_yaml_find(job->tree, "folder"));
+        job->output_at = rey_job_place(rey_yaml_find(job->tree, "output"));
         job->scene_at = rey_job_place(rey_yaml_find(job->tree, "scene"));
         job->load_at = rey_job_place(rey_yaml_find(job->tree, "load"));
         job->truth_at = rey_job_place(truth ? rey_yaml_find(truth, "scene") : NULL);
@@ -414,7 +434,9 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
         result = rey_job_fail(job, rey_yaml_find(job->tree, "views_per_iteration"),
                          "views_per_iteration = %d, but the job has %d view%s%s", job->views_per_iteration,
                          job->fitted_count, PLURAL(job->fitted_count),
-                         job->fitted_count < job->view_count ? " that are not held out" : "");
+                         job->fitted_count == job->view_count ? ""
+                         : job->fitted_count == 1             ? " that is not held out"
+                                                              : " that are not held out");
     }
     return result;
 }

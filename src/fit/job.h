@@ -42,7 +42,7 @@ typedef struct JobView {
     double weight;      // of this view in the loss
     double exposure;    // of the target: what is rendered is multiplied with it; the start where it is unknown
     int held_out;       // not fitted: the report says how well it is predicted
-    JobPlace at, sensor_at, target_at, mask_at, silhouette_at;
+    JobPlace sensor_at, target_at, mask_at, silhouette_at;
 } JobView;
 
 typedef struct JobParameter {
@@ -59,7 +59,7 @@ typedef struct JobParameter {
     const double *start;    // values, null = none
     int start_count;        // 1 = the same for every entry
     const char *start_file; // picture file, null = none
-    JobPlace at, start_at;
+    const YamlNode *node;   // its entry
 } JobParameter;
 
 typedef struct JobSpp { // samples per pixel from this iteration on
@@ -71,6 +71,7 @@ typedef struct JobLevel { // from coarse to fine, from this iteration on
     int reduce;         // every picture is so many times smaller in width and height
     double edge_length; // to which meshes are remeshed as it begins [scene units], 0 = they stay
     int resolution;     // cells along the longest axis that grids are resampled to as it begins, 0 = they stay
+    JobPlace reduce_at, resolution_at;
 } JobLevel;
 
 typedef struct JobSchedule { // factor of every learning rate at iteration i
@@ -102,7 +103,7 @@ typedef struct Job {
     const char *folder; // that paths are relative to
     const char *scene, *truth_scene, *output;
     const char *load; // scene file whose values the scene gets, or null
-    JobPlace scene_at, truth_at, load_at, terms_at, levels_at;
+    JobPlace folder_at, output_at, scene_at, truth_at, load_at, terms_at;
     JobDefines defines, truth_defines; // the truth gets those of the job where it has none of its own
     uint32_t seed;
     int iterations, views_per_iteration; // 0 = all views
@@ -137,14 +138,21 @@ void rey_job_free(Job *job);
 rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
                                const char *const *overrides, int override_count, Job *job);
 
+// Of two places that do not go together the one that an override set, else the first.
+JobPlace rey_job_blame(JobPlace first, JobPlace second);
+// That of the values of two keys (null: none) of an entry; where it has neither, its own.
+JobPlace rey_job_place_of(const YamlNode *entry, const char *key, const char *other);
+
 // Records what is wrong with an entry: "job.yaml:12: ...", of an override "--set key=value: ...", which is no failure of the
 // job but of the command (REY_ERROR_ARGUMENT), unless it names a file that cannot be read.
 rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const char *format, ...) PRINTF_LIKE(4, 5);
 
-// Puts the place that named a file before why it could not be read; passes every result on.
+// Puts the place that named a file before why it could not be read (of an override also before what is wrong in it: it may be
+// another kind of file); passes every result on.
 rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result);
 
-// The same for a scene that these defines were given to: one that it never uses is told at its own place.
+// The same for a scene that these defines were given to: one that it never uses, or whose value the message quotes, is told at
+// its own place.
 rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *defines, rey_result result);
 
 // Path of a file that the job names; owned by the job, null (and a recorded message) when memory runs out.

@@ -25,8 +25,7 @@ bool rey_job_is_real(const YamlNode *node, double *value) {
     return node->kind == YAML_SCALAR && node->text && rey_parse_real(node->text, &end, value) && !*end;
 }
 
-// Where something else was expected, the override that made an entry of a value is to blame: scene.x=1 of the text that scene is.
-static const YamlNode *blamed(const YamlNode *node) {
+const YamlNode *rey_job_blamed(const YamlNode *node) {
     for (const YamlNode *entry = node->child; entry; entry = entry->next) {
         if (entry->set) {
             return entry;
@@ -35,10 +34,40 @@ static const YamlNode *blamed(const YamlNode *node) {
     return node;
 }
 
+JobPlace rey_job_blame(JobPlace first, JobPlace second) {
+    return (second.set && !first.set) || (!first.set && !first.line) ? second : first;
+}
+
+JobPlace rey_job_place_of(const YamlNode *entry, const char *key, const char *other) {
+    const char *const keys[] = {key, other};
+    JobPlace at = {0};
+    for (int i = 0; i < COUNT_OF(keys); i++) {
+        const YamlNode *value = keys[i] ? rey_yaml_find(entry, keys[i]) : NULL;
+        at = rey_job_blame(at, rey_job_place(value ? rey_job_blamed(value) : NULL));
+    }
+    return rey_job_blame(at, at.line ? at : rey_job_place(entry));
+}
+
+// What stands where something else was expected.
+static const char *found(const YamlNode *node, char text[128]) {
+    bool empty = !node->child && !(node->text && node->text[0]);
+    if (node->kind == YAML_SCALAR && !empty) {
+        snprintf(text, 128, "'%.100s'", node->text);
+    } else {
+        snprintf(text, 128, "%s", node->kind == YAML_LIST ? (empty ? "an empty list" : "a list") : empty ? "nothing" : "a map");
+    }
+    return text;
+}
+
+rey_result rey_job_fail_kind(Job *job, const YamlNode *node, const char *what, const char *expected) {
+    char text[128];
+    return rey_job_fail(job, rey_job_blamed(node), "%s: %s, expected %s", what, found(node, text), expected);
+}
+
 rey_result rey_job_read_real(Job *job, const YamlNode *node, const char *what, double low, double high, double *out) {
     double value;
     if (!rey_job_is_real(node, &value)) {
-        return rey_job_fail(job, blamed(node), "%s: expected a number", what);
+        return rey_job_fail_kind(job, node, what, "a number");
     }
     if (value < low || value > high) {
         return rey_job_fail(job, node, "%s = %.10g, expected %.10g to %.10g", what, value, low, high);
@@ -68,16 +97,18 @@ static rey_result read_choice(Job *job, const YamlNode *node, const char *what, 
             return REY_OK;
         }
     }
-    char all[256];
+    char all[256], expected[320];
     list_words(word_at, (void *)(uintptr_t)names, all, sizeof all);
     const char *nearest = rey_nearest_word(text, word_at, (void *)(uintptr_t)names);
-    return nearest ? rey_job_fail(job, blamed(node), "%s: unknown value '%s', did you mean '%s'?", what, text, nearest)
-                   : rey_job_fail(job, blamed(node), "%s: unknown value '%s', expected one of %s", what, text, all);
+    snprintf(expected, sizeof expected, "one of %s", all);
+    return nearest ? rey_job_fail(job, node, "%s: unknown value '%s', did you mean '%s'?", what, text, nearest)
+           : text[0] ? rey_job_fail(job, node, "%s: unknown value '%s', expected %s", what, text, expected)
+                     : rey_job_fail_kind(job, node, what, expected);
 }
 
 rey_result rey_job_read_text(Job *job, const YamlNode *node, const char **out) {
     if (node->kind != YAML_SCALAR || !node->text || !node->text[0]) {
-        return rey_job_fail(job, blamed(node), "%s: expected a text", node->key ? node->key : "entry");
+        return rey_job_fail_kind(job, node, node->key ? node->key : "entry", "a text");
     }
     *out = node->text;
     return REY_OK;
@@ -127,7 +158,7 @@ static rey_result unknown_key(Job *job, const YamlNode *node, const char *what, 
 
 rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, const Field *fields, void *base) {
     if (map->kind != YAML_MAP) {
-        return rey_job_fail(job, map, "%s: expected 'key: value' lines", what);
+        return rey_job_fail_kind(job, map, what, "'key: value' lines");
     }
     for (const YamlNode *node = map->child; node; node = node->next) {
         const Field *field = fields;
@@ -152,7 +183,7 @@ rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, con
 
 rey_result rey_job_open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count) {
     if (node->kind != YAML_LIST || !node->child) {
-        return rey_job_fail(job, node, "%s: expected a list of at least one entry", node->key ? node->key : "entry");
+        return rey_job_fail_kind(job, node, node->key ? node->key : "entry", "a list of at least one entry");
     }
     *count = rey_yaml_count(node);
     *items = rey_job_alloc(job, (size_t)*count, item_bytes);

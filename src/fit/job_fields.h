@@ -31,6 +31,10 @@ typedef struct Field {
 
 // Records a message that starts with the node's file and line.
 rey_result rey_job_fail(Job *job, const YamlNode *node, const char *format, ...) PRINTF_LIKE(3, 4);
+// Where a value is not what was expected, the override that made an entry of it is to blame: scene.x=1 of the text that scene is.
+const YamlNode *rey_job_blamed(const YamlNode *node);
+// An entry that is something else than what a message says is expected; the message says what it is.
+rey_result rey_job_fail_kind(Job *job, const YamlNode *node, const char *what, const char *expected);
 JobPlace rey_job_place(const YamlNode *node); // null: none
 bool rey_job_is_real(const YamlNode *node, double *value);
 // what: the key that a message calls it by.

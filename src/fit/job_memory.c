@@ -29,6 +29,9 @@ void rey_job_free(Job *job) {
 
 rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const char *format, ...) {
     char message[1600]; // what is told may be the context's own message
+    if (code == REY_ERROR_IO) { // a file that is not where the paths begin
+        at = rey_job_blame(at, job->folder_at);
+    }
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
@@ -38,14 +41,17 @@ rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const c
 }
 
 rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result) {
-    return result == REY_ERROR_IO ? rey_job_fail_at(job, at, result, "%s", rey_error(job->ctx)) : result;
+    bool missing = result == REY_ERROR_IO && (at.line || at.set), wrong = result == REY_ERROR_FORMAT && at.set;
+    return missing || wrong ? rey_job_fail_at(job, at, result, "%s", rey_error(job->ctx)) : result;
 }
 
 rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *defines, rey_result result) {
     char quoted[128];
-    for (int i = 0; i < defines->count && result == REY_ERROR_ARGUMENT; i++) {
-        snprintf(quoted, sizeof quoted, "the parameter '%.100s'", defines->list[i].name);
-        if (strstr(rey_error(job->ctx), quoted)) {
+    for (int i = 0; i < defines->count && result; i++) {
+        bool unused = result == REY_ERROR_ARGUMENT;
+        snprintf(quoted, sizeof quoted, unused ? "the parameter '%.100s'" : "'%.100s'",
+                 unused ? defines->list[i].name : defines->list[i].value);
+        if (result != REY_ERROR_MEMORY && result != REY_ERROR_IO && strstr(rey_error(job->ctx), quoted)) {
             return rey_job_fail_at(job, defines->at[i], REY_ERROR_SCENE, "%s", rey_error(job->ctx));
         }
     }

@@ -2,6 +2,7 @@
 #include "fit/job_fields.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -21,14 +22,14 @@ static rey_result read_bound(Job *job, const YamlNode *node, double *out) {
 static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
     double *bounds = target;
     if (node->kind != YAML_LIST || rey_yaml_count(node) != 2) {
-        return rey_job_fail(job, node, "bounds: expected [low, high]");
+        return rey_job_fail_kind(job, node, "bounds", "[low, high]");
     }
     rey_result result = read_bound(job, node->child, &bounds[0]);
     if (!result) {
         result = read_bound(job, node->child->next, &bounds[1]);
     }
     if (!result && !(bounds[0] < bounds[1])) {
-        result = rey_job_fail(job, node, "bounds: %g is not below %g", bounds[0], bounds[1]);
+        result = rey_job_fail(job, rey_job_blamed(node), "bounds: %g is not below %g", bounds[0], bounds[1]);
     }
     return result;
 }
@@ -36,7 +37,6 @@ static rey_result read_bounds(Job *job, const YamlNode *node, void *target) {
 static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     JobParameter *parameter = target;
     double value;
-    parameter->start_at = rey_job_place(node);
     static const char *const infinite[] = {"nan", ".nan", "inf", ".inf", "-inf", "-.inf", "infinity", "-infinity"};
     for (int i = 0; i < COUNT_OF(infinite) && node->kind == YAML_SCALAR && node->text; i++) {
         if (!strcasecmp(node->text, infinite[i])) {
@@ -49,7 +49,7 @@ static rey_result read_start(Job *job, const YamlNode *node, void *target) {
     }
     int count = node->kind == YAML_LIST ? rey_yaml_count(node) : 1;
     if (node->kind == YAML_MAP || count < 1) {
-        return rey_job_fail(job, node, "start: expected a number, a list of numbers, or a file");
+        return rey_job_fail_kind(job, node, "start", "a number, a list of numbers, or a file");
     }
     double *values = rey_job_alloc(job, (size_t)count, sizeof *values);
     rey_result result = values ? REY_OK : REY_ERROR_MEMORY;
@@ -83,18 +83,24 @@ static rey_result check_regularisers(Job *job, const YamlNode *node, bool laplac
     for (const YamlNode *one = given ? given->child : NULL; one; one = one->next) {
         bool grid = !strcmp(one->key, of_grids[0]) || !strcmp(one->key, of_grids[1]);
         if (grid == laplacian) {
-            return rey_job_fail(job, one, laplacian ? "%s is for grids" : "%s is for 'parameterisation: laplacian'", one->key);
+            JobPlace at = rey_job_blame(rey_job_place(one), rey_job_place(rey_yaml_find(node, "parameterisation")));
+            return rey_job_fail_at(job, at, REY_ERROR_FORMAT,
+                                   laplacian ? "%s is for grids" : "%s is for 'parameterisation: laplacian'", one->key);
         }
     }
     return REY_OK;
 }
 
+// A key that does not go with the parameterisation.
+static rey_result fail_with(Job *job, const YamlNode *entry, const char *key, const char *why) {
+    return rey_job_fail_at(job, rey_job_place_of(entry, key, "parameterisation"), REY_ERROR_FORMAT, "%s", why);
+}
+
 // What is said of laplacian alone, and what depends on it.
 static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter *p) {
     bool laplacian = p->parameterisation == PARAMETERISATION_LAPLACIAN;
-    const YamlNode *given = rey_yaml_find(node, "smoothness");
-    if (given && !laplacian) {
-        return rey_job_fail(job, given, "smoothness is for 'parameterisation: laplacian'");
+    if (rey_yaml_find(node, "smoothness") && !laplacian) {
+        return fail_with(job, node, "smoothness", "smoothness is for 'parameterisation: laplacian'");
     }
     rey_result result = check_regularisers(job, node, laplacian);
     if (result) {
@@ -103,14 +109,15 @@ static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter 
     bool scattering = p->parameterisation == PARAMETERISATION_SCATTERING;
     bool simplex = p->parameterisation == PARAMETERISATION_SIMPLEX;
     if ((laplacian || scattering || simplex) && !isnan(p->bounds[0])) {
-        return rey_job_fail(job, rey_yaml_find(node, "bounds"), "parameterisation %s has no bounds",
-                            rey_parameterisation_name((int)p->parameterisation));
+        char why[64];
+        snprintf(why, sizeof why, "parameterisation %s has no bounds", rey_parameterisation_name((int)p->parameterisation));
+        return fail_with(job, node, "bounds", why);
     }
-    if (scattering && (given = rey_yaml_find(node, "start")) != NULL) {
-        return rey_job_fail(job, given, "parameterisation scattering starts with what the scene has");
+    if (scattering && rey_yaml_find(node, "start")) {
+        return fail_with(job, node, "start", "parameterisation scattering starts with what the scene has");
     }
-    if (!scattering && (given = rey_yaml_find(node, "g")) != NULL) {
-        return rey_job_fail(job, given, "g is for 'parameterisation: scattering'");
+    if (!scattering && rey_yaml_find(node, "g")) {
+        return fail_with(job, node, "g", "g is for 'parameterisation: scattering'");
     }
     if (p->moment == MOMENT_COUNT) {
         p->moment = laplacian ? MOMENT_UNIFORM : simplex ? MOMENT_SHARED : MOMENT_PER_ENTRY;
@@ -151,9 +158,7 @@ rey_result rey_job_read_parameters(Job *job, const YamlNode *node, void *target)
     *parameters = items;
     int i = 0;
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
-        JobPlace at = rey_job_place(entry);
-        (*parameters)[i] = (JobParameter){
-            .bounds = {NAN, NAN}, .moment = MOMENT_COUNT, .smoothness = 19, .at = at, .start_at = at};
+        (*parameters)[i] = (JobParameter){.bounds = {NAN, NAN}, .moment = MOMENT_COUNT, .smoothness = 19, .node = entry};
         result = entry->kind == YAML_SCALAR // a name alone
                      ? rey_job_read_field(job, fields, entry, (char *)&(*parameters)[i])
                      : rey_job_read_map(job, entry, "parameters", fields, &(*parameters)[i]);

@@ -17,13 +17,14 @@ rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *vi
     const SensorRecord *s = fit->scene->view.sensors + view->sensor;
     for (int i = 0; i < fit->job.level_count; i++) {
         int r = fit->job.levels[i].reduce;
+        JobPlace at = rey_job_blame(fit->job.levels[i].reduce_at, job_view->sensor_at);
         if (s->width % r || s->height % r || s->crop_x % r || s->crop_y % r || view->width % r || view->height % r) {
-            return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_FORMAT,
+            return rey_job_fail_at(&fit->job, at, REY_ERROR_FORMAT,
                                    "level %d reduces by %d, but sensor %d has %d x %d pixels, expected multiples of %d", i,
                                    r, view->sensor, view->width, view->height, r);
         }
         if (r > 1 && s->batch_count) {
-            return rey_job_fail_at(&fit->job, job_view->at, REY_ERROR_UNSUPPORTED,
+            return rey_job_fail_at(&fit->job, at, REY_ERROR_UNSUPPORTED,
                                    "sensor %d is a batch, which levels do not reduce", view->sensor);
         }
     }
@@ -32,8 +33,10 @@ rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *vi
 
 rey_result rey_levels_check_grids(Fit *fit) {
     bool grids = false, levels = false;
+    JobPlace at = {0};
     for (int i = 0; i < fit->job.level_count; i++) {
         levels = levels || fit->job.levels[i].resolution > 0;
+        at = fit->job.levels[i].resolution > 0 ? rey_job_blame(at, fit->job.levels[i].resolution_at) : at;
     }
     for (size_t k = 0; k < fit->unknowns.items.count && levels; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
@@ -42,14 +45,14 @@ rey_result rey_levels_check_grids(Fit *fit) {
             int resolution = i < 0 ? 0 : fit->job.levels[i].resolution;
             int64_t count = rey_voxels_count(resolution > 0 ? rey_voxels_resized(p->grid, resolution) : p->grid);
             if (count <= HISTORY_LARGEST || count > INT32_MAX) {
-                return rey_job_fail_at(&fit->job, fit->job.levels_at, REY_ERROR_PARAM,
+                return rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM,
                                        "levels with a 'resolution' make %s a grid of %lld numbers, expected %d or more", p->name,
                                        (long long)count, HISTORY_LARGEST + 1);
             }
         }
     }
     return grids || !levels ? REY_OK
-                            : rey_job_fail_at(&fit->job, fit->job.levels_at, REY_ERROR_PARAM,
+                            : rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM,
                                               "levels have a 'resolution', which is for grids, and the job has none");
 }
 

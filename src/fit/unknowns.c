@@ -13,12 +13,14 @@ enum { SHOWN_NAMES = 3 }; // of what a pattern passes over
 
 static const double LOG_FLOOR = 1e-6; // lower bound where a parameter has none and log needs one
 
-static rey_result fail_at(Job *job, const JobParameter *p, const char *name, const char *why) {
-    return rey_job_fail_at(job, p->at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
+// key: what is wrong with a parameter, or does not go with its parameterisation.
+static rey_result fail_key(Job *job, const JobParameter *p, const char *key, const char *name, const char *why) {
+    return rey_job_fail_at(job, rey_job_place_of(p->node, key, "parameterisation"), REY_ERROR_PARAM, "parameter '%s': %s", name,
+                           why);
 }
 
-static rey_result fail_start_at(Job *job, const JobParameter *p, const char *name, const char *why) {
-    return rey_job_fail_at(job, p->start_at, REY_ERROR_PARAM, "parameter '%s': %s", name, why);
+static rey_result fail_name(Job *job, const JobParameter *p, const char *name, const char *why) {
+    return rey_job_fail_at(job, rey_job_place_of(p->node, "name", NULL), REY_ERROR_PARAM, "parameter '%s': %s", name, why);
 }
 
 // Which numbers are allowed, from the job and from the parameter itself.
@@ -27,18 +29,21 @@ static rey_result set_bounds(Job *job, const JobParameter *p, const rey_param_in
     unknown->low = given ? fmax(p->bounds[0], (double)info->low) : (double)info->low;
     unknown->high = given ? fmin(p->bounds[1], (double)info->high) : (double)info->high;
     if (unknown->low > unknown->high) {
-        return fail_at(job, p, info->name, "the bounds lie outside of the parameter's range");
+        char why[160];
+        snprintf(why, sizeof why, "the bounds %g to %g lie outside of the parameter's range, expected some of %g to %g",
+                 p->bounds[0], p->bounds[1], (double)info->low, (double)info->high);
+        return fail_key(job, p, "bounds", info->name, why);
     }
     if (p->parameterisation == PARAMETERISATION_LOG) {
         if (!(unknown->low > 0)) {
             unknown->low = LOG_FLOOR; // log needs a positive lower bound
         }
         if (!(unknown->high > unknown->low)) {
-            return fail_at(job, p, info->name, "parameterisation log needs positive bounds");
+            return fail_key(job, p, "bounds", info->name, "parameterisation log needs positive bounds");
         }
     }
     if (p->parameterisation == PARAMETERISATION_LOGIT && !(isfinite(unknown->low) && isfinite(unknown->high))) {
-        return fail_at(job, p, info->name, "parameterisation logit needs bounds: [low, high]");
+        return fail_key(job, p, "bounds", info->name, "parameterisation logit needs bounds: [low, high]");
     }
     return REY_OK;
 }
@@ -48,7 +53,8 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
     rey_image image = {0};
     rey_result result = path ? rey_image_read(job->ctx, path, &image) : REY_ERROR_MEMORY;
     if (result && result != REY_ERROR_MEMORY) {
-        result = rey_job_fail_at(job, p->start_at, result, "parameter '%s': %s", unknown->name, rey_error(job->ctx));
+        result = rey_job_fail_at(job, rey_job_place_of(p->node, "start", NULL), result, "parameter '%s': %s", unknown->name,
+                                 rey_error(job->ctx));
     }
     if (!result) {
         if (image.srgb) {
@@ -66,13 +72,13 @@ static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown
             }
             snprintf(why, sizeof why, "%s holds %d x %d x %d numbers, expected %s", p->start_file, image.height,
                      image.width, image.channels, shape);
-            result = fail_start_at(job, p, unknown->name, why);
+            result = fail_key(job, p, "start", unknown->name, why);
         } else {
             memcpy(start, image.data, (size_t)count * sizeof *start);
         }
         for (int64_t i = 0; i < count && !result; i++) {
             if (!isfinite(start[i])) {
-                result = fail_start_at(job, p, unknown->name, "the start file holds a value that is not finite");
+                result = fail_key(job, p, "start", unknown->name, "the start file holds a value that is not finite");
             }
         }
     }
@@ -95,10 +101,9 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     }
     int64_t last = unknown->dims ? unknown->shape[unknown->dims - 1] : 1;
     if (p->start_count != 1 && p->start_count != unknown->count && p->start_count != last) {
-        char why[128];
-        snprintf(why, sizeof why, "start holds %d numbers, expected %s%lld", p->start_count,
-                 unknown->count > 1 ? "1 or " : "", (long long)unknown->count);
-        return fail_start_at(job, p, unknown->name, why);
+        return rey_job_fail_at(job, rey_job_place_of(p->node, "start", "name"), REY_ERROR_PARAM,
+                               "parameter '%s': start holds %d numbers, expected %s%lld", unknown->name, p->start_count,
+                               unknown->count > 1 ? "1 or " : "", (long long)unknown->count);
     }
     for (int64_t i = 0; i < unknown->count; i++) { // shorter lists repeat: a colour for every texel
         start[i] = (float)p->start[i % p->start_count];
@@ -108,9 +113,9 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
 
 static rey_result fail_start(Job *job, const JobParameter *p, const Unknown *unknown, int64_t i, float start,
                              const char *expected) {
-    JobPlace at = p->start_count || p->start_file ? p->start_at : p->at;
-    return rey_job_fail_at(job, at, REY_ERROR_PARAM, "parameter '%s': entry %lld starts at %g, %s", unknown->name,
-                           (long long)i, (double)start, expected);
+    const char *other = unknown->parameterisation == PARAMETERISATION_IDENTITY ? "bounds" : "parameterisation";
+    return rey_job_fail_at(job, rey_job_place_of(p->node, "start", other), REY_ERROR_PARAM,
+                           "parameter '%s': entry %lld starts at %g, %s", unknown->name, (long long)i, (double)start, expected);
 }
 
 // A start that would be moved before the first iteration is not what the job asked for.
@@ -142,7 +147,8 @@ static rey_result add_vertices(Job *job, const rey_scene *scene, const JobParame
     const Param *param = &ARRAY_AT(scene->params, Param, unknown->param);
     const ShapeRecord *shape = param->geometry >= 0 ? scene->view.shapes + param->geometry : NULL;
     if (!shape || shape->triangle_count == 0 || param->theta != shape->positions) {
-        return fail_at(job, p, unknown->name, "parameterisation laplacian is for vertices of meshes, such as NAME.positions");
+        return fail_key(job, p, "name", unknown->name,
+                        "parameterisation laplacian is for vertices of meshes, such as NAME.positions");
     }
     return rey_vertices_create(job->ctx, shape->vertex_count, scene->view.welded + shape->welded, shape->triangle_count,
                                scene->view.triangles + 3 * (int64_t)shape->triangle, p->smoothness, p->regularisers,
@@ -161,14 +167,15 @@ static GridSize grid_size(const rey_scene *scene, int param) {
 }
 
 // Terms that the gradient of a parameter does not have would fit nothing.
-static rey_result check_terms(Job *job, const rey_param_info *info) {
+static rey_result check_terms(Job *job, const JobParameter *p, const rey_param_info *info) {
     if (!job->terms || (job->terms & info->terms)) {
         return REY_OK;
     }
     char asked[128], expected[128];
     rey_job_terms_text(job->terms, asked, sizeof asked);
     rey_job_terms_text(info->terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR), expected, sizeof expected);
-    return rey_job_fail_at(job, job->terms_at, REY_ERROR_PARAM,
+    JobPlace at = rey_job_blame(job->terms_at, rey_job_place_of(p->node, "name", NULL));
+    return rey_job_fail_at(job, at, REY_ERROR_PARAM,
                            "terms %s: the gradient of %s has no such term, expected some of %s", asked, info->name, expected);
 }
 
@@ -180,24 +187,24 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
         return result;
     }
     if (!info.terms) { // whether all terms are there depends on the views: derivatives.c asks for all of them
-        return fail_at(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
+        return fail_name(job, p, info.name, info.why[0] ? info.why : "it has no derivative");
     }
-    result = check_terms(job, &info);
+    result = check_terms(job, p, &info);
     if (result) {
         return result;
     }
     if (p->parameterisation == PARAMETERISATION_SIMPLEX && info.count < 2) {
-        return fail_at(job, p, info.name, "parameterisation simplex is for two or more shares");
+        return fail_key(job, p, "name", info.name, "parameterisation simplex is for two or more shares");
     }
     bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
     if (pose && info.count != RIGID_VALUES) {
-        return fail_at(job, p, info.name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
+        return fail_key(job, p, "name", info.name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
     }
     for (size_t i = 0; i < u->items.count; i++) {
         if (ARRAY_AT(u->items, Unknown, i).param == param) {
             char why[96];
             snprintf(why, sizeof why, "entry %d of 'parameters' names it already", ARRAY_AT(*owners, int, i));
-            return fail_at(job, p, info.name, why);
+            return fail_name(job, p, info.name, why);
         }
     }
     bool several = strchr(p->name, '*') || p->parameterisation == PARAMETERISATION_SCATTERING;
@@ -221,7 +228,7 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
                          .regularisers = p->grid_regularisers};
     u->count += info.count;
     if (!unknown->grid.nx && (p->grid_regularisers.total_variation > 0 || p->grid_regularisers.sparsity > 0)) {
-        return fail_at(job, p, info.name, "total_variation and sparsity are for grids of voxels");
+        return fail_key(job, p, "regularisers", info.name, "total_variation and sparsity are for grids of voxels");
     }
     if (p->parameterisation == PARAMETERISATION_LAPLACIAN) {
         result = add_vertices(job, scene, p, unknown);
@@ -234,12 +241,12 @@ static rey_result add_exposure(Job *job, int view, const char *name, int index, 
     const JobParameter *p = &job->parameters[index];
     const rey_param_info info = {.name = name, .low = 0, .high = INFINITY};
     if (p->parameterisation >= PARAMETERISATION_RIGID) {
-        return fail_at(job, p, name, "an exposure is one number, of parameterisation identity, log or logit");
+        return fail_key(job, p, "name", name, "an exposure is one number, of parameterisation identity, log or logit");
     }
     for (size_t i = 0; i < u->items.count; i++) {
         const Unknown *other = &ARRAY_AT(u->items, Unknown, i);
         if (other->param < 0 && other->view == view) {
-            return fail_at(job, p, name, "an earlier entry of 'parameters' names it already");
+            return fail_name(job, p, name, "an earlier entry of 'parameters' names it already");
         }
     }
     Unknown *unknown = rey_array_push(job->ctx, &u->items, sizeof *unknown, 1);
@@ -309,7 +316,7 @@ static rey_result match_medium(Job *job, rey_scene *scene, int index, Array *own
         }
     }
     if (offsets[SCATTERING_SIGMA_T] < 0 || counts[SCATTERING_SIGMA_T] != counts[SCATTERING_ALBEDO]) {
-        return fail_at(job, p, p->name, "parameterisation scattering is for media, such as NAME.interior_medium, whose "
+        return fail_key(job, p, "name", p->name, "parameterisation scattering is for media, such as NAME.interior_medium, whose "
                                         "sigma_t and albedo have as many numbers");
     }
     s.count = counts[SCATTERING_SIGMA_T];
@@ -333,21 +340,21 @@ static rey_result fail_exposure(Job *job, const JobParameter *p, int view) {
         snprintf(why, sizeof why, "the job has no view %d, expected %s%d", view, job->view_count > 1 ? "0 to " : "",
                  job->view_count - 1);
     }
-    return fail_at(job, p, p->name, why);
+    return fail_name(job, p, p->name, why);
 }
 
 // A pattern that passes over all that it matches; passed: the names of some of them, of `count`.
 static rey_result fail_pattern(Job *job, const JobParameter *p, const char *passed, int count) {
     char why[1024], more[32] = "";
     if (count == 0) {
-        return fail_at(job, p, p->name, "matches no parameter of the scene; 'reynolds params' lists them");
+        return fail_name(job, p, p->name, "matches no parameter of the scene; 'reynolds params' lists them");
     }
     if (count > SHOWN_NAMES) {
         snprintf(more, sizeof more, " and %d more", count - SHOWN_NAMES);
     }
     snprintf(why, sizeof why, "matches only %s%s, which move%s things or ha%s no derivative: a pattern passes over those; name "
              "them one by one", passed, more, count == 1 ? "s" : "", count == 1 ? "s" : "ve");
-    return fail_at(job, p, p->name, why);
+    return fail_name(job, p, p->name, why);
 }
 
 static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *owners, Unknowns *u) {
@@ -371,7 +378,7 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
             char absent[ABSENT_BYTES], why[ABSENT_BYTES + 32];
             rey_param_absent(scene, p->name, absent);
             snprintf(why, sizeof why, "the scene has none of this name%s", absent);
-            return fail_at(job, p, p->name, why);
+            return fail_name(job, p, p->name, why);
         }
         return add_unknown(job, scene, param, p, index, owners, u);
     }

@@ -58,7 +58,9 @@ static rey_result next_event(Reader *r) {
     } else if (has_tab(r, line)) {
         problem = "a tab in the indentation, expected spaces";
     }
-    return fail_at(r, (int)line + 1, problem);
+    char words[256];
+    snprintf(words, sizeof words, r->override ? "the value, which is read as YAML: %s" : "%s", problem);
+    return fail_at(r, (int)line + 1, words);
 }
 
 static rey_result fail_here(Reader *r, const char *message) {
@@ -190,7 +192,7 @@ static rey_result read_document(Reader *r, YamlNode **out) {
         if (!*out) {
             return REY_ERROR_MEMORY;
         }
-        (*out)->kind = YAML_MAP;
+        (*out)->kind = r->override ? YAML_SCALAR : YAML_MAP;
         (*out)->line = 1;
         return REY_OK;
     }
@@ -268,6 +270,7 @@ int rey_yaml_count(const YamlNode *node) {
 static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, const char *assignment,
                             YamlNode **out) {
     YamlNode **place = &node->child;
+    bool number = *part && !part[strspn(part, "0123456789")];
     if (node->kind == YAML_SCALAR && node->text && node->text[0]) {
         // "loss: l2" is short for "loss: {type: l2}", and an entry "- a" of a list for "- {name: a}".
         YamlNode *type = rey_alloc(ctx, sizeof *type);
@@ -281,13 +284,16 @@ static rey_result step_into(rey_context *ctx, YamlNode *node, const char *part, 
         node->child = type;
         node->kind = YAML_MAP;
     }
+    if (node->kind == YAML_SCALAR && number) { // the first entry of what was not there
+        node->kind = YAML_LIST;
+    }
     if (node->kind == YAML_LIST) {
-        char *end;
-        long index = strtol(part, &end, 10);
+        long index = strtol(part, NULL, 10);
         int count = rey_yaml_count(node);
-        if (*end || end == part || index < 0 || index > count) {
-            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: '%s' is not an index from 0 to %d", assignment, part,
-                            count);
+        if (!number || index > count) {
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: %.100s is a list of %d, and '%.100s' is no index of it, "
+                            "expected %s%d, which appends an entry", assignment, node->key ? node->key : "this", count, part,
+                            count == 0 ? "" : count == 1 ? "0 or " : "0 to ", count);
         }
         for (long i = 0; i < index; i++) {
             place = &(*place)->next;
@@ -325,7 +331,8 @@ static rey_result override_path(rey_context *ctx, YamlNode *root, char *path, co
             *dot = 0;
         }
         if (!*part || depth >= DEEPEST) {
-            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: malformed key", assignment);
+            return rey_fail(ctx, REY_ERROR_ARGUMENT, "--set %.200s: expected a key whose parts are joined by dots, such as "
+                            "optimizer.learning_rate or views.0.weight", assignment);
         }
         rey_result result = step_into(ctx, node, part, assignment, &node);
         if (result) {

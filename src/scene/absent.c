@@ -42,14 +42,29 @@ static const char *reason(const ShapeRecord *shape, const char *leaf) {
     return strcmp(leaf, "faces") == 0 ? "which vertices a triangle joins is no number that could change a little" : NULL;
 }
 
+// A parameter of an object that is named alone, null where there is none.
+static const char *first_below(const rey_scene *scene, const char *object) {
+    size_t length = strlen(object);
+    for (size_t i = 0; i < scene->params.count && length; i++) {
+        const char *name = ARRAY_AT(scene->params, Param, i).name;
+        if (!strncmp(name, object, length) && name[length] == '.') {
+            return name;
+        }
+    }
+    return NULL;
+}
+
 void rey_param_absent(const rey_scene *scene, const char *name, char text[ABSENT_BYTES]) {
     char object[1024];
     const char *dot = strrchr(name, '.');
     snprintf(object, sizeof object, "%.*s", dot ? (int)(dot - name) : 0, name);
     const ShapeRecord *shape = dot ? shape_named(scene, object) : NULL;
     const char *why = shape ? reason(shape, dot + 1) : NULL, *nearest = why ? NULL : rey_param_nearest(scene, name);
+    const char *below = why || nearest ? NULL : first_below(scene, name);
     text[0] = 0;
-    if (why) {
+    if (below) {
+        snprintf(text, ABSENT_BYTES, "; there is '%.600s'", below);
+    } else if (why) {
         snprintf(text, ABSENT_BYTES, ": %s", why);
     } else if (nearest) {
         snprintf(text, ABSENT_BYTES, ", did you mean '%.600s'?", nearest);

@@ -86,6 +86,33 @@ static void fits_show_what_the_job_says(void **state) {
     }
 }
 
+// What an override makes wrong is told as such, although it shows where the scene is known, and the status is that of usage.
+static void overrides_are_told(void **state) {
+    Fixture *f = *state;
+    static const char *const cases[][2] = {
+        {"parameters.0.name=red", "parameter 'red': the scene has none of this name; there is 'red.reflectance.value'"},
+        {"parameters.0.name=none.*", "parameter 'none.*': matches no parameter of the scene"},
+        {"parameters.0.bounds.0=7", "bounds: 7 is not below 1"},
+        {"parameters.0.bounds=[5,6]", "the bounds 5 to 6 lie outside of the parameter's range, expected some of 0 to 1"},
+        {"parameters.0.parameterisation=rigid", "parameterisations rigid and similarity are for poses"},
+        {"parameters.0.carve=true", "carve is for grids of voxels"},
+        {"parameters.0.regularisers.sparsity=1", "total_variation and sparsity are for grids"},
+        {"levels.0.reduce=7", "level 0 reduces by 7, but sensor 0 has "},
+        {"defines={light: zzz}", "bad value 'zzz'"},
+    };
+    write_job(f, "levels: [{from: 0}]\nviews: [{target: none.exr}]\nparameters: [{name: red.reflectance, bounds: [0, 1]}]\n");
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char command[256], words[256];
+        snprintf(command, sizeof command, "fit job.yaml -o fit --set views.0.target=$PWD/target.exr --set '%s'", cases[i][0]);
+        expect_said(f, 2, command, cases[i][1]);
+        snprintf(words, sizeof words, "--set %s: ", cases[i][0]);
+        expect_said(f, 2, command, words);
+    }
+    expect_said(f, 2, "fit job.yaml -o fit --set scene=$PWD/job.yaml", "job.yaml:1:1: not well-formed XML");
+    expect_said(f, 1, "fit job.yaml --set folder=/none", "--set folder=/none: /none/start.xml: cannot open the scene");
+    expect_said(f, 1, "fit job.yaml --set views.0.target=$PWD/target.exr --set output=/proc/none", "--set output=/proc/none: ");
+}
+
 // Where the job is wrong its line is told; where the command line is, the setting, and the exit status is that of usage.
 static void places_of_jobs_are_told(void **state) {
     Fixture *f = *state;
@@ -97,7 +124,8 @@ static void places_of_jobs_are_told(void **state) {
     expect_said(f, 2, "fit job.yaml -o fit --spp 1", "--spp 1: spp = 1, expected 2 to 65536");
     expect_said(f, 2, "fit job.yaml -o fit --set lss=l1", "--set lss=l1: unknown key 'lss', did you mean 'loss'?");
     expect_said(f, 2, "fit job.yaml -o fit --set seed=[", "--set seed=[: ");
-    expect_said(f, 2, "fit job.yaml -o fit --set views.5.target=a", "--set views.5.target=a: '5' is not an index");
+    expect_said(f, 2, "fit job.yaml -o fit --set views.5.target=a",
+                "--set views.5.target=a: views is a list of 1, and '5' is no index");
     expect_said(f, 2, "fit job.yaml -o fit -D a=1 -D b=2 -D a=3", "-D: 'a' is defined twice");
     expect_said(f, 2, "fit job.yaml -o fit -D nothing=1", "the scene never uses '$nothing'");
     write_job(f, "defines: {nothing: 1}\nviews: [{target: none.exr}]\nparameters: [red.reflectance]\n");
@@ -136,7 +164,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refusals_are_the_same),       cmocka_unit_test(what_may_be_needed_is_told),
         cmocka_unit_test(fits_show_what_the_job_says), cmocka_unit_test(places_of_jobs_are_told),
-        cmocka_unit_test(checks_show_their_rows),
+        cmocka_unit_test(overrides_are_told),          cmocka_unit_test(checks_show_their_rows),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
