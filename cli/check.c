@@ -256,7 +256,7 @@ static rey_result try_again(Work *w, Check *check) {
 }
 
 // A parameter with entries on both of its bounds cannot move as a whole: those in the upper half of the range move down.
-static bool turn_inwards(const Work *w, Check *check) {
+static bool turn_inwards(Work *w, Check *check) {
     const Direction *d = &check->direction;
     rey_param_info info;
     bool bare = !check->spec[cli_direction_name_length(check->spec)];
@@ -269,7 +269,8 @@ static bool turn_inwards(const Work *w, Check *check) {
     }
     check->step = check_choose_step(w->session.scene, w->original, check, w->session.options->step);
     if (check->step.h > 0) {
-        cli_note("%s has entries on both of its bounds: those in the upper half of its range move down, the others up", info.name);
+        cli_session_note(&w->session, "%s has entries on both of its bounds: those in the upper half of its range move down, the "
+                         "others up", info.name);
     }
     return check->step.h > 0;
 }
@@ -370,6 +371,23 @@ static bool is_partial(const Work *w, const Check *check) {
     return w->session.options->all && check->left_out;
 }
 
+// What the picture does not depend on, of all directions together.
+static int note_unreached(Work *w, const Check *checks, int count) {
+    Array params = {0};
+    rey_result result = REY_OK;
+    for (int i = 0; i < count && !result; i++) {
+        const Direction *d = &checks[i].direction;
+        int *slots = rey_array_push(w->session.ctx, &params, sizeof *slots, (size_t)d->count);
+        result = slots ? REY_OK : REY_ERROR_MEMORY;
+        for (int k = 0; k < d->count && slots; k++) {
+            slots[k] = d->params[k];
+        }
+    }
+    result = result ? result : cli_note_unreached(&w->session, params.data, (int)params.count);
+    rey_array_free(w->session.ctx, &params);
+    return result ? cli_report_failure(w->session.options, w->session.ctx, result) : EXIT_OK;
+}
+
 static int build_directions(Work *w, const Specs *specs, Check *checks) {
     for (int i = 0; i < specs->count; i++) {
         checks[i].spec = specs->texts[i];
@@ -381,7 +399,7 @@ static int build_directions(Work *w, const Specs *specs, Check *checks) {
         int needed = cli_direction_terms(w->session.scene, &checks[i].direction), asked = w->session.options->terms;
         checks[i].left_out = asked ? needed & ~asked : 0;
     }
-    return EXIT_OK;
+    return note_unreached(w, checks, specs->count);
 }
 
 static rey_result check_all(Work *w, Check *checks, int count) {

@@ -124,6 +124,8 @@ typedef struct Session {
     int width, height;  // of the picture of the sensor
     double load_seconds; // from the file to a scene that can be rendered
     Progress progress;
+    char **notes;       // what cli_session_note said, for --json
+    int note_count;
 } Session;
 
 // Creates the context only (context_open) or the context and the scene too, after a look at whether the output can be
@@ -151,11 +153,18 @@ void cli_json_error(const char *message, const char *kind);
 void cli_warn_nonfinite(const rey_stats *stats);
 // Words on standard error, one line.
 void cli_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// The same of a session, kept for "notes" of --json.
+void cli_session_note(Session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Says which parameters the session's picture does not depend on, in one line for all of them: a derivative of 0 may be a
+// misunderstanding.
+rey_result cli_note_unreached(Session *session, const int *params, int count);
 // Flushes standard output; EXIT_OK, or EXIT_FAILED and a message when the data could not be written.
 int cli_finish_output(void);
 
-// The keys that every rendering command reports: times, paths, rays, memory, threads, lanes.
+// The keys that every rendering command reports: times, paths, rays, memory, threads, lanes, notes.
 void cli_json_stats(Json *json, const Session *session, const rey_stats *stats);
+// "notes": what cli_session_note said.
+void cli_json_notes(Json *json, const Session *session);
 // "ignored": what a lenient reader left out; nothing when the reader was not lenient.
 void cli_json_ignored(Json *json, const Session *session);
 void cli_add_stats(rey_stats *sum, const rey_stats *part);

@@ -17,6 +17,7 @@ typedef struct Display {
     bool terminal;
     double shown; // time of the last line [s]
     bool finishing;
+    Session *session; // keeps the notes
 } Display;
 
 static bool show_progress(void *user, const FitProgress *p) {
@@ -34,6 +35,11 @@ static bool show_progress(void *user, const FitProgress *p) {
         display->shown = now;
     }
     return !cli_interrupted();
+}
+
+static void show_note(void *user, const char *words) {
+    const Display *display = user;
+    cli_session_note(display->session, "%s", words);
 }
 
 static void entries_text(const FitRow *row, int column, char *text, size_t size) {
@@ -114,7 +120,7 @@ static void json_values(Json *json, const char *key, const FitRow *row, const fl
     json_array_end(json);
 }
 
-static void print_json(const FitResult *result) {
+static void print_json(const FitResult *result, const Session *session) {
     Json json = json_begin(stdout);
     char words[64];
     json_object(&json, NULL);
@@ -166,6 +172,7 @@ static void print_json(const FitResult *result) {
         json_object_end(&json);
     }
     json_array_end(&json);
+    cli_json_notes(&json, session);
     json_string(&json, "output", result->output);
     json_string(&json, "report", result->report);
     json_string(&json, "scene", result->scene);
@@ -345,7 +352,7 @@ static int run(const Options *options, Session *session, const char *command) {
     if (!overrides) {
         return cli_fail(options, "out of memory");
     }
-    Display display = {.terminal = isatty(STDERR_FILENO) != 0, .shown = rey_seconds()};
+    Display display = {.terminal = isatty(STDERR_FILENO) != 0, .shown = rey_seconds(), .session = session};
     FitDef def = {.job_path = options->files[0],
                   .overrides = (const char *const *)overrides,
                   .override_count = override_count,
@@ -356,6 +363,7 @@ static int run(const Options *options, Session *session, const char *command) {
                   .seed_given = options->seed_given,
                   .seed = options->seed,
                   .progress = show_progress,
+                  .note = show_note,
                   .user = &display};
     FitResult result;
     rey_result code = rey_fit(session->ctx, &def, &result);
@@ -384,7 +392,7 @@ static int run(const Options *options, Session *session, const char *command) {
         status = cli_report_failure(options, session->ctx, code);
     } else {
         if (options->json) {
-            print_json(&result);
+            print_json(&result, session);
         } else {
             print_words(&result);
         }

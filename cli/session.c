@@ -16,6 +16,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+enum { SHOWN_NAMES = 3 }; // of a note
+
 static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
 
 static void on_interrupt(int number) {
@@ -90,6 +92,21 @@ void cli_note(const char *format, ...) {
     vfprintf(stderr, format, arguments);
     fputc('\n', stderr);
     va_end(arguments);
+}
+
+void cli_session_note(Session *session, const char *format, ...) {
+    char text[2048];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    cli_note("%s", text);
+    char **longer = realloc(session->notes, (size_t)(session->note_count + 1) * sizeof *longer);
+    if (longer) { // without memory it was said, at least
+        session->notes = longer;
+        longer[session->note_count] = strdup(text);
+        session->note_count += longer[session->note_count] != NULL;
+    }
 }
 
 void cli_json_error(const char *message, const char *kind) {
@@ -243,7 +260,7 @@ static rey_result load_scene(Session *s) {
         bool derivative = o->command == COMMAND_GRAD || o->command == COMMAND_CHECK;
         if (o->command != COMMAND_INFO &&
             (!strncmp(note, "warning: ", 9) || (derivative && !strncmp(note, "derivatives: ", 13)))) {
-            cli_note("%s", note);
+            cli_session_note(s, "%s", note);
         }
     }
     rey_scene_info info;
@@ -288,20 +305,61 @@ int cli_session_open(const Options *options, const char *label, Session *session
 void cli_session_close(Session *session) {
     rey_scene_destroy(session->scene);
     rey_context_destroy(session->ctx);
+    for (int i = 0; i < session->note_count; i++) {
+        free(session->notes[i]);
+    }
+    free(session->notes);
     session->scene = NULL;
     session->ctx = NULL;
+    session->notes = NULL;
+    session->note_count = 0;
 }
 
-// A derivative of 0 may be a misunderstanding.
-static rey_result note_unused(Session *session, const Direction *direction) {
-    bool *used = rey_alloc_array(session->ctx, (size_t)rey_param_count(session->scene), sizeof *used);
-    rey_result result = used ? rey_params_used(session->scene, used) : REY_ERROR_MEMORY;
-    for (int i = 0; i < direction->count && !result; i++) {
-        if (!used[direction->params[i]]) {
-            cli_note("nothing in the scene uses %s: its derivative is 0", direction->names[i]);
+// Adds a name to "A, B, C and 2 more".
+static void add_name(char *text, size_t size, int *count, const char *name) {
+    size_t used = strlen(text);
+    if ((*count)++ < SHOWN_NAMES) {
+        snprintf(text + used, size - used, "%s%s", used ? ", " : "", name);
+    }
+}
+
+static void end_names(char *text, size_t size, int count) {
+    size_t used = strlen(text);
+    if (count > SHOWN_NAMES) {
+        snprintf(text + used, size - used, " and %d more", count - SHOWN_NAMES);
+    }
+}
+
+rey_result cli_note_unreached(Session *s, const int *params, int count) {
+    size_t all = (size_t)rey_param_count(s->scene);
+    bool *used = rey_alloc_array(s->ctx, all, sizeof *used), *reached = rey_alloc_array(s->ctx, all, sizeof *reached);
+    rey_result result = used && reached ? rey_params_used(s->scene, used) : REY_ERROR_MEMORY;
+    char unused[768] = "", elsewhere[768] = "";
+    int unused_count = 0, elsewhere_count = 0;
+    result = result ? result : rey_params_reached(s->scene, s->sensor, reached);
+    for (int i = 0; i < count && !result; i++) {
+        rey_param_info info;
+        result = rey_param_get_info(s->scene, params[i], &info);
+        if (!result && !used[params[i]]) {
+            add_name(unused, sizeof unused, &unused_count, info.name);
+        } else if (!result && !reached[params[i]]) {
+            add_name(elsewhere, sizeof elsewhere, &elsewhere_count, info.name);
         }
     }
-    rey_free(session->ctx, used);
+    end_names(unused, sizeof unused, unused_count);
+    end_names(elsewhere, sizeof elsewhere, elsewhere_count);
+    if (!result && unused_count) {
+        cli_session_note(s, "nothing in the scene uses %s: %s 0", unused,
+                         unused_count == 1 ? "its derivative is" : "their derivatives are");
+    }
+    if (!result && elsewhere_count) {
+        const char *id = rey_mitsuba_sensor_id(s->scene, s->sensor);
+        cli_session_note(s, "the picture of sensor %d%s%s%s does not depend on %s, which belong%s to another sensor: %s 0; "
+                         "--sensor chooses", s->sensor, id ? " ('" : "", id ? id : "", id ? "')" : "", elsewhere,
+                         elsewhere_count == 1 ? "s" : "", elsewhere_count == 1 ? "its derivative is" : "their derivatives are");
+    }
+    rey_free(s->ctx, used);
+    rey_free(s->ctx, reached);
     return result;
 }
 
@@ -311,13 +369,13 @@ int cli_session_direction(Session *session, const char *const *specs, int spec_c
         result = cli_direction_check_terms(session->ctx, session->scene, direction, session->options->terms);
     }
     if (!result && session->options->command == COMMAND_GRAD) {
-        result = note_unused(session, direction);
+        result = cli_note_unreached(session, direction->params, direction->count);
     }
     bool notes = !session->options->all && session->options->command != COMMAND_PARAMS;
     for (int i = 0; i < spec_count && !result && notes; i++) {
         if (cli_direction_bare_pose(session->scene, specs[i])) {
-            cli_note("%s moves all entries of the matrix; :translate=x,y,z, :rotate=ax,ay,az@cx,cy,cz and :scale=S@cx,cy,cz "
-                     "move what it places", specs[i]);
+            cli_session_note(session, "%s moves all entries of the matrix; :translate=x,y,z, :rotate=ax,ay,az@cx,cy,cz and "
+                             ":scale=S@cx,cy,cz move what it places", specs[i]);
         }
     }
     return result ? cli_report(session->options, session->ctx, result) : EXIT_OK;
@@ -344,6 +402,14 @@ void cli_json_ignored(Json *json, const Session *session) {
     json_array_end(json);
 }
 
+void cli_json_notes(Json *json, const Session *session) {
+    json_array(json, "notes");
+    for (int i = 0; i < session->note_count; i++) {
+        json_string(json, NULL, session->notes[i]);
+    }
+    json_array_end(json);
+}
+
 void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) {
     double seconds = stats->seconds;
     json_number(json, "seconds", seconds);
@@ -358,4 +424,5 @@ void cli_json_stats(Json *json, const Session *session, const rey_stats *stats) 
     json_integer(json, "threads", rey_threads(session->ctx));
     json_integer(json, "lanes", rey_lanes(session->ctx));
     json_integer(json, "nonfinite", stats->nonfinite);
+    cli_json_notes(json, session);
 }

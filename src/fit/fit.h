@@ -26,6 +26,7 @@ typedef struct FitDef {
     // Called after every iteration, and while longer calls render; false stops: the iteration is finished, the state
     // saved, and rey_fit returns REY_ERROR_CANCELLED. May be null.
     bool (*progress)(void *user, const FitProgress *progress);
+    void (*note)(void *user, const char *words); // what is not wrong and may be a mistake, before the first iteration; may be null
     void *user;
 } FitDef;
 
@@ -157,7 +158,7 @@ rey_result rey_levels_remesh(Fit *fit, int level);
 // The job's scene, or that of a level: see FitState.meshed.
 rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);
 
-// Whether every fitted view has the gradients of all unknowns (derivatives.c).
+// Whether every fitted view has the gradients of all unknowns (derivatives.c). Unknowns on which no fitted view depends are noted.
 rey_result rey_fit_check_derivatives(Fit *fit);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled

@@ -64,8 +64,7 @@ void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, con
     }
 }
 
-// Where a sensor keeps one of its numbers.
-static int32_t camera_theta(const SensorRecord *s, int32_t number) {
+int32_t rey_camera_theta(const SensorRecord *s, int32_t number) {
     switch (number) {
     case CAMERA_POSE:
         return s->to_world;
@@ -108,7 +107,7 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
         *moves = true;
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
-    if (p->camera >= 0 && camera_theta(r->plan.sensor, p->camera) == p->theta) {
+    if (p->camera >= 0 && rey_camera_theta(r->plan.sensor, p->camera) == p->theta) {
         *(view->has_media ? &job->glides : &job->any_motion) = true;
         job->any_camera = true;
         return (int32_t *)(uintptr_t)job->camera_at + p->camera;

@@ -14,6 +14,9 @@ void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, con
 // where media end, and neither the path's vertices nor what hides light are among them.
 bool rey_moves_border(const SceneView *view, const Param *p);
 
+// Where a sensor keeps one of its numbers (CAMERA_), -1 where it has none.
+int32_t rey_camera_theta(const SensorRecord *s, int32_t number);
+
 // Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
 int32_t *rey_motion_slot(Render *r, const Param *p);
 

@@ -2,9 +2,11 @@
 #include "render/used.h"
 
 #include "emitter/table.h"
+#include "render/motion.h"
 
 typedef struct Marks {
     const SceneView *view;
+    int sensor; // the only one that counts, -1 = all do
     uint8_t *shapes, *emitters, *bsdfs, *textures, *volumes, *phases, *media;
 } Marks;
 
@@ -104,7 +106,7 @@ static void mark_all(const Marks *m) {
         }
     }
     for (int64_t i = 0; i < view->sensors_count; i++) {
-        mark_medium(m, view->sensors[i].medium);
+        mark_medium(m, m->sensor < 0 || m->sensor == i ? view->sensors[i].medium : -1);
     }
 }
 
@@ -120,6 +122,19 @@ static bool attribute_read(const Marks *m, int32_t entry) {
     return false;
 }
 
+// Whether the sensor that counts, or a part of it, has a sensor's number.
+static bool camera_used(const Marks *m, const Param *p) {
+    if (m->sensor < 0) {
+        return true;
+    }
+    const SensorRecord *s = m->view->sensors + m->sensor;
+    bool used = rey_camera_theta(s, p->camera) == p->theta;
+    for (int32_t i = 0; i < s->batch_count; i++) {
+        used = used || rey_camera_theta(m->view->batch_sensors + s->batch + i, p->camera) == p->theta;
+    }
+    return used;
+}
+
 static bool is_used(const Marks *m, const Param *p) {
     return p->texture >= 0     ? m->textures[p->texture]
            : p->to_uv >= 0     ? m->textures[p->to_uv]
@@ -128,14 +143,15 @@ static bool is_used(const Marks *m, const Param *p) {
            : p->attribute >= 0 ? attribute_read(m, p->attribute)
            : p->emitter >= 0   ? m->emitters[p->emitter]
            : p->volume >= 0    ? m->volumes[p->volume]
+           : p->camera >= 0    ? camera_used(m, p)
                                : true;
 }
 
-rey_result rey_params_used(rey_scene *scene, bool *used) {
+static rey_result find_used(rey_scene *scene, int sensor, bool *used) {
     const SceneView *v = &scene->view;
     const int64_t counts[] = {v->shapes_count,  v->emitters_count, v->bsdfs_count, v->textures_count,
                               v->volumes_count, v->phases_count,   v->media_count};
-    Marks m = {.view = v};
+    Marks m = {.view = v, .sensor = sensor};
     uint8_t **const arrays[] = {&m.shapes, &m.emitters, &m.bsdfs, &m.textures, &m.volumes, &m.phases, &m.media};
     size_t total = 0;
     for (int k = 0; k < COUNT_OF(counts); k++) {
@@ -155,3 +171,7 @@ rey_result rey_params_used(rey_scene *scene, bool *used) {
     rey_free(scene->ctx, all);
     return REY_OK;
 }
+
+rey_result rey_params_used(rey_scene *scene, bool *used) { return find_used(scene, -1, used); }
+
+rey_result rey_params_reached(rey_scene *scene, int sensor, bool *reached) { return find_used(scene, sensor, reached); }

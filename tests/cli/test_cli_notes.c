@@ -1,0 +1,66 @@
+// test_cli_notes.c: what the command tells beside its numbers, in words and with --json.
+#include "command.h"
+
+// A ball that two cameras see, the second one with an id.
+static void write_scene(void) {
+    write_words("two.xml",
+                "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>\n"
+                "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/>\n"
+                "</film><transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
+                "<sensor type='perspective' id='side'><film type='hdrfilm'><integer name='width' value='8'/>\n"
+                "<integer name='height' value='6'/></film>\n"
+                "<transform name='to_world'><lookat origin='4,0,0' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
+                "<emitter type='constant'/><bsdf type='diffuse' id='idle'/>\n"
+                "<shape type='sphere' id='ball'><bsdf type='diffuse' id='grey'/></shape></scene>\n");
+}
+
+static void expect_note(Fixture *f, const char *arguments, const char *words) {
+    JsonNode *node = run_json(f, 0, arguments);
+    const JsonNode *notes = json_get(node, "notes");
+    assert_non_null(notes);
+    if (!words) {
+        assert_null(notes->first);
+    } else if (!notes->first || !strstr(notes->first->text, words)) {
+        fail_msg("reynolds %s: '%s', expected '%s'", arguments, notes->first ? notes->first->text : "no note", words);
+    }
+    json_free(node);
+    assert_true(!words || strstr(f->words, words));
+}
+
+// A derivative is 0 with respect to the numbers of a camera that is not looked through: that is told.
+static void other_cameras_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    static const char words[] = "the picture of sensor 0 does not depend on side.to_world, which belongs to another sensor: its";
+    expect_note(f, "grad two.xml --param side.to_world:translate=1,0,0 --spp 16 --json", words);
+    expect_note(f, "grad two.xml --param side.to_world:translate=1,0,0 --spp 16 --mode reverse --adjoint 1 --json", words);
+    expect_note(f, "grad two.xml --param side.to_world:translate=1,0,0 --spp 16 --sensor side --json", NULL);
+    expect_note(f, "check two.xml --param side.to_world:translate=1,0,0 --spp 16 --json", words);
+    expect_note(f, "grad two.xml --param sensor_0.x_fov --sensor 1 --spp 16 --json",
+                "the picture of sensor 1 ('side') does not depend on sensor_0.x_fov");
+    expect_note(f, "grad two.xml --param idle.reflectance.value --spp 16 --json", "nothing in the scene uses idle.reflectance");
+    expect(f, 0, "check two.xml --all --spp 16");
+    assert_non_null(strstr(f->words, "does not depend on side.to_world, side.x_fov, side.principal_point_offset_x and 1 more, which "
+                                     "belong to another sensor: their derivatives are 0"));
+}
+
+// So are unknowns of a fit on which no fitted view depends.
+static void unknowns_out_of_sight_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    expect(f, 0, "render two.xml -o target.npy --spp 4");
+    write_words("job.yaml", "scene: two.xml\nviews: [{target: target.npy}]\niterations: 1\nspp: 2\nreport_spp: 0\n"
+                            "parameters: [grey.reflectance.value, side.x_fov]\n");
+    expect_note(f, "fit job.yaml --json", "parameter 'side.x_fov': no view that is fitted has this sensor, so that its gradient is 0");
+    expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=idle.reflectance.value",
+                "parameter 'idle.reflectance.value': no view that is fitted depends on it");
+    expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov", NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(other_cameras_are_told),
+        cmocka_unit_test(unknowns_out_of_sight_are_told),
+    };
+    return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
+}
