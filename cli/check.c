@@ -255,50 +255,13 @@ static rey_result try_again(Work *w, Check *check) {
     return result;
 }
 
-// A parameter with entries on both of its bounds cannot move as a whole: those in the upper half of the range move down.
-static bool turn_inwards(Work *w, Check *check) {
-    const Direction *d = &check->direction;
-    rey_param_info info;
-    bool bare = !check->spec[cli_direction_name_length(check->spec)];
-    if (!bare || d->count != 1 || rey_param_get_info(w->session.scene, d->params[0], &info) ||
-        !isfinite(info.low) || !isfinite(info.high)) {
-        return false;
-    }
-    for (int64_t i = 0; i < info.count; i++) {
-        d->tangent[i] = w->original[i] > 0.5f * (info.low + info.high) ? -1 : 1;
-    }
-    check->step = check_choose_step(w->session.scene, w->original, check, w->session.options->step);
-    if (check->step.h > 0) {
-        cli_session_note(&w->session, "%s has entries on both of its bounds: those in the upper half of its range move down, the "
-                         "others up", info.name);
-    }
-    return check->step.h > 0;
-}
-
-static rey_result choose_step(Work *w, Check *check) {
-    rey_context *ctx = w->session.ctx;
-    double asked = w->session.options->step, least = check_least_step(w->original, &check->direction);
-    if (isinf(least)) {
-        return rey_fail(ctx, REY_ERROR_PARAM, "%s: the direction is zero, expected one that moves the parameter", check->spec);
-    }
-    check->step = check_choose_step(w->session.scene, w->original, check, asked);
-    if (!(check->step.h > 0) && !turn_inwards(w, check)) {
-        return rey_fail(ctx, REY_ERROR_PARAM, "%s: the bounds leave no room to move along this direction", check->spec);
-    }
-    if (asked > 0 && asked < least) {
-        return rey_fail(ctx, REY_ERROR_PARAM, "%s: a step of %g is lost in the rounding of the parameter's values, expected %.1g "
-                        "or more", check->spec, asked, least);
-    }
-    return REY_OK;
-}
-
 static rey_result check_direction(Work *w, Check *check) {
     const Direction *d = &check->direction;
     for (int k = 0; k < d->count; k++) {
         const float *values = rey_param_values(w->session.scene, d->params[k]);
         memcpy(w->original + d->offsets[k], values, (size_t)(d->offsets[k + 1] - d->offsets[k]) * sizeof(float));
     }
-    rey_result result = choose_step(w, check);
+    rey_result result = check_find_step(&w->session, w->original, check);
     if (!result) {
         result = attempt(w, check);
     }
@@ -447,13 +410,17 @@ static int report_checks(const Options *options, Work *w, Check *checks, int cou
     bool wrong = false;
     rey_result result = REY_OK;
     judge(w, checks, count, &threshold);
+    for (int i = 0; i < count; i++) {
+        wrong |= checks[i].verdict == VERDICT_WRONG;
+    }
+    if (wrong && options->step > 0) {
+        cli_session_note(&w->session, "the differences are over the step that --step asks for, which may be what is wrong; without "
+                         "it the step is found");
+    }
     if (options->json) {
         check_print_json(&w->session, &w->stats, checks, count, threshold);
     } else {
         result = check_print_table(w->session.ctx, checks, count, threshold);
-    }
-    for (int i = 0; i < count; i++) {
-        wrong |= checks[i].verdict == VERDICT_WRONG;
     }
     int status = result ? cli_report_failure(options, w->session.ctx, result) : cli_finish_output();
     return status ? status : wrong ? EXIT_FAILED : EXIT_OK;

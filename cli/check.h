@@ -43,11 +43,8 @@ typedef struct Check { // one direction
 
 Step check_central_step(double h);
 Step check_one_sided_step(double h, double sign);
-// The step to begin with; original: the values of the direction's parameters; asked: 0 = found by itself.
-Step check_choose_step(const rey_scene *scene, const float *original, const Check *check, double asked);
-
-// Below it the values' rounding to floats is more than 1 % of how far they move; infinite for a direction of zeros.
-double check_least_step(const float *original, const Direction *d);
+// The step to begin with, found or as --step asks for; original: the values of the direction's parameters.
+rey_result check_find_step(Session *session, const float *original, Check *check);
 
 // Largest difference between forward and reverse mode, which sum the same samples in float in another order.
 #define CHECK_REVERSE_TOLERANCE 1e-4

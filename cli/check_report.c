@@ -25,13 +25,17 @@ static double unsigned_zero(double value, int digits) {
 
 static void print_row(FILE *file, const Check *check, const char *verdict) {
     const CheckResult *r = &check->result;
-    char block[32], fresh[32] = "-"; // of what moves the differences are of fresh paths themselves
+    char block[32], noise[32] = "-", fresh[32] = "-"; // of what moves the differences are of fresh paths themselves
+    double percent = 100 * r->relative_error;
     if (check->replays) {
         snprintf(fresh, sizeof fresh, "%.2f", unsigned_zero(check->fresh_z, 2));
     }
+    if (r->tests > 0) {
+        snprintf(noise, sizeof noise, percent < 1e5 ? "%.2f%%" : "%.1e%%", percent);
+    }
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %8.2f%% %8.2f %7s %6.2f %7s %9.1e  %s\n", check->spec, r->derivative + 0.0,
-            r->gradient_standard_error, r->difference + 0.0, check->step.h, 100 * r->relative_error,
+    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %9s %8.2f %7s %6.2f %7s %9.1e  %s\n", check->spec, r->derivative + 0.0,
+            r->gradient_standard_error, r->difference + 0.0, check->step.h, noise,
             unsigned_zero(r->worst_z, 2), block, unsigned_zero(r->sum_z, 2), fresh, check->reverse_error, verdict);
 }
 
@@ -110,11 +114,12 @@ static void print_left_out(const Check *checks, int count) {
 rey_result check_print_table(rey_context *ctx, const Check *checks, int count, double threshold) {
     rey_result result = print_rows(ctx, checks, count);
     int wrong = count_verdicts(checks, count, VERDICT_WRONG), weak = count_verdicts(checks, count, VERDICT_WEAK);
-    int undecided = 0;
+    int undecided = 0, shared = 0;
     bool replayed = false;
     char fresh[32] = "";
     for (int i = 0; i < count; i++) {
         undecided += checks[i].undecided;
+        shared += checks[i].verdict == VERDICT_WEAK && checks[i].result.relative_error <= CHECK_WEAK;
         replayed = replayed || (checks[i].verdict != VERDICT_REFUSED && checks[i].replays);
     }
     if (replayed) {
@@ -130,9 +135,13 @@ rey_result check_print_table(rey_context *ctx, const Check *checks, int count, d
     if (undecided) {
         printf("%d of %d are beyond these limits, and too noisy to be called wrong\n", undecided, count);
     }
-    if (weak) {
-        printf("%d of %d are weak: noise is more than %g %% of the signal, so that they say little; raise --spp\n", weak,
-               count, 100 * CHECK_WEAK);
+    if (weak > shared) {
+        printf("%d of %d are weak: error/rms, the noise of what is compared over the derivative, is above %g %%, so that they say "
+               "little; raise --spp\n", weak - shared, count, 100 * CHECK_WEAK);
+    }
+    if (shared) {
+        printf("%d of %d are weak: derivative and difference agree, and share a noise that is more than %g %% of the derivative's "
+               "blocks, so that the derivative is known no better than that; raise --spp\n", shared, count, 100 * CHECK_WEAK);
     }
     return result;
 }

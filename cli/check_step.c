@@ -3,8 +3,12 @@
 // side, the one-sided four-point formula of error O(h^3).
 #include "check.h"
 
+#include "base/context.h"
+
 #include <math.h>
 #include <string.h>
+
+static const double MOST_MOVED = 1e18; // farther away, coordinates have no squares in single precision
 
 // Steps that the bounds of the parameters allow along the direction, forwards (sign 1) or backwards (-1).
 static double room(const rey_scene *scene, const float *original, const Direction *d, double sign) {
@@ -79,16 +83,18 @@ Step check_one_sided_step(double h, double sign) {
                   .plain = {-k / 3, 0, 0, k / 3}};
 }
 
-Step check_choose_step(const rey_scene *scene, const float *original, const Check *check, double asked) {
+// The step to begin with; asked: 0 = found by itself.
+static Step choose(const rey_scene *scene, const float *original, const Check *check, double asked) {
     const Direction *d = &check->direction;
     double h = asked > 0 ? asked : natural_step(scene, original, check);
     double forward = 0.999 * room(scene, original, d, 1), backward = 0.999 * room(scene, original, d, -1);
     double central = fmin(h, fmin(forward, backward));
-    return central >= 0.1 * h ? check_central_step(central)
+    return central > 0 && central >= 0.1 * fmin(h, fmax(forward, backward)) ? check_central_step(central)
                               : check_one_sided_step(fmin(h, fmax(forward, backward) / 3), forward >= backward ? 1 : -1);
 }
 
-double check_least_step(const float *original, const Direction *d) {
+// Below it the values' rounding to floats is more than 1 % of how far they move; infinite for a direction of zeros.
+static double least_step(const float *original, const Direction *d) {
     double spacings = 0, moves = 0;
     for (int64_t i = 0; i < d->offsets[d->count]; i++) {
         double t = (double)d->tangent[i], v = fabs((double)original[i]);
@@ -98,4 +104,60 @@ double check_least_step(const float *original, const Direction *d) {
     }
     // The nearest points lie half a step away, and rounding moves them by half of the spacing at most.
     return moves > 0 ? 100 * sqrt(spacings / moves) : INFINITY;
+}
+
+// A parameter with entries on both of its bounds cannot move as a whole: those in the upper half of the range move down.
+static bool turn_inwards(Session *session, const float *original, Check *check) {
+    const Direction *d = &check->direction;
+    rey_param_info info;
+    bool bare = !check->spec[cli_direction_name_length(check->spec)];
+    if (!bare || d->count != 1 || rey_param_get_info(session->scene, d->params[0], &info) || !isfinite(info.low) ||
+        !isfinite(info.high)) {
+        return false;
+    }
+    for (int64_t i = 0; i < info.count; i++) {
+        d->tangent[i] = original[i] > 0.5f * (info.low + info.high) ? -1 : 1;
+    }
+    check->step = choose(session->scene, original, check, session->options->step);
+    if (check->step.h > 0) {
+        cli_session_note(session, "%s has entries on both of its bounds: those in the upper half of its range move down, the "
+                         "others up", info.name);
+    }
+    return check->step.h > 0;
+}
+
+// A step beyond what floats hold makes a scene that is none; one that the bounds shorten is not what was asked for.
+static rey_result check_asked(Session *session, const float *original, const Check *check) {
+    const Direction *d = &check->direction;
+    double asked = session->options->step, least = least_step(original, d), largest = 0;
+    for (int64_t i = 0; i < d->offsets[d->count]; i++) {
+        largest = fmax(largest, fabs((double)d->tangent[i]));
+    }
+    double farthest = fmax(fabs(check->step.offsets[2]), fabs(check->step.offsets[3]));
+    if (asked < least) {
+        return rey_fail(session->ctx, REY_ERROR_PARAM, "%s: a step of %g is lost in the rounding of the parameter's values, "
+                        "expected %.1g or more", check->spec, asked, least);
+    }
+    if (farthest * largest > MOST_MOVED) {
+        return rey_fail(session->ctx, REY_ERROR_PARAM, "%s: a step of %g is too long, expected %.1g or less", check->spec, asked,
+                        MOST_MOVED / largest);
+    }
+    if (check->step.h < 0.999 * asked) {
+        cli_session_note(session, "%s: the step of %g is shortened to %.4g, as far as the parameter's range allows", check->spec,
+                         asked, check->step.h);
+    }
+    return REY_OK;
+}
+
+rey_result check_find_step(Session *session, const float *original, Check *check) {
+    double asked = session->options->step;
+    if (isinf(least_step(original, &check->direction))) {
+        return rey_fail(session->ctx, REY_ERROR_PARAM, "%s: the direction is zero, expected one that moves the parameter",
+                        check->spec);
+    }
+    check->step = choose(session->scene, original, check, asked);
+    if (!(check->step.h > 0) && !turn_inwards(session, original, check)) {
+        return rey_fail(session->ctx, REY_ERROR_PARAM, "%s: the bounds leave no room to move along this direction", check->spec);
+    }
+    return asked > 0 ? check_asked(session, original, check) : REY_OK;
 }

@@ -5,8 +5,9 @@
 static void write_scene(void) {
     write_words("two.xml",
                 "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>\n"
-                "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/>\n"
-                "</film><transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
+                "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='8'/>\n"
+                "<integer name='height' value='8'/></film>\n"
+                "<transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
                 "<sensor type='perspective' id='side'><film type='hdrfilm'><integer name='width' value='8'/>\n"
                 "<integer name='height' value='6'/></film>\n"
                 "<transform name='to_world'><lookat origin='4,0,0' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
@@ -40,8 +41,8 @@ static void other_cameras_are_told(void **state) {
                 "the picture of sensor 1 ('side') does not depend on sensor_0.x_fov");
     expect_note(f, "grad two.xml --param idle.reflectance.value --spp 16 --json", "nothing in the scene uses idle.reflectance");
     expect(f, 0, "check two.xml --all --spp 16");
-    assert_non_null(strstr(f->words, "does not depend on side.to_world, side.x_fov, side.principal_point_offset_x and 1 more, which "
-                                     "belong to another sensor: their derivatives are 0"));
+    assert_non_null(strstr(f->words, "does not depend on side.to_world, side.x_fov, side.principal_point_offset_x and 1 more, "
+                                     "which belong to another sensor: their derivatives are 0"));
 }
 
 // So are unknowns of a fit on which no fitted view depends.
@@ -51,16 +52,48 @@ static void unknowns_out_of_sight_are_told(void **state) {
     expect(f, 0, "render two.xml -o target.npy --spp 4");
     write_words("job.yaml", "scene: two.xml\nviews: [{target: target.npy}]\niterations: 1\nspp: 2\nreport_spp: 0\n"
                             "parameters: [grey.reflectance.value, side.x_fov]\n");
-    expect_note(f, "fit job.yaml --json", "parameter 'side.x_fov': no view that is fitted has this sensor, so that its gradient is 0");
+    expect_note(f, "fit job.yaml --json",
+                "parameter 'side.x_fov': no view that is fitted has this sensor, so that its gradient is 0");
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=idle.reflectance.value",
                 "parameter 'idle.reflectance.value': no view that is fitted depends on it");
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov", NULL);
+}
+
+// A step that was asked for is not replaced without a word.
+static void steps_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    expect_note(f, "check two.xml --param grey.reflectance.value --spp 16 --step 1e30 --json",
+                "grey.reflectance.value: the step of 1e+30 is shortened to 0.4995, as far as the parameter's range allows");
+    expect_note(f, "check two.xml --param grey.reflectance.value --spp 16 --step 0.1 --json", NULL);
+    expect_words(f, 1, "check two.xml --param ball.to_world:translate=2,0,0 --spp 16 --step 1e30",
+                 "a step of 1e+30 is too long, expected 5e+17 or less");
+    expect_words(f, 1, "check two.xml --param grey.reflectance.value --spp 16 --step 1e-20", "is lost in the rounding");
+    expect_words(f, 1, "check two.xml --param ball.to_world:translate=1,0,0 --spp 16 --step 50",
+                 "the differences are over the step that --step asks for");
+}
+
+// Noise that derivative and difference share is not in error/rms, and makes a derivative weak all the same.
+static void shared_noise_is_told(void **state) {
+    Fixture *f = *state;
+    write_words("rough.xml",
+                "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>\n"
+                "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='16'/>\n"
+                "<integer name='height' value='16'/></film>\n"
+                "<transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
+                "<emitter type='constant'/><shape type='sphere'><bsdf type='roughdielectric' id='glass'/></shape></scene>\n");
+    expect_said(f, 0, "check rough.xml --param glass.alpha.value --spp 16",
+                "1 of 1 are weak: derivative and difference agree, and");
+    expect(f, 0, "check two.xml --param idle.reflectance.value --spp 16");
+    assert_non_null(strstr(f->out, "        -     0.00   0,0 R"));
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told),
         cmocka_unit_test(unknowns_out_of_sight_are_told),
+        cmocka_unit_test(steps_are_told),
+        cmocka_unit_test(shared_noise_is_told),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
 }
