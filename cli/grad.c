@@ -4,6 +4,7 @@
 // (forward mode: A = 1/(3 W H), the mean), and its standard error from independently scrambled sample sets: the
 // standard deviation of the sets' values divided by the square root of their number.
 #include "cli.h"
+#include "npy.h"
 
 #include "base/context.h"
 #include "io/file.h"
@@ -15,13 +16,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS = 16, PATH_BYTES = 4096 };
+enum { SETS = 16, PATH_BYTES = 4096, SHOWN_VALUES = 16 }; // gradients up to this size are printed in full with --json
+
+// What is told of one parameter's gradient.
+typedef struct Summary {
+    double sum, standard_error, rms; // of the sum
+    double values[SHOWN_VALUES];
+} Summary;
 
 typedef struct Grad {
     Session session;
     Direction direction;
     rey_stats stats;
     double value, standard_error;
+    Summary *summaries; // reverse: one per parameter of the direction
     TermRequest request;
     double shares[SETS][TERM_COUNT]; // of each set's value
     int needed, used; // term bits
@@ -64,6 +72,34 @@ static void write_terms(Json *json, const Grad *g) {
     }
 }
 
+static void write_gradients(Json *json, const Grad *g) {
+    json_array(json, "gradients");
+    for (int k = 0; k < g->direction.count; k++) {
+        const Summary *s = &g->summaries[k];
+        rey_param_info info = {.count = 0};
+        rey_param_get_info(g->session.scene, g->direction.params[k], &info);
+        json_object(json, NULL);
+        json_string(json, "name", g->direction.names[k]);
+        json_array(json, "shape");
+        for (int i = 0; i < info.dims; i++) {
+            json_integer(json, NULL, info.shape[i]);
+        }
+        json_array_end(json);
+        json_number(json, "sum", s->sum);
+        json_number(json, "standard_error", s->standard_error);
+        json_number(json, "rms", s->rms);
+        if (info.count <= SHOWN_VALUES) {
+            json_array(json, "values");
+            for (int64_t i = 0; i < info.count; i++) {
+                json_number(json, NULL, s->values[i]);
+            }
+            json_array_end(json);
+        }
+        json_object_end(json);
+    }
+    json_array_end(json);
+}
+
 static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     const Options *o = g->session.options;
     Json json = json_begin(file);
@@ -81,6 +117,9 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
         json_string(&json, NULL, g->direction.names[i]);
     }
     json_array_end(&json);
+    if (o->reverse) {
+        write_gradients(&json, g);
+    }
     json_integer(&json, "width", g->session.width);
     json_integer(&json, "height", g->session.height);
     json_string(&json, "output", gradient_folder ? gradient_folder : o->output);
@@ -262,6 +301,30 @@ static rey_result write_gradient(const Grad *g, const double *gradient) {
     return write_summary(g);
 }
 
+// Each parameter's gradient in a few numbers; sets: the gradients of the sample sets, `size` numbers each.
+static rey_result summarize_gradients(Grad *g, const double *gradient, const double *sets, int64_t size) {
+    const Direction *d = &g->direction;
+    g->summaries = rey_alloc_array(g->session.ctx, (size_t)d->count, sizeof *g->summaries);
+    for (int k = 0; k < d->count && g->summaries; k++) {
+        Summary *s = &g->summaries[k];
+        int64_t count = d->offsets[k + 1] - d->offsets[k];
+        double sums[SETS] = {0}, squares = 0;
+        for (int64_t i = 0; i < count; i++) {
+            double x = gradient[d->offsets[k] + i];
+            for (int set = 0; set < SETS; set++) {
+                sums[set] += sets[set * size + d->offsets[k] + i];
+            }
+            squares += x * x / (double)count;
+            if (i < SHOWN_VALUES) {
+                s->values[i] = x;
+            }
+        }
+        summarize(sums, 1, &s->sum, &s->standard_error);
+        s->rms = sqrt(squares);
+    }
+    return g->summaries ? REY_OK : REY_ERROR_MEMORY;
+}
+
 static rey_result reverse(Grad *g) {
     Session *s = &g->session;
     int64_t size = g->direction.offsets[g->direction.count];
@@ -283,7 +346,10 @@ static rey_result reverse(Grad *g) {
             sets[i] = dot(set_gradients + i * size, g->direction.tangent, size);
         }
         summarize(sets, 1, &g->value, &g->standard_error);
-        result = s->options->output ? write_gradient(g, gradient) : REY_OK;
+        result = summarize_gradients(g, gradient, set_gradients, size);
+    }
+    if (!result && s->options->output) {
+        result = write_gradient(g, gradient);
     }
     rey_free(s->ctx, adjoint);
     rey_free(s->ctx, gradient);
@@ -318,6 +384,31 @@ static void note_left_out(const Grad *g) {
     }
 }
 
+static void print_gradients(const Grad *g) {
+    int width = (int)strlen("parameter"), shape_width = (int)strlen("shape");
+    char shape[64];
+    for (int pass = 0; pass < 2; pass++) { // first how wide the columns are
+        if (pass) {
+            printf("\n%-*s  %-*s  %13s %9s %13s\n", width, "parameter", shape_width, "shape", "sum", "+-", "rms");
+        }
+        for (int k = 0; k < g->direction.count; k++) {
+            const Summary *s = &g->summaries[k];
+            const char *name = g->direction.names[k];
+            rey_param_info info = {.count = 1};
+            rey_param_get_info(g->session.scene, g->direction.params[k], &info);
+            cli_shape_text(&info, shape, sizeof shape);
+            width = (int)strlen(name) > width ? (int)strlen(name) : width;
+            shape_width = (int)strlen(shape) > shape_width ? (int)strlen(shape) : shape_width;
+            if (pass) {
+                printf("%-*s  %-*s  %13.6g %9.1e %13.6g\n", width, name, shape_width, shape, s->sum, s->standard_error, s->rms);
+            }
+        }
+    }
+    if (!g->session.options->output) {
+        cli_note("-o DIR writes the gradients' numbers, a file for each parameter");
+    }
+}
+
 static void print_result(const Grad *g) {
     cli_warn_nonfinite(&g->stats);
     if (g->png_scale > 0) {
@@ -332,6 +423,10 @@ static void print_result(const Grad *g) {
         cli_note("value %.9g, standard error %.3g", g->value, g->standard_error); // the picture has standard output
     } else {
         printf("value %.9g\nstandard_error %.3g\n", g->value, g->standard_error);
+        if (g->session.options->reverse) {
+            fflush(stdout);
+            print_gradients(g);
+        }
     }
 }
 
@@ -357,6 +452,7 @@ int cli_grad(int argc, char **argv) {
             print_result(&g);
             status = cli_finish_output();
         }
+        rey_free(g.session.ctx, g.summaries);
         cli_direction_free(g.session.ctx, &g.direction);
         cli_specs_free(&g.session, &specs);
         cli_session_close(&g.session);

@@ -1,6 +1,8 @@
 // test_cli_notes.c: what the command tells beside its numbers, in words and with --json.
 #include "command.h"
 
+#include <math.h>
+
 // A ball that two cameras see, the second one with an id.
 static void write_scene(void) {
     write_words("two.xml",
@@ -88,12 +90,46 @@ static void shared_noise_is_told(void **state) {
     assert_non_null(strstr(f->out, "        -     0.00   0,0 R"));
 }
 
+// A gradient in reverse mode is told parameter by parameter, and their sums make up the value.
+static void gradients_have_rows(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    static const char *const command = "grad two.xml --param grey.reflectance.value --param ball.to_world --mode reverse "
+                                       "--adjoint 1 --spp 16%s";
+    char arguments[256];
+    snprintf(arguments, sizeof arguments, command, "");
+    expect_words(f, 0, arguments, "-o DIR writes the gradients' numbers");
+    assert_non_null(strstr(f->out, "parameter               shape            sum        +-           rms\n"
+                                   "grey.reflectance.value  3  "));
+    snprintf(arguments, sizeof arguments, command, " --json -o gradients");
+    JsonNode *node = run_json(f, 0, arguments);
+    const JsonNode *list = json_get(node, "gradients");
+    double sum = 0, value = json_value(node, "value", 0);
+    for (const JsonNode *row = list->first; row; row = row->next) {
+        const JsonNode *values = json_get(row, "values");
+        double entries = 0, squares = 0, count = 0;
+        for (const JsonNode *entry = values->first; entry; entry = entry->next, count++) {
+            entries += entry->number;
+            squares += entry->number * entry->number;
+        }
+        assert_true(count == 3 || count == 16);
+        assert_true(fabs(entries - json_value(row, "sum", 0)) <= 1e-9 * fabs(entries));
+        assert_true(fabs(sqrt(squares / count) - json_value(row, "rms", 0)) <= 1e-9 * sqrt(squares));
+        assert_true(json_value(row, "standard_error", 0) > 0);
+        sum += entries;
+    }
+    assert_true(value != 0 && fabs(sum - value) <= 1e-9 * fabs(value));
+    json_free(node);
+    assert_int_equal(access("gradients/ball.to_world.npy", R_OK), 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told),
         cmocka_unit_test(unknowns_out_of_sight_are_told),
         cmocka_unit_test(steps_are_told),
         cmocka_unit_test(shared_noise_is_told),
+        cmocka_unit_test(gradients_have_rows),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
 }
