@@ -18,6 +18,7 @@
 #include <zlib.h>
 
 #include <jpeglib.h> // needs stdio.h before it
+#include <suitesparse/cholmod.h> // defines what zlib.h would look at
 
 // A square that fills the view under a constant sky of radiance 1: the mean of the pixels is its reflectance, and each
 // pixel is the reflectance times its derivative.
@@ -34,7 +35,7 @@ static const char scene_text[] =
     "  <emitter type=\"constant\"/>\n"
     "</scene>\n";
 
-enum { TEST_PIXELS = 64, TEST_WIDTHS = 3, LIBRARIES = 7 };
+enum { TEST_PIXELS = 64, TEST_WIDTHS = 3, LIBRARIES = 8 };
 
 #if defined(__clang__) || !defined(__GNUC__)
 static const char compiler[] = __VERSION__; // holds clang's name
@@ -103,6 +104,10 @@ static void find_libraries(Library list[LIBRARIES]) {
     library_version(&list[4], "zlib", zlibVersion());
     library_version(&list[5], "expat", XML_ExpatVersion());
     library_version(&list[6], "libyaml", yaml_get_version_string());
+    int cholmod[3];
+    cholmod_version(cholmod);
+    snprintf(text, sizeof text, "%d.%d.%d", cholmod[0], cholmod[1], cholmod[2]);
+    library_version(&list[7], "cholmod", text);
 }
 
 // Renders the scene and its derivative; the sentence on what was found goes to test->verdict.

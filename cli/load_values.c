@@ -42,7 +42,11 @@ static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name,
     if (param < 0) {
         char absent[ABSENT_BYTES];
         rey_param_absent(scene, text, absent);
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s: the scene has no parameter '%s'%s", path, text, absent);
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s=%s: the scene has no parameter '%s'%s", text, path, text,
+                        absent[0] ? absent : "; 'reynolds params' lists them");
+    }
+    if (!path[0]) {
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "--load %s=: the name of a file is missing, expected FILE.xml or NAME=FILE", text);
     }
     rey_result result = rey_param_get_info(scene, param, &info);
     float *values = result ? NULL : rey_alloc_array(ctx, (size_t)info.count, sizeof *values);

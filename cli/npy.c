@@ -101,7 +101,7 @@ static rey_result read_values(rey_context *ctx, FILE *file, const char *path, co
 static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_info *info, bool flat, float *values) {
     FILE *file = fopen(path, "rb");
     if (!file) {
-        return rey_fail(ctx, REY_ERROR_IO, "%s: %s", path, strerror(errno));
+        return rey_fail(ctx, REY_ERROR_IO, "%s: cannot open: %s", path, strerror(errno));
     }
     Header header = {.shape = ""};
     rey_result result = read_header(ctx, file, path, &header);

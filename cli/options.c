@@ -145,7 +145,7 @@ static bool parse_terms(Options *o, const char *text) {
 static bool parse_load(Options *o, const char *text) {
     static const char *const pictures[] = {".npy", ".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".bmp"};
     const char *equals = strchr(text, '='), *dot = strrchr(text, '.');
-    if (!text[0] || equals == text || (equals && !equals[1])) {
+    if (!text[0] || equals == text) { // that a file is missing is told with the name that it is of
         cli_usage_error(o, "--load: expected FILE.xml or NAME=FILE, got '%s'", text);
         return false;
     }
@@ -317,7 +317,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     case OPTION_DEFINE:
         return parse_define(o, value);
     case OPTION_THREADS:
-        return parse_count(o, "--threads", value, 1, 4096, &o->threads);
+        return parse_count(o, "--threads (without it: all that the machine allows)", value, 1, 4096, &o->threads);
     case OPTION_LANES:
         return parse_lanes(o, value);
     case OPTION_SAMPLER:

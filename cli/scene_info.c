@@ -123,7 +123,10 @@ static void print_info(const Session *s) {
     for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
         int width, height;
         if (rey_scene_film_size(s->scene, i, &width, &height) == REY_OK) {
-            printf("sensor %-10d %d x %d pixels\n", i, width, height);
+            const char *id = rey_mitsuba_sensor_id(s->scene, i);
+            char name[256];
+            snprintf(name, sizeof name, "sensor %d%s%s%s", i, id ? " '" : "", id ? id : "", id ? "'" : "");
+            printf("%-17s %d x %d pixels\n", name, width, height);
         }
     }
     Lack lacks[MOST_LACKS];
@@ -182,6 +185,11 @@ static void print_info_json(const Session *s) {
         json_integer(&json, NULL, width);
         json_integer(&json, NULL, height);
         json_array_end(&json);
+    }
+    json_array_end(&json);
+    json_array(&json, "sensor_ids");
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        json_string(&json, NULL, rey_mitsuba_sensor_id(s->scene, i));
     }
     json_array_end(&json);
     json_array(&json, "notes");

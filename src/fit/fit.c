@@ -133,7 +133,7 @@ static rey_result open_job(Fit *fit) {
     if (!result) {
         result = rey_fit_load_scene(fit, fit->state.meshed, &fit->scene);
     }
-    return result;
+    return result ? result : rey_fit_check_truth(fit);
 }
 
 // A fit that goes on in the scene of a level began in the job's.

@@ -158,6 +158,9 @@ rey_result rey_levels_remesh(Fit *fit, int level);
 // The job's scene, or that of a level: see FitState.meshed.
 rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);
 
+// Whether the truth of the job, if it has one, is a file that can be read, which is all of it that is looked at before the end.
+rey_result rey_fit_check_truth(Fit *fit);
+
 // Whether every fitted view has the gradients of all unknowns (derivatives.c). Unknowns on which no fitted view depends are noted.
 rey_result rey_fit_check_derivatives(Fit *fit);
 

@@ -41,8 +41,11 @@ rey_result rey_job_fail_at(const Job *job, JobPlace at, rey_result code, const c
 }
 
 rey_result rey_job_named_file(const Job *job, JobPlace at, rey_result result) {
-    bool missing = result == REY_ERROR_IO && (at.line || at.set), wrong = result == REY_ERROR_FORMAT && at.set;
-    return missing || wrong ? rey_job_fail_at(job, at, result, "%s", rey_error(job->ctx)) : result;
+    char why[1600];
+    snprintf(why, sizeof why, "%s", rey_error(job->ctx));
+    return result == REY_ERROR_IO && (at.line || at.set) ? rey_job_fail_at(job, at, result, "%s", why)
+           : result == REY_ERROR_FORMAT && at.set ? rey_fail(job->ctx, result, "--set %.200s: %s", at.set, why)
+                                                  : result;
 }
 
 rey_result rey_job_named_scene(const Job *job, JobPlace at, const JobDefines *defines, rey_result result) {

@@ -1,6 +1,8 @@
 // report_views.c: the views of a report: the pictures of start and result, and those on the way.
 #include "fit/report_parts.h"
 
+#include "io/mitsuba.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -118,8 +120,14 @@ static rey_result view_section(Fit *fit, int index, const float *start, const fl
     float exposure = rey_report_exposure(fit->ctx, view->target, (int64_t)view->width * view->height);
     char caption[112];
     bool held_out = fit->job.views[index].held_out;
-    rey_text_add(html, "<section><h3>View %d%s <span class=\"note\">sensor %d, %d &times; %d", index,
-                 held_out ? ", held out" : "", view->sensor, view->width, view->height);
+    const char *id = rey_mitsuba_sensor_id(fit->scene, view->sensor);
+    rey_text_add(html, "<section><h3>View %d%s <span class=\"note\">sensor %d", index, held_out ? ", held out" : "", view->sensor);
+    if (id) {
+        rey_text_add(html, " \xe2\x80\x98");
+        rey_text_html(html, id);
+        rey_text_add(html, "\xe2\x80\x99");
+    }
+    rey_text_add(html, ", %d &times; %d", view->width, view->height);
     if (exposure < 1 || exposure > 1) {
         rey_text_add(html, ", shown at exposure &times;%.3g", (double)exposure);
     }

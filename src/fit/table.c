@@ -3,12 +3,14 @@
 #include "fit/chamfer.h"
 #include "fit/fit.h"
 #include "fit/pose.h"
+#include "io/file.h"
 #include "io/mitsuba.h"
 #include "render/update.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { LARGEST_SMALL = 64, WEIGHT_SPP = 16 }; // parameters up to this size are judged by their worst entry
 
@@ -328,6 +330,20 @@ static rey_result check_films(Fit *fit, const rey_scene *truth) {
         }
     }
     return REY_OK;
+}
+
+rey_result rey_fit_check_truth(Fit *fit) {
+    if (!fit->job.truth_scene) {
+        return REY_OK;
+    }
+    const char *path = rey_job_path(&fit->job, fit->job.truth_scene);
+    size_t size;
+    int file;
+    rey_result result = path ? rey_file_open(fit->ctx, path, &file, &size) : REY_ERROR_MEMORY;
+    if (!result) {
+        close(file);
+    }
+    return rey_job_named_file(&fit->job, fit->job.truth_at, result);
 }
 
 // The job's defines are those of its scene: the truth need not use them. Its own it must.

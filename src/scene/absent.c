@@ -45,8 +45,9 @@ static const char *reason(const ShapeRecord *shape, const char *leaf) {
 // A parameter of an object that is named alone, null where there is none.
 static const char *first_below(const rey_scene *scene, const char *object) {
     size_t length = strlen(object);
-    for (size_t i = 0; i < scene->params.count && length; i++) {
-        const char *name = ARRAY_AT(scene->params, Param, i).name;
+    size_t count = scene->params.count, all = count + scene->aliases.count;
+    for (size_t i = 0; i < all && length; i++) {
+        const char *name = i < count ? ARRAY_AT(scene->params, Param, i).name : ARRAY_AT(scene->aliases, Alias, i - count).name;
         if (!strncmp(name, object, length) && name[length] == '.') {
             return name;
         }

@@ -59,6 +59,9 @@ static void unknowns_out_of_sight_are_told(void **state) {
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=idle.reflectance.value",
                 "parameter 'idle.reflectance.value': no view that is fitted depends on it");
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov", NULL);
+    // A truth that is missing is told before the work.
+    expect_words(f, 1, "fit job.yaml -o before --set truth.scene=none.xml", "--set truth.scene=none.xml: none.xml: cannot open");
+    assert_int_not_equal(access("before", F_OK), 0);
 }
 
 // A step that was asked for is not replaced without a word.
@@ -123,6 +126,37 @@ static void gradients_have_rows(void **state) {
     assert_int_equal(access("gradients/ball.to_world.npy", R_OK), 0);
 }
 
+// Sensors are named where they are numbered, and all libraries where some are.
+static void names_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    expect_said(f, 0, "info two.xml", "sensor 0          8 x 8 pixels\nsensor 1 'side'   8 x 6 pixels\n");
+    JsonNode *node = run_json(f, 0, "info two.xml --json");
+    const JsonNode *ids = json_get(node, "sensor_ids");
+    assert_true(ids->first->kind == JSON_NULL);
+    assert_string_equal(ids->first->next->text, "side");
+    json_free(node);
+    expect(f, 0, "render two.xml --sensor side -o side.npy --spp 4");
+    expect(f, 0, "fit job.yaml --overwrite --set 'views.0={sensor: side, target: side.npy}' --set report_spp=2");
+    char page[OUTPUT_BYTES];
+    read_text("fit/report.html", page);
+    assert_non_null(strstr(page, "sensor 1 \xe2\x80\x98side\xe2\x80\x99, 8 &times; 6"));
+    expect_said(f, 0, "doctor -t 1 --lanes 1", "\ncholmod    ");
+    expect_words(f, 2, "render two.xml -o a.exr -t 0", "all that the machine allows): expected a whole number from 1 to 4096");
+}
+
+// A name that the scene does not have is told before what is wrong with its file.
+static void loads_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    expect_words(f, 2, "render two.xml -o a.exr --load ball.bsdf.reflectanc.value=",
+                 "did you mean 'ball.bsdf.reflectance.value'?");
+    expect_words(f, 2, "render two.xml -o a.exr --load grey=", "no parameter 'grey'; there is 'grey.reflectance.value'");
+    expect_words(f, 2, "render two.xml -o a.exr --load nosuch=a.npy", "no parameter 'nosuch'; 'reynolds params' lists them");
+    expect_words(f, 2, "render two.xml -o a.exr --load grey.reflectance.value=", "the name of a file is missing");
+    expect_words(f, 1, "render two.xml -o a.exr --load grey.reflectance.value=none.npy", "none.npy: cannot open: No such file");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told),
@@ -130,6 +164,8 @@ int main(void) {
         cmocka_unit_test(steps_are_told),
         cmocka_unit_test(shared_noise_is_told),
         cmocka_unit_test(gradients_have_rows),
+        cmocka_unit_test(names_are_told),
+        cmocka_unit_test(loads_are_told),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
 }

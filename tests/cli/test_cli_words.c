@@ -108,7 +108,8 @@ static void overrides_are_told(void **state) {
         snprintf(words, sizeof words, "--set %s: ", cases[i][0]);
         expect_said(f, 2, command, words);
     }
-    expect_said(f, 2, "fit job.yaml -o fit --set scene=$PWD/job.yaml", "job.yaml:1:1: not well-formed XML");
+    expect_said(f, 1, "fit job.yaml -o fit --set scene=$PWD/job.yaml", "/job.yaml:1:1: not well-formed XML");
+    assert_non_null(strstr(f->words, "--set scene="));
     expect_said(f, 1, "fit job.yaml --set folder=/none", "--set folder=/none: /none/start.xml: cannot open the scene");
     expect_said(f, 1, "fit job.yaml --set views.0.target=$PWD/target.exr --set output=/proc/none", "--set output=/proc/none: ");
 }
