@@ -30,6 +30,7 @@ typedef struct MeshAttribute {
 typedef struct AttributeUse {
     char name[64];
     int32_t texture;
+    rey_xml_node *node;
 } AttributeUse;
 
 // The source document; it lives as long as the scene, which is written back from it.

@@ -132,6 +132,10 @@ static rey_result height_slot(Builder *b, rey_xml_node *node, const ParamDesc *p
     rey_xml_child *child = rey_xml_child_of(node, REY_XML_TEXTURES, 0);
     TRY(build_texture(b, child->node, slot_use(p), path, out));
     TRY(refuse_attribute(b, node, *out));
+    if (ARRAY_AT(b->scene->build.textures, TextureNode, *out).kind == TEXTURE_CONSTANT) {
+        TRY(rey_scene_add_note(b->scene, "warning: %s:%d: the texture of this %s is constant and has no slope: there are no bumps",
+                               node->at.file, node->at.line, node->type));
+    }
     Param *param;
     for (int i = 0; (param = build_param_of(b, *out, i)); i++) {
         if (param->to_uv == *out) {

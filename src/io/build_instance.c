@@ -25,7 +25,9 @@ static rey_result build_shapes_of(Builder *b, rey_xml_node *node, const char *pa
         Snapshot s = build_snapshot(b);
         TRY(build_forgive(b, &s, child, "", build_shape(b, child->node, full), NULL));
     }
-    return REY_OK;
+    return node->child_count ? REY_OK
+                             : rey_scene_add_note(b->scene, "warning: %s:%d: this %s holds no shapes, and shows nothing",
+                                                  node->at.file, node->at.line, node->type);
 }
 
 rey_result build_shapegroup(Builder *b, rey_xml_node *node, const char *path) {

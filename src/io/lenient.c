@@ -71,6 +71,11 @@ rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, co
     return remember(b, rey_error(b->ctx), instead);
 }
 
+rey_result build_overlook(Builder *b, const char *instead, rey_result result) {
+    bool overlook = result != REY_OK && result != REY_ERROR_MEMORY && b->lenient;
+    return overlook ? remember(b, rey_error(b->ctx), instead) : result;
+}
+
 rey_result build_check_unused(Builder *b, rey_xml_node *node) {
     while (rey_xml_check_unused(b->ctx, node, NULL, NULL) != REY_OK) {
         if (!b->lenient) {

@@ -18,5 +18,8 @@ Snapshot build_snapshot(const Builder *b);
 // snapshot, marks the child as left out and returns REY_OK; else returns the result. *left_out may be null.
 rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, const char *instead, rey_result result,
                          bool *left_out);
+// The result of a look at what was built: where it failed and the reader is lenient, lists why, and what is done instead, and
+// returns REY_OK.
+rey_result build_overlook(Builder *b, const char *instead, rey_result result);
 // An error that names what nobody took; a lenient reader leaves all of that out.
 rey_result build_check_unused(Builder *b, rey_xml_node *node);

@@ -157,6 +157,49 @@ static void loads_are_told(void **state) {
     expect_words(f, 1, "render two.xml -o a.exr --load grey.reflectance.value=none.npy", "none.npy: cannot open: No such file");
 }
 
+// What a scene has and shows nothing of: attributes that a shape lacks are refused, and what has no effect is told.
+static void attributes_are_looked_for(void **state) {
+    Fixture *f = *state;
+    static const char head[] = "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'/>"
+                               "<emitter type='constant'/>\n"
+                               "<bsdf type='twosided' id='cloth'><bsdf type='diffuse'><texture type='mesh_attribute' "
+                               "name='reflectance'>\n<string name='name' value='%s'/></texture></bsdf></bsdf>\n"
+                               "<shape type='ply' id='quilt'><string name='filename' value='a.ply'/><ref id='cloth'/></shape>\n"
+                               "%s</scene>";
+    static const char sphere[] = "<shape type='sphere' id='plum'><ref id='cloth'/></shape>\n";
+    static const char plain[] = "<shape type='ply'><string name='filename' value='b.ply'/><ref id='cloth'/></shape>\n";
+    static const char lamp[] = "<shape type='ply' id='lamp'><string name='filename' value='b.ply'/><emitter type='area'>\n"
+                               "<texture type='mesh_attribute' name='radiance'><string name='name' value='vertex_color'/>\n"
+                               "</texture></emitter></shape>\n";
+    static const char *const cases[][3] = {
+        {"vertex_colour", "", "s.xml:3:1: the ply 'quilt' has no attribute 'vertex_colour'; it has vertex_color, face_cover"},
+        {"vertex_color", sphere, "s.xml:3:1: the sphere 'plum' has no attribute 'vertex_color': meshes of files have them"},
+        {"face_cover", plain, "s.xml:3:1: the ply in line 5 has no attribute 'face_cover': its file has none"},
+        {"face_cover", lamp, "s.xml:6:48: the ply 'lamp' has no attribute 'vertex_color': its file has none"},
+    };
+    static const char mesh[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n%s"
+                               "element face 1\nproperty list uchar int vertex_indices\n%send_header\n%s";
+    char text[2048];
+    snprintf(text, sizeof text, mesh, "property float r\nproperty float g\nproperty float b\n", "property float cover_0\n",
+             "0 0 0 1 1 1\n1 0 0 1 0 0\n0 1 0 0 1 0\n3 0 1 2 0.5\n");
+    write_words("a.ply", text);
+    snprintf(text, sizeof text, mesh, "", "", "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    write_words("b.ply", text);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        snprintf(text, sizeof text, head, cases[i][0], cases[i][1]);
+        write_words("s.xml", text);
+        expect_words(f, 1, "info s.xml", cases[i][2]);
+        expect_words(f, 0, "info s.xml --lenient", ": it is 0 there");
+    }
+    snprintf(text, sizeof text, head, "vertex_color", "<shape type='merge'/>");
+    write_words("s.xml", text);
+    expect_note(f, "render s.xml --spp 1 --json", "warning: s.xml:5: this merge holds no shapes");
+    snprintf(text, sizeof text, head, "face_cover", "<shape type='sphere'><bsdf type='bumpmap'><bsdf type='diffuse'/>\n"
+             "<texture type='rawconstant'><float name='value' value='1'/></texture></bsdf></shape>");
+    write_words("s.xml", text);
+    expect_note(f, "render s.xml --spp 1 --json", "warning: s.xml:5: the texture of this bumpmap is constant and has no slope");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told),
@@ -166,6 +209,7 @@ int main(void) {
         cmocka_unit_test(gradients_have_rows),
         cmocka_unit_test(names_are_told),
         cmocka_unit_test(loads_are_told),
+        cmocka_unit_test(attributes_are_looked_for),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
 }
