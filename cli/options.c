@@ -1,5 +1,5 @@
-// options.c: the command line's options: one table row for each, and the parser that walks it.
-#include "cli.h"
+// options.c: the values of the command line's options, and the parser that walks it.
+#include "options_rows.h"
 
 #include "base/context.h"
 #include "scene/scene.h"
@@ -9,89 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-
-enum {
-    RENDERS = 1 << COMMAND_RENDER | 1 << COMMAND_GRAD | 1 << COMMAND_CHECK,
-    FITS = 1 << COMMAND_FIT,
-    READS = 1 << COMMAND_PARAMS | 1 << COMMAND_INFO | 1 << COMMAND_CONVERT,
-    GRADS = 1 << COMMAND_GRAD,
-    CHECKS = 1 << COMMAND_CHECK,
-    LISTS = 1 << COMMAND_PARAMS,
-    DOCTOR = 1 << COMMAND_DOCTOR,
-    EVERY = (1 << COMMAND_COUNT) - 1
-};
-
-
-typedef enum OptionId {
-    OPTION_OUTPUT,
-    OPTION_SPP,
-    OPTION_SEED,
-    OPTION_SENSOR,
-    OPTION_DEFINE,
-    OPTION_THREADS,
-    OPTION_LANES,
-    OPTION_SAMPLER,
-    OPTION_PARAM,
-    OPTION_MODE,
-    OPTION_ESTIMATOR,
-    OPTION_ADJOINT,
-    OPTION_TERMS,
-    OPTION_SPP_TERMS,
-    OPTION_ALL,
-    OPTION_STEP,
-    OPTION_VARIANCE,
-    OPTION_SET,
-    OPTION_RESUME,
-    OPTION_OVERWRITE,
-    OPTION_LENIENT,
-    OPTION_LOAD,
-    OPTION_JSON,
-    OPTION_HELP
-} OptionId;
-
-typedef struct OptionRow {
-    OptionId id;
-    char letter;          // short form, 0 when there is none
-    const char *name;     // long form, null when there is none
-    const char *argument; // placeholder, null for a switch
-    int commands;         // bits of the subcommands that take it
-    const char *help;
-} OptionRow;
-
-static const OptionRow option_rows[] = {
-    {OPTION_OUTPUT, 'o', NULL, "OUT", 1 << COMMAND_RENDER, "file by ending (.exr .png .npy), - for standard output"},
-    {OPTION_OUTPUT, 'o', NULL, "OUT", GRADS, "forward mode: the derivative image (.exr .png .npy, or -); reverse: a folder"},
-    {OPTION_OUTPUT, 'o', NULL, "DIR", FITS, "folder for everything that the fit writes (default: the job's)"},
-    {OPTION_PARAM, 0, "param", "P", GRADS | CHECKS, "NAME[:OP]: a direction (see below); may be repeated"},
-    {OPTION_PARAM, 0, "param", "NAME", LISTS, "these parameters only; * stands for any text; may be repeated"},
-    {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
-    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or a picture (.exr .npy) of the image's size"},
-    {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior,primary,indirect,specular)"},
-    {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
-    {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
-    {OPTION_ESTIMATOR, 0, "estimator", "probe|score", GRADS | CHECKS, "how extinctions are differentiated (default probe)"},
-    {OPTION_STEP, 0, "step", "H", CHECKS, "step of the differences along the direction (default: found by itself)"},
-    {OPTION_VARIANCE, 0, "variance", NULL, GRADS, "forward mode: also write the variance of each pixel, to OUT_variance"},
-    {OPTION_SET, 0, "set", "key=value", FITS, "change an entry of the job; may be repeated"},
-    {OPTION_RESUME, 0, "resume", NULL, FITS, "continue from the last checkpoint"},
-    {OPTION_OVERWRITE, 0, "overwrite", NULL, FITS, "start again where the folder holds another or an unfinished fit"},
-    {OPTION_SPP, 0, "spp", "N", RENDERS, "samples per pixel (default: the scene's)"},
-    {OPTION_SPP, 0, "spp", "N", FITS, "samples per pixel of an iteration (default: the job's)"},
-    {OPTION_SEED, 0, "seed", "N", RENDERS, "seed of the random numbers (default 0)"},
-    {OPTION_SEED, 0, "seed", "N", FITS, "seed of the random numbers (default: the job's)"},
-    {OPTION_SENSOR, 0, "sensor", "K|ID", RENDERS, "which sensor: its number, from 0, or its id"},
-    {OPTION_SAMPLER, 0, "sampler", "independent|sobol", RENDERS, "how samples are placed (default sobol)"},
-    {OPTION_DEFINE, 'D', NULL, "key=value", RENDERS | READS | FITS, "value of $key in the scene; may be repeated"},
-    {OPTION_THREADS, 't', "threads", "N", RENDERS | FITS | READS | DOCTOR, "worker threads (default: all that are allowed)"},
-    {OPTION_LANES, 0, "lanes", "1|8|16", RENDERS | FITS | READS | DOCTOR, "SIMD width (default: the widest)"},
-    {OPTION_LOAD, 0, "load", "FILE.xml|NAME=FILE", RENDERS | READS,
-     "values of parameters, by name: from a saved scene, or of one from a picture or .npy; may be repeated"},
-    {OPTION_LOAD, 0, "load", "FILE.xml", FITS, "values of parameters, by name, from a saved scene"},
-    {OPTION_LENIENT, 0, "lenient", NULL, RENDERS | READS, "leave out what cannot be read, and list it"},
-    {OPTION_JSON, 0, "json", NULL, EVERY, "print one JSON object on standard output"},
-    {OPTION_HELP, 'h', "help", NULL, EVERY, "print this text"},
-};
-enum { OPTION_ROW_COUNT = sizeof option_rows / sizeof option_rows[0] };
 
 int cli_usage_error(const Options *options, const char *format, ...) {
     const char *command = cli_command_name(options->command);
@@ -105,23 +22,6 @@ int cli_usage_error(const Options *options, const char *format, ...) {
         cli_json_error(message, "usage");
     }
     return EXIT_USAGE;
-}
-
-void cli_options_help(Command command) {
-    printf("\nOptions:\n");
-    for (int i = 0; i < OPTION_ROW_COUNT; i++) {
-        const OptionRow *row = &option_rows[i];
-        if (row->commands >> command & 1) {
-            char text[64] = "    ";
-            if (row->letter) {
-                snprintf(text, sizeof text, "-%c%s", row->letter, row->name ? ", " : "");
-            }
-            size_t used = strlen(text);
-            snprintf(text + used, sizeof text - used, "%s%s%s%s", row->name ? "--" : "", row->name ? row->name : "",
-                     row->argument ? " " : "", row->argument ? row->argument : "");
-            printf("  %-32s %s\n", text, row->help);
-        }
-    }
 }
 
 static bool parse_terms(Options *o, const char *text) {
@@ -352,62 +252,16 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     }
 }
 
-static const char *option_name_at(void *user, int i) {
-    int command = *(const Command *)user;
-    for (int row = 0; row < OPTION_ROW_COUNT; row++) {
-        if (option_rows[row].name && option_rows[row].commands >> command & 1 && i-- == 0) {
-            return option_rows[row].name;
-        }
-    }
-    return NULL;
-}
-
-static const OptionRow *find_row(Command command, const char *name, size_t length, char letter) {
-    for (int i = 0; i < OPTION_ROW_COUNT; i++) {
-        const OptionRow *row = &option_rows[i];
-        bool same = name ? row->name && strlen(row->name) == length && !strncmp(row->name, name, length)
-                         : row->letter == letter;
-        if (same && row->commands >> command & 1) {
-            return row;
-        }
-    }
-    return NULL;
-}
-
-// Finds the row of one argument that starts with a dash, and its attached value ("--spp=4", "-t4"), if any.
-static const OptionRow *match_option(Options *o, const char *text, const char **attached) {
-    *attached = NULL;
-    if (text[1] != '-') {
-        const OptionRow *row = find_row(o->command, NULL, 0, text[1]);
-        if (!row || (text[2] && !row->argument)) {
-            cli_usage_error(o, "unknown option '%s'", text);
-            return NULL;
-        }
-        *attached = text[2] ? text + 2 : NULL;
-        return row;
-    }
-    const char *name = text + 2;
-    size_t length = strcspn(name, "=");
-    const OptionRow *row = find_row(o->command, name, length, 0);
-    if (!row) {
-        char word[64];
-        snprintf(word, sizeof word, "%.*s", (int)length, name);
-        const char *nearest = rey_nearest_word(word, option_name_at, &o->command);
-        if (nearest) {
-            cli_usage_error(o, "unknown option '--%s', did you mean '--%s'?", word, nearest);
-        } else {
-            cli_usage_error(o, "unknown option '--%s'", word);
-        }
-        return NULL;
-    }
-    *attached = name[length] == '=' ? name + length + 1 : NULL;
-    return row;
-}
-
 static bool add_file(Options *o, const char *text) {
     static const int most[COMMAND_COUNT] = {1, 1, 1, 1, 1, 1, 2, 2, 0};
     if (o->file_count >= most[o->command]) {
-        cli_usage_error(o, "unexpected argument '%s'", text);
+        Command c = o->command;
+        bool result = cli_image_format(text) != IMAGE_UNKNOWN && (c == COMMAND_RENDER || c == COMMAND_GRAD);
+        bool params = c == COMMAND_GRAD || c == COMMAND_CHECK || c == COMMAND_PARAMS;
+        cli_usage_error(o, "unexpected argument '%s'%s", text,
+                        result   ? "; -o names the result"
+                        : params ? "; --param names a parameter"
+                                 : "");
         return false;
     }
     if (!text[0]) {
@@ -433,7 +287,7 @@ static bool parse_arguments(Options *o, int argc, char **argv, bool *help) {
             continue;
         }
         const char *value;
-        const OptionRow *row = match_option(o, text, &value);
+        const OptionRow *row = options_match(o, text, &value);
         if (!row) {
             return false;
         }

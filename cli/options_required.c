@@ -52,7 +52,7 @@ bool cli_options_required(const Options *o) {
     } else if (o->all && o->param_count) {
         cli_usage_error(o, "--all and --param: give one of them");
     } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {
-        cli_usage_error(o, "--param is missing");
+        cli_usage_error(o, "--param %sis missing", c == COMMAND_CHECK ? "or --all " : "");
     } else if (o->variance && (o->reverse || !o->output || !strcmp(o->output, "-"))) {
         cli_usage_error(o, "--variance is of forward mode and needs -o with the name of a file");
     } else if (c == COMMAND_GRAD && o->reverse && (!o->adjoint || !o->adjoint[0])) {

@@ -232,6 +232,11 @@ static rey_result find_sensor(Session *s, int count) {
                                    count, PLURAL(count), o->sensor, list);
 }
 
+static bool is_job_name(const char *path) {
+    const char *dot = strrchr(path, '.');
+    return dot && (!strcmp(dot, ".yaml") || !strcmp(dot, ".yml"));
+}
+
 static rey_result load_scene(Session *s) {
     const Options *o = s->options;
     rey_result result = check_output(s);
@@ -244,6 +249,10 @@ static rey_result load_scene(Session *s) {
     s->load_seconds = rey_seconds() - start;
     if (!result && o->output && strcmp(o->output, "-") != 0 && !o->reverse) {
         result = cli_refuse_input(s, o->output);
+    } else if (result == REY_ERROR_FORMAT && is_job_name(o->files[0])) {
+        char why[1024];
+        snprintf(why, sizeof why, "%s", rey_error(s->ctx));
+        result = rey_fail(s->ctx, result, "%s; jobs are for 'reynolds fit'", why);
     }
     if (result) {
         return result;

@@ -200,6 +200,29 @@ static void attributes_are_looked_for(void **state) {
     expect_note(f, "render s.xml --spp 1 --json", "warning: s.xml:5: the texture of this bumpmap is constant and has no slope");
 }
 
+// What stands at the wrong place of the command line is told with the right one.
+static void misplaced_words_are_told(void **state) {
+    Fixture *f = *state;
+    static const char *const cases[][2] = {
+        {"check two.xml -o a.exr", "'-o' is an option of render, grad and fit, not of check"},
+        {"render two.xml -o a.exr --param x", "'--param' is an option of grad, check and params, not of render"},
+        {"fit job.yaml --lenient=1", "'--lenient' is an option of render, grad, check, params, info and convert, not of fit"},
+        {"render two.xml --sppp 3", "unknown option '--sppp', did you mean '--spp'?"},
+        {"render two.xml -z", "unknown option '-z'"},
+        {"render -hx", "option '-h' takes no value"},
+        {"render two.xml a.exr", "unexpected argument 'a.exr'; -o names the result"},
+        {"grad two.xml grey", "unexpected argument 'grey'; --param names a parameter"},
+        {"info two.xml grey", "unexpected argument 'grey'\n"},
+        {"check two.xml", "--param or --all is missing"},
+        {"grad two.xml", "grad: --param is missing"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        expect_words(f, 2, cases[i][0], cases[i][1]);
+    }
+    expect_words(f, 1, "info job.yaml", "job.yaml:1:1: not well-formed XML");
+    assert_non_null(strstr(f->words, "; jobs are for 'reynolds fit'"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told),
@@ -210,6 +233,7 @@ int main(void) {
         cmocka_unit_test(names_are_told),
         cmocka_unit_test(loads_are_told),
         cmocka_unit_test(attributes_are_looked_for),
+        cmocka_unit_test(misplaced_words_are_told),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);
 }
