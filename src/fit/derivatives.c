@@ -3,7 +3,6 @@
 
 #include "render/term_request.h"
 #include "render/update.h"
-#include "render/used.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -38,33 +37,6 @@ static rey_result check_view(Fit *fit, int view) {
     return rey_derivative_check(fit->scene, &def, all); // only together
 }
 
-// What no view that is fitted depends on stays where it starts.
-static rey_result note_unreached(const Fit *fit) {
-    size_t count = fit->scene->params.count;
-    bool *any = rey_alloc_array(fit->ctx, count, sizeof *any), *reached = rey_alloc_array(fit->ctx, count, sizeof *reached);
-    rey_result result = any && reached ? REY_OK : REY_ERROR_MEMORY;
-    for (int v = 0; v < fit->job.view_count && !result; v++) {
-        result = fit->job.views[v].held_out ? REY_OK : rey_params_reached(fit->scene, fit->views[v].sensor, reached);
-        for (size_t i = 0; i < count && !fit->job.views[v].held_out; i++) {
-            any[i] = any[i] || reached[i];
-        }
-    }
-    for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
-        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
-        char words[1024];
-        if (p->param < 0 || any[p->param]) {
-            continue;
-        }
-        bool camera = ARRAY_AT(fit->scene->params, Param, p->param).camera >= 0;
-        snprintf(words, sizeof words, "parameter '%s': %s, so that its gradient is 0", p->name,
-                 camera ? "no view that is fitted has this sensor" : "no view that is fitted depends on it");
-        fit->def->note(fit->def->user, words);
-    }
-    rey_free(fit->ctx, any);
-    rey_free(fit->ctx, reached);
-    return result;
-}
-
 rey_result rey_fit_check_derivatives(Fit *fit) {
     rey_result result = rey_scene_update(fit->scene);
     for (int v = 0; v < fit->job.view_count && !result; v++) {
@@ -74,5 +46,5 @@ rey_result rey_fit_check_derivatives(Fit *fit) {
         }
         result = asked ? REY_OK : check_view(fit, v);
     }
-    return result || !fit->def->note ? result : note_unreached(fit);
+    return result;
 }

@@ -170,6 +170,9 @@ static rey_result open_fit(Fit *fit) {
         result = rey_fit_check_derivatives(fit);
     }
     if (!result) {
+        result = rey_fit_note_unknowns(fit);
+    }
+    if (!result) {
         result = allocate(fit);
     }
     if (!result) {

@@ -161,8 +161,11 @@ rey_result rey_fit_load_scene(Fit *fit, int meshed, rey_scene **out);
 // Whether the truth of the job, if it has one, is a file that can be read, which is all of it that is looked at before the end.
 rey_result rey_fit_check_truth(Fit *fit);
 
-// Whether every fitted view has the gradients of all unknowns (derivatives.c). Unknowns on which no fitted view depends are noted.
+// Whether every fitted view has the gradients of all unknowns (derivatives.c).
 rey_result rey_fit_check_derivatives(Fit *fit);
+
+// Notes unknowns on which no fitted view depends, and poses that may shear (notes.c).
+rey_result rey_fit_note_unknowns(const Fit *fit);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
 // back through that, with the gradient of an unknown exposure.

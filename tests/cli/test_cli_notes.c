@@ -59,6 +59,9 @@ static void unknowns_out_of_sight_are_told(void **state) {
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=idle.reflectance.value",
                 "parameter 'idle.reflectance.value': no view that is fitted depends on it");
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov", NULL);
+    expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=ball.to_world",
+                "parameter 'ball.to_world': the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid'");
+    expect_note(f, "fit job.yaml --overwrite --json --set 'parameters.1={name: ball.to_world, parameterisation: rigid}'", NULL);
     // A truth that is missing is told before the work.
     expect_words(f, 1, "fit job.yaml -o before --set truth.scene=none.xml", "--set truth.scene=none.xml: none.xml: cannot open");
     assert_int_not_equal(access("before", F_OK), 0);
