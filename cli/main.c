@@ -35,9 +35,9 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "       reynolds grad SCENE --param P [--param P]... --mode reverse --adjoint A [-o DIR] [options]",
          "derivative image (forward) or gradient (reverse)",
          "\nForward mode writes the derivative image along the direction; its value is the mean over pixels and\n"
-         "channels. Reverse mode writes d/dparameter of the sum over pixels and channels of A times image: one .npy "
-         "for\n"
-         "each parameter, and gradient.json, into the folder -o. Several P form one joint direction.\n" DIRECTION_NOTES},
+         "channels. Reverse mode computes d/dparameter of the sum over pixels and channels of A times image, and tells of\n"
+         "each parameter the sum and the root mean square; -o names a folder for all of it, one .npy for each and\n"
+         "gradient.json. Several P form one joint direction.\n" DIRECTION_NOTES},
     [COMMAND_CHECK] =
         {"check", cli_check, "SCENE --param P [--param P]... | --all [options]",
          "compare gradients with correlated finite differences",
