@@ -24,6 +24,9 @@ static void test_keys_are_named(void **state) {
     rey_context *ctx = *state;
     static const char *const cases[][2] = {
         {HEAD "views_of: 1\n", "job.yaml:4: unknown key 'views_of', did you mean 'views'?"},
+        {HEAD "learning_rate: 1\n", "job.yaml:4: unknown key 'learning_rate', did you mean optimizer.learning_rate?"},
+        {"bounds: [0, 1]\n", "job.yaml:1: unknown key 'bounds', did you mean parameters.0.bounds?"},
+        {HEAD "stop: {reduce: 1}\n", "job.yaml:4: unknown key 'reduce' in stop, expected one of window, tolerance"},
         {HEAD "loss: {type: l2, x: 1}\n", "job.yaml:4: unknown key 'x' in loss, expected one of type, epsilon"},
         {HEAD "loss: l3\n", "job.yaml:4: loss: unknown value 'l3', did you mean 'l1'?"},
         {HEAD "loss: []\n", "job.yaml:4: loss: an empty list, expected 'key: value' lines"},

@@ -148,7 +148,32 @@ static const char *key_at(void *user, int i) {
     return fields[i].key;
 }
 
+// A key of the job that is one of an entry below it, null where it is none.
+static const char *home_of(const Job *job, const YamlNode *node) {
+    static const char *const below[][2] = {
+        {"learning_rate", "optimizer.learning_rate"}, {"schedule", "optimizer.schedule"}, {"average", "optimizer.average"},
+        {"beta1", "optimizer.beta1"}, {"beta2", "optimizer.beta2"}, {"momentum", "optimizer.momentum"},
+        {"memory", "optimizer.memory"}, {"epsilon", "loss.epsilon or optimizer.epsilon"}, {"target", "views.0.target"},
+        {"mask", "views.0.mask"}, {"sensor", "views.0.sensor"}, {"exposure", "views.0.exposure"},
+        {"bounds", "parameters.0.bounds"}, {"start", "parameters.0.start"}, {"moment", "parameters.0.moment"},
+        {"parameterisation", "parameters.0.parameterisation"}, {"tolerance", "stop.tolerance"}, {"window", "stop.window"},
+        {"reduce", "levels.0.reduce"},
+    };
+    for (const YamlNode *own = job->tree->child; own; own = own->next) {
+        for (int i = 0; i < COUNT_OF(below) && own == node; i++) {
+            if (!strcmp(node->key, below[i][0])) {
+                return below[i][1];
+            }
+        }
+    }
+    return NULL;
+}
+
 static rey_result unknown_key(Job *job, const YamlNode *node, const char *what, const Field *fields) {
+    const char *home = home_of(job, node);
+    if (home) {
+        return rey_job_fail(job, node, "unknown key '%s', did you mean %s?", node->key, home);
+    }
     const char *nearest = rey_nearest_word(node->key, key_at, (void *)(uintptr_t)fields);
     char all[512];
     list_words(key_at, (void *)(uintptr_t)fields, all, sizeof all);
