@@ -31,7 +31,7 @@ FILES = [("src/bsdf/*.h", ADJOINTS), ("src/math/fresnel.h", ADJOINTS), ("src/mat
          ("src/scene/volume.h", ADJOINTS + "|volume_to_world_adj"), ("src/scene/texture*.h", ADJOINTS),
          ("src/scene/attribute.h", ADJOINTS), ("src/shape/*.h", ADJOINTS + r"|curve_twist|pose_\w+_inverse|matrix_\w+"),
          ("src/shape/normals_adj.c", r"\w+"), ("src/integrator/path_adj.h", r"\w+"),
-         ("src/integrator/kept.h", r"kept_\w+"),
+         ("src/integrator/kept.h", r"(?!kept_replay)kept_\w+"),
          ("src/integrator/path_move.h", r"\w+"), ("src/integrator/passage_move.h", r"\w+"),
          ("src/integrator/flight_adj.h", r"\w+"), ("src/integrator/border.h", r"\w+"),
          ("src/integrator/collision_adj.h", r"\w+"), ("src/integrator/walk_adj.h", r"\w+"),

@@ -14,12 +14,18 @@
 
 enum { PIXELS = 4 * 4, NUMBERS = PIXELS * 3 };
 
+#define SKY "<emitter type='constant'/>"
+#define BULB "<emitter type='point'><point name='position' x='0' y='0' z='-2'/></emitter>"
+#define NEXT_WALL(z)                                                                                                   \
+    "</shape><shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate y='1' angle='180'/>"            \
+    "<translate z='" z "'/></transform>"
+
 typedef struct Wall {
     rey_context *ctx;
     rey_scene *scene;
 } Wall;
 
-// A wall under lights before a camera of 4 x 4 pixels.
+// A wall under lights before a camera of 4 x 4 pixels. With further walls behind it, roulette plays from the first vertex on.
 static Wall wall_open(const char *integrator, const char *lights, const char *function) {
     char path[64];
     Wall wall;
@@ -27,11 +33,12 @@ static Wall wall_open(const char *integrator, const char *lights, const char *fu
     FILE *f = fopen(path, "w");
     assert_non_null(f);
     fprintf(f,
-            "<scene version='3.0.0'><integrator type='%s'><boolean name='hide_emitters' value='true'/></integrator>"
-            "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='4'/><integer name='height' value='4'/>"
-            "</film></sensor>%s<shape type='rectangle' id='wall'><transform name='to_world'><scale value='50'/>"
-            "<rotate y='1' angle='180'/><translate z='3'/></transform>%s</shape></scene>",
-            integrator, lights, function);
+            "<scene version='3.0.0'><integrator type='%s'><boolean name='hide_emitters' value='true'/>"
+            "%s</integrator><sensor type='perspective'><film type='hdrfilm'><integer name='width' value='4'/>"
+            "<integer name='height' value='4'/></film></sensor>%s"
+            "<shape type='rectangle' id='wall'><transform name='to_world'><scale value='50'/><rotate y='1' angle='180'/>"
+            "<translate z='3'/></transform>%s</shape></scene>",
+            integrator, strstr(function, NEXT_WALL("4")) ? "<integer name='rr_depth' value='1'/>" : "", lights, function);
     assert_int_equal(fclose(f), 0);
     assert_int_equal(rey_context_create(NULL, &wall.ctx), REY_OK);
     if (rey_scene_load(wall.ctx, path, NULL, 0, &wall.scene) != REY_OK) {
@@ -53,12 +60,12 @@ static void near(const char *what, double found, double expected, double toleran
 }
 
 // The mean of the picture, and its derivatives by numbers of a parameter that all move alike; reverse mode agrees.
-static double slope_of(Wall wall, const char *name, int count, double *mean) {
+static double slope_of(Wall wall, const char *name, int count, int spp, double *mean) {
     const float ones[3] = {1, 1, 1};
     float image[NUMBERS], derivative[NUMBERS];
     double gradient[3], product = 0, sum = 0, slope = 0;
     rey_render_def def = rey_default_render_def();
-    def.spp = 4096;
+    def.spp = spp;
     int param = rey_param_find(wall.scene, name);
     const rey_selection selection = {&param, 1};
     assert_true(param >= 0);
@@ -78,8 +85,6 @@ static double slope_of(Wall wall, const char *name, int count, double *mean) {
     return slope;
 }
 
-#define SKY "<emitter type='constant'/>"
-#define BULB "<emitter type='point'><point name='position' x='0' y='0' z='-2'/></emitter>"
 #define NET(opacity) "<bsdf type='mask' id='net'><float name='opacity' value='" opacity "'/><bsdf type='diffuse' id='grey'/></bsdf>"
 
 // `path` drops what a path brought that met only surfaces that let it pass, as the format's renderer does: 0.702 of the light
@@ -91,7 +96,7 @@ static void test_light(void **state) {
     (void)state;
     for (int i = 0; i < 4; i++) {
         Wall wall = wall_open(names[i], SKY, i < 3 ? NET("0.4") : NET("1"));
-        slope[i] = 0.5 * slope_of(wall, "grey.reflectance.value", 3, mean + i);
+        slope[i] = 0.5 * slope_of(wall, "grey.reflectance.value", 3, 4096, mean + i);
         wall_close(wall);
     }
     near("volpath", mean[1], 0.2, 0.002);
@@ -116,8 +121,8 @@ static void test_opacity(void **state) {
         Wall bulb = wall_open("path", BULB, function), sky = wall_open("path", SKY, function);
         Wall closed = wall_open("path", BULB, NET("1"));
         double full, expected = 0, slope = 0;
-        slope_of(closed, "grey.reflectance.value", 3, &full);
-        near("under a bulb", slope_of(bulb, "net.opacity.value", 1, &mean), 2 * o * full, 0.01 * full);
+        slope_of(closed, "grey.reflectance.value", 3, 4096, &full);
+        near("under a bulb", slope_of(bulb, "net.opacity.value", 1, 4096, &mean), 2 * o * full, 0.01 * full);
         near("under a bulb, mean", mean, o * o * full, 0.01 * full);
         enum { STEPS = 2000 };
         for (int k = 0; k < STEPS; k++) {
@@ -126,11 +131,36 @@ static void test_opacity(void **state) {
             expected += z / STEPS * o * (o * w + 1 - w);
             slope += z / STEPS * (o * w + 1 - w + o * w + o * (o - 1) * dw);
         }
-        near("under a sky", slope_of(sky, "net.opacity.value", 1, &again), slope, 0.02);
+        near("under a sky", slope_of(sky, "net.opacity.value", 1, 4096, &again), slope, 0.02);
         near("under a sky, mean", again, expected, 0.01);
         wall_close(bulb);
         wall_close(sky);
         wall_close(closed);
+    }
+}
+
+// Three nets and a wall behind each other, the first one lit: of what it reflects, o A, as much is kept as paths scatter later on,
+// K_k = o + (1 - o) 0.95 K_(k+1), where roulette takes a twentieth at each vertex.
+static void test_stack(void **state) {
+    static const char *const opacities[] = {"0.02", "0.3", "0.98"};
+    double full;
+    (void)state;
+    Wall closed = wall_open("path", BULB, NET("1"));
+    slope_of(closed, "grey.reflectance.value", 3, 4096, &full);
+    wall_close(closed);
+    for (int i = 0; i < 3; i++) {
+        double o = i == 0 ? 0.02 : i == 1 ? 0.3 : 0.98, kept = 1, dkept = 0, mean;
+        char function[2048];
+        snprintf(function, sizeof function, NET("%s") NEXT_WALL("4") "<ref id='net'/>" NEXT_WALL("5") "<ref id='net'/>"
+                 NEXT_WALL("6") "<bsdf type='diffuse'/>", opacities[i]);
+        for (int k = 0; k < 3; k++) {
+            dkept = 1 - 0.95 * kept + (1 - o) * 0.95 * dkept;
+            kept = o + (1 - o) * 0.95 * kept;
+        }
+        Wall wall = wall_open("path", BULB, function);
+        near("stack", slope_of(wall, "net.opacity.value", 1, 65536, &mean), full * (kept + o * dkept), 0.02 * full);
+        near("stack, mean", mean, full * o * kept, 0.01 * full);
+        wall_close(wall);
     }
 }
 
@@ -169,7 +199,7 @@ static void test_refusals(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_light), cmocka_unit_test(test_opacity),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_light), cmocka_unit_test(test_opacity), cmocka_unit_test(test_stack),
                                        cmocka_unit_test(test_refusals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
