@@ -321,7 +321,7 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
     }
     *edge = *e;
     *number = (float)weight;
-    *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_MARK;
+    *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_MARK || e->kind == EDGE_TERMINATOR;
     return REY_OK;
 }
 

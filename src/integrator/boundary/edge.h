@@ -39,6 +39,11 @@ typedef struct EdgePoint {
     Vec2 uv;
 } EdgePoint;
 
+// How narrow what is looked for on the film may be [pixels]: rounding of directions is some hundred times smaller.
+KFN real film_resolution(const SensorRecord *sensor) {
+    return sensor->width > 25 ? (real)4e-6 * (real)sensor->width : (real)1e-4;
+}
+
 // Which sample of its random numbers a slot stands for.
 KFN void slot_number(Tracer *t, int32_t k, int64_t number) {
     t->ws.pixel[k] = (int32_t)(number / BOUNDARY_PER_SET);

@@ -1,7 +1,7 @@
 // mirrored.h: the boundary term of what the sensor sees in smooth mirrors and through smooth glass. As for what it sees
 // itself, the picture jumps along curves of the film that move, but they are not known beforehand: an edge may be seen along
 // many chains, or none. They are looked for on the film: short strips of random length, place and direction, at whose ends
-// the lines of sight (sightline.h) part behind their first vertices, are halved until the place where they do is known.
+// the lines of sight (sightline.h) part, are halved until a place where they do so behind their first vertices is known.
 // Strips of length r cross a curve dl times with the probability 2 r dl / (pi area). A strip may cross several curves, or one
 // twice, and finds one at most: the probability that a strip across a place finds it is estimated by repeating that, which is
 // one over it on average. How fast the curve moves follows from what the lines meet there (crossing.h).
@@ -28,8 +28,7 @@ typedef struct Strips {
 static Strips strips_of(const Tracer *t) {
     const PathJob *job = t->job;
     Strips s = {.x = (real)job->x, .y = (real)job->y, .width = (real)job->width, .height = (real)job->height};
-    // Rounding of directions is some hundred times smaller.
-    s.end = t->sensor->width > 25 ? (real)4e-6 * (real)t->sensor->width : (real)1e-4;
+    s.end = film_resolution(t->sensor);
     double sum = 0;
     for (int k = 0; k < STRIP_LENGTHS; k++) {
         s.length[k] = (real)ldexp(LONGEST_STRIP, -k);
@@ -77,10 +76,12 @@ static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again
     return strip_around(x, y, way * (cosine * nx - sine * ny), way * (cosine * ny + sine * nx), length, v.y * length);
 }
 
+enum { LINES_ALIKE = -1 };
+
 // The first vertex at which two lines of sight part because they meet different surfaces there, or different fields of one's
-// textures. 0: none, or what the sensor sees itself, or they are mirrored or refracted differently.
+// textures: 0 is what the sensor sees itself. LINES_ALIKE: none, or they are mirrored or refracted differently.
 static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *a, const Sightline *b, Mask m) {
-    Int level = i_set(0);
+    Int level = i_set(LINES_ALIKE);
     for (int32_t i = 0; i < a->last && i < b->last; i++) {
         Mask same = mi_eq(a->hit[i].shape, b->hit[i].shape) & mi_eq(a->hit[i].prim, b->hit[i].prim) &
                     mi_eq(a->hit[i].instance, b->hit[i].instance) & mi_eq(a->behind[i], b->behind[i]);
@@ -116,24 +117,40 @@ static void strip_look(Tracer *t, const SampleKey *key, Vec2 lens, const Strip *
     sightline_trace(t, key, lens, s->x[end], s->y[end], m, line);
 }
 
-// Halves strips until their ends lie next to where the lines part; returns the levels, 0 where they never do.
+// Where a strip's ends part, as far as something moves up to there. At level 0 another curve may lie between them.
+static Int strip_level(const Tracer *t, const BoundaryJob *b, const Sightline line[2], Mask m) {
+    Int level = lines_part(t, b, line, line + 1, m & (mi_lt(i_set(0), line[0].turns) | mi_lt(i_set(0), line[1].turns)));
+    Mask deep = mi_lt(i_set(0), level), moves = lines_move(t, b, line, level, m & deep);
+    return i_select(moves | (m & ~deep), level, i_set(LINES_ALIKE));
+}
+
+// Random bits of a strip's own, so that whether it finds a place depends on the strip alone.
+static UInt strip_bits(const Strip *s) {
+    const Float grid = f_set(65536);
+    UInt4 v = {(UInt)i_from_f(s->x[0] * grid), (UInt)i_from_f(s->y[0] * grid), (UInt)i_from_f(s->x[1] * grid),
+               (UInt)i_from_f(s->y[1] * grid)};
+    return rng_hash4(v).x;
+}
+
+// Halves strips until their ends lie next to where the lines part behind their first vertices; returns the levels, 0 or less
+// where they never do. Of two halves whose ends part, that is kept in which they do so behind their first vertices, or else
+// either: outlines and edges of the mirror hide what is beside them.
 static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 lens, real end, Strip *s,
                                  Mask m) {
     Sightline line[2], middle;
+    UInt bits = strip_bits(s);
     strip_look(t, key, lens, s, 0, m, line);
-    m = m & mi_lt(i_set(0), line[0].turns);
     strip_look(t, key, lens, s, 1, m, line + 1);
-    Int level = lines_part(t, b, line, line + 1, m);
-    m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
-    for (;;) {
-        Mask open = m & mi_lt(i_set(0), level) & m_gt(s->length, f_set(end));
+    for (Int level = strip_level(t, b, line, m);; bits = bits >> 1) {
+        Mask open = m & mi_lt(i_set(LINES_ALIKE), level) & m_gt(s->length, f_set(end));
         if (!m_any(open)) {
-            return i_select(lines_move(t, b, line, level, m), level, i_set(0));
+            return i_select(lines_move(t, b, line, level, m & mi_lt(i_set(0), level)), level, i_set(0));
         }
         Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]);
         sightline_trace(t, key, lens, x, y, open, &middle);
         Int before = lines_part(t, b, line, &middle, open), behind = lines_part(t, b, &middle, line + 1, open);
-        Mask first = open & mi_lt(i_set(0), before), second = open & ~first;
+        Mask either = mi_eq(behind, i_set(0)) & mi_eq((Int)bits & 1, i_set(0)), only = mi_lt(behind, i_set(0));
+        Mask first = open & (mi_lt(i_set(0), before) | (mi_eq(before, i_set(0)) & (either | only))), second = open & ~first;
         sightline_take(line + 1, &middle, first);
         sightline_take(line, &middle, second);
         s->x[1] = f_select(first, x, s->x[1]);
@@ -207,12 +224,8 @@ static int32_t strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         Strip s = strip_sample(all, &own);
         Sightline line[2];
         strip_look(t, &key, lens, &s, 0, m, line);
-        m = m & mi_lt(i_set(0), line[0].turns);
-        if (m_any(m)) {
-            strip_look(t, &key, lens, &s, 1, m, line + 1);
-            Int level = lines_part(t, b, line, line + 1, m);
-            m = lines_move(t, b, line, level, m & mi_lt(i_set(0), level));
-        }
+        strip_look(t, &key, lens, &s, 1, m, line + 1);
+        m = m & mi_lt(i_set(LINES_ALIKE), strip_level(t, b, line, m));
         i_compress(kept + kept_count, slot, m);
         kept_count += m_count(m);
     }

@@ -11,6 +11,9 @@
 // Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
 #define PRIMARY_STEP 2e-3f
 
+// Half the angle between the directions from which the two paths of a terminator come to it.
+#define PRIMARY_TURN 1e-4f
+
 // Dimensions of its own random numbers; the two paths draw theirs like those of the camera.
 #define DIMENSION_EDGE 0x80000001u
 
@@ -22,8 +25,15 @@ typedef struct PrimarySample {
     Vec3 n;         // normal of the plane of edge and view: what moves along it moves the edge on the film
     Float nx, ny;   // the side of the edge that n points to, on the film, unit
     Float weight;   // of dL times the velocity along n, over the density
+    Float step;     // distance of the two paths from the edge [pixels]
     Mask silhouette, m;
 } PrimarySample;
+
+// Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
+static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e) {
+    Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
+    return f_select(smooth & m_set(b->chains), f_set(2 * film_resolution(t->sensor)), f_set(PRIMARY_STEP));
+}
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
     SampleKey key = slot_key(t, slot);
@@ -42,6 +52,7 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->nx = f_copysign(rcp, turn) * -along.y;
     out->ny = f_copysign(rcp, turn) * along.x;
     out->weight = f_abs(turn) * f_safe_rcp(e.probability);
+    out->step = primary_step(t, b, &e);
     out->silhouette = edge_is_silhouette(t->scene, b, &e, n, s.d);
     out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
              m_gt(out->weight, f_set(0)) & (out->silhouette | e.crease);
@@ -54,14 +65,15 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->n = n;
 }
 
-// The ray of one of the two paths of a sample, on the side of the edge that `step` says [pixels].
-KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real step) {
+// The ray of one of the two paths of a sample, by the side of the edge: -1 or 1, or 0 for the edge itself.
+KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real side) {
+    Float step = side * s->step;
     return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
 }
 
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
 static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
-    const Ray rays[2] = {primary_ray(t, s, -PRIMARY_STEP).ray, primary_ray(t, s, PRIMARY_STEP).ray};
+    const Ray rays[2] = {primary_ray(t, s, -1).ray, primary_ray(t, s, 1).ray};
     Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~s->edge.mark), mark = m & s->edge.mark;
     if (m_any(mark)) {
         // Paths beside it start on its surface, also where the outline is nearer than their step.
@@ -109,7 +121,7 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
         f_store(t->ws.film_x + k, s.seen.x);
         f_store(t->ws.film_y + k, s.seen.y);
         for (int side = 0; side < 2; side++) {
-            SensorRay r = primary_ray(t, &s, side ? PRIMARY_STEP : -PRIMARY_STEP);
+            SensorRay r = primary_ray(t, &s, side ? 1 : -1);
             // Lanes beyond the count carry rays that end at once.
             r.ray.tmax = f_zero_unless(m_first_n(count - k), r.ray.tmax);
             path_begin(t, side * half + k, slot + side * half, &r.ray, r.weight);
@@ -122,6 +134,22 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
     t->job->paths += 2 * count;
 }
 
+// The directions of two paths, k and half + k, that meet a terminator's point from before and from behind its shading normal: what
+// a mirror makes of such a ray dips below the surface at once, which no step over the surface would resolve.
+static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t half, Mask m) {
+    Paths *p = &t->ws.paths[0];
+    Mask above = m_gt(v3_dot(s->edge.rise, s->n), f_set(0));
+    for (int side = 0; side < 2; side++) {
+        int32_t at = side * half + k;
+        Vec3 d = record_v3(p->dx, p->dy, p->dz, at), n = s->edge.normal;
+        Float turn = f_select(side ? above : ~above, f_set(-PRIMARY_TURN), f_set(PRIMARY_TURN));
+        d = v3_select(m, v3_normalize(v3_madd(d, turn - v3_dot(d, n), n)), d);
+        f_store(p->dx + at, d.x);
+        f_store(p->dy + at, d.y);
+        f_store(p->dz + at, d.z);
+    }
+}
+
 // Finds the first vertices of those paths. Beside the outline of a round surface its normal turns with the root of the distance,
 // which no step would resolve: there the vertex is the point that is all but on the outline. Beside marks it is on their surface.
 static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Segments *q, int32_t count, int32_t half) {
@@ -130,7 +158,8 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         PrimarySample s;
         primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
         Mask above = m_gt(edge_first_rise(&s.edge, s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
-        for (int side = 0; side < 2 && m_any(round | s.edge.mark); side++) {
+        Mask turns = m & m_gt(v3_dot(s.edge.normal, s.edge.normal), f_set(0));
+        for (int side = 0; side < 2 && m_any(round | s.edge.mark | turns); side++) {
             int32_t at = side * half + k;
             Mask inside = round & (side ? above : ~above);
             const Workspace *ws = &t->ws;
@@ -142,7 +171,11 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
                        i_select(inside, s.edge.hit.instance, i_load(ws->hit_instance + at))};
             Hit beside = hit_select(side ? above : ~above, s.edge.beside, s.edge.beside + 1);
             hit = hit_select(m & s.edge.mark, &beside, &hit);
+            hit = hit_select(turns, &s.edge.hit, &hit);
             hit_store(t, at, &hit);
+        }
+        if (m_any(turns)) {
+            primary_turn(t, &s, k, half, turns);
         }
         nudges_store(&s.edge, above, q, k, half + k);
     }
