@@ -154,7 +154,7 @@ static const Motion motions[] = {
     {"seen_bulge.xml", "bulge.to_world", SHIFT, {0.3f, 1, 0.5f}, 0.02, 1},
     {"seen_tiles.xml", "ball.to_world", TURN, {0.3f, 1, 0.4f}, 4, 4},
     {"seen_tiles.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 4},
-    {"seen_tiles.xml", "coin.to_world", TURN, {0, 0.3f, 1}, 2, 6},
+    {"seen_tiles.xml", "coin.to_world", TURN, {0, 0.3f, 1}, 2.5, 3},
     {"smooth_seen.xml", "ball.positions", SHEAR, {0}, 0.02, 1},
     {"smooth_seen.xml", "mirror.to_world", TURN, {0.2f, 1, 0.1f}, 0.5, 1},
     {"smooth_hill.xml", "hill.positions", SHEAR, {0}, 0.02, 1},
