@@ -79,6 +79,8 @@ static void test_refusals(void **state) {
         {POINT("<spectrum type='d65' name='intensity'><rgb name='color' value='1, 1, 1'/>"
                "<texture type='checkerboard' name='nested'/></spectrum>"),
          "either a 'color' or one texture"},
+        {POINT("<texture type='checkerboard' name='intensity'/>"), "'intensity' of 'point' is one colour or spectrum"},
+        {"<emitter type='constant'><texture type='checkerboard' name='radiance'/></emitter>", "is one colour or spectrum"},
     };
     rey_context *ctx;
     assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
@@ -136,9 +138,9 @@ static void test_spectra(void **state) {
                  "lamp.intensity", 3, (float[]){2, 2, 2});
     expect_numbers(ctx, POINT("<spectrum type='d65' name='intensity'><rgb name='color' value='1, 2, 3'/></spectrum>"),
                  "lamp.intensity", 3, (float[]){1, 2, 3});
-    expect_numbers(ctx, POINT("<spectrum type='d65' name='intensity'><float name='scale' value='2'/>"
-                            "<texture type='checkerboard' name='nested'/></spectrum>"),
-                 "lamp.intensity.color0", 3, (float[]){0.4f, 0.4f, 0.4f});
+    expect_numbers(ctx, "<shape type='rectangle'><emitter type='area' id='lamp'><spectrum type='d65' name='radiance'>"
+                        "<float name='scale' value='2'/><texture type='checkerboard' name='nested'/></spectrum></emitter></shape>",
+                 "lamp.radiance.color0", 3, (float[]){0.4f, 0.4f, 0.4f});
     expect_numbers(ctx, POINT("<spectrum type='blackbody' name='intensity'><integer name='temperature' value='4000'/></spectrum>"),
                  "lamp.intensity.temperature", 1, (float[]){4000});
     rey_context_destroy(ctx);

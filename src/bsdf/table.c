@@ -48,6 +48,8 @@ bool rey_bsdf_bends(int kind) {
     return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_PLASTIC || rey_bsdf_opens(kind);
 }
 
+bool rey_bsdf_mirrors(int kind) { return rey_bsdf_bends(kind) && kind != BSDF_MASK && kind != BSDF_NULL; }
+
 bool rey_bsdf_refracts(int kind) { return kind == BSDF_DIELECTRIC; }
 
 bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }

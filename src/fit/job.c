@@ -269,7 +269,7 @@ static rey_result read_terms(Job *job, const YamlNode *node, void *target) {
     job->terms_at = rey_job_place(node);
     *(int *)target = rey_terms_of(text, &wrong);
     return *(int *)target ? REY_OK
-                          : rey_job_fail(job, node, "'%.*s' is no term; expected some of interior,primary,indirect",
+                          : rey_job_fail(job, node, "'%.*s' is no term; expected some of interior,primary,indirect,specular",
                                          (int)strcspn(wrong, ","), wrong);
 }
 

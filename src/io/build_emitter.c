@@ -197,6 +197,18 @@ static Param place_param(const Builder *b, const EmitterKind *kind, const Emitte
     return p;
 }
 
+// Lights without an extent over which a picture could vary, and skies of one colour, have one spectrum.
+static rey_result check_spectrum(Builder *b, rey_xml_node *node, const EmitterKind *kind, const EmitterParam *row,
+                                 int32_t texture) {
+    bool one = strcmp(kind->name, "constant") == 0 || strcmp(kind->name, "point") == 0 || strcmp(kind->name, "spot") == 0 ||
+               strcmp(kind->name, "directional") == 0;
+    int form = ARRAY_AT(b->scene->build.textures, TextureNode, texture).kind;
+    return !one || row->type != EMITTER_PARAM_EMISSION || form == TEXTURE_CONSTANT || form == TEXTURE_BLACKBODY
+               ? REY_OK
+               : rey_xml_fail(b->ctx, rey_xml_place(node, row->name), REY_ERROR_SCENE,
+                              "'%s' of '%s' is one colour or spectrum for all directions, not a picture", row->name, kind->name);
+}
+
 // Brings the rows of the kind's parameters into the record's slots.
 static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *kind, int32_t id, const char *path,
                              EmitterRecord *e) {
@@ -210,6 +222,7 @@ static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *
         case EMITTER_PARAM_EMISSION:
         case EMITTER_PARAM_COLOUR:
             TRY(colour_slot(b, node, row, name, slot));
+            TRY(check_spectrum(b, node, kind, row, *slot));
             break;
         case EMITTER_PARAM_REAL:
             TRY(number_slot(b, node, row, (double)row->value, name, slot));

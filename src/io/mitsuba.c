@@ -148,6 +148,16 @@ static bool bends_within(const rey_scene *scene, int32_t bsdf) {
     return bends;
 }
 
+// Whether normals turn paths at it: whatever passes undeviated does not depend on them.
+static bool mirrors_within(const rey_scene *scene, int32_t bsdf) {
+    const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
+    bool mirrors = rey_bsdf_mirrors(node->kind);
+    for (int i = 0; i < MAX_CHILDREN && !mirrors; i++) {
+        mirrors = node->child[i] >= 0 && mirrors_within(scene, node->child[i]);
+    }
+    return mirrors;
+}
+
 // Whether a texture turns the normals of a function that bends paths.
 static bool texture_turns_mirror(const rey_scene *scene, int32_t texture) {
     bool turns = false;
@@ -212,7 +222,7 @@ static void name_further_terms(Builder *b) {
         p->terms |= p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) ? moving & REY_TERM_SPECULAR : 0; // its shadows
         int32_t texture = p->texture >= 0 ? p->texture : p->to_uv;
         bool mirror = p->normals >= 0
-                          ? bends_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
+                          ? mirrors_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
                           : (p->terms & REY_TERM_TERMINATOR) && texture >= 0 && texture_turns_mirror(scene, texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
         p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them

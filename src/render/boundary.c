@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
+#include "emitter/table.h"
 #include "render/blame.h"
 #include "render/boundary_edges.h"
 #include "render/corners.h"
@@ -123,6 +124,22 @@ static rey_result check_lines(const Render *r, int term) {
     return unknown ? refuse(r->scene, term, unknown, name) : REY_OK;
 }
 
+// What `direct` leaves out where one of its numbers of samples is 0, null where that is nothing.
+static const char *left_out(const SceneView *view, int term) {
+    bool points = false;
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        points = points || rey_emitter_kinds[view->emitters[i].kind].form == EMITTER_IS_DELTA;
+    }
+    if (!view->split || term == REY_TERM_PRIMARY) {
+        return NULL;
+    }
+    return view->light_samples == 0 && points
+               ? "that 'direct' without emitter_samples never meets lights at a point or with one direction"
+           : view->scatter_samples == 0 && has_chains(view)
+               ? "that 'direct' without bsdf_samples sees nothing in mirrors and glass"
+               : NULL;
+}
+
 // Whether a term of a selection can be computed; records why not.
 static rey_result boundary_check(const Render *r, int term) {
     rey_scene *scene = r->scene;
@@ -131,6 +148,9 @@ static rey_result boundary_check(const Render *r, int term) {
     char name[OBJECT_NAME];
     if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic", NULL);
+    }
+    if (left_out(view, term)) {
+        return refuse(scene, term, left_out(view, term), NULL);
     }
     rey_result result = r->lines ? check_lines(r, term) : REY_OK;
     if (result != REY_OK || !(r->job.any_motion || r->job.any_places)) {
@@ -244,6 +264,10 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
+    }
+    const int32_t depth = r->scene->view.max_depth;
+    if (kind != BOUNDARY_PRIMARY && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
+        edge_count = 0;
     }
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,

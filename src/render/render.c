@@ -314,10 +314,10 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
                                    rey_selection selection, int32_t mode) {
     rey_result result = (request.asked ? render_plan : rey_render_begin)(r, scene, def, mode, 3);
     r->request = request;
-    if (result == REY_OK && scene->view.colour_is_depth) {
-        result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                          "the integrator '%s' has no derivatives, 'path' has%s", scene->integrator,
-                          scene->integrators.count > 1 ? ": of several, put one such first" : "");
+    const Integrator *first = scene->integrators.count ? &ARRAY_AT(scene->integrators, Integrator, 0) : NULL;
+    if (result == REY_OK && (scene->view.colour_is_depth || (first && strcmp(first->name, "aov") == 0))) { // which holds none
+        result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the integrator '%s' has no derivatives, 'path' has%s",
+                          scene->integrator, scene->integrators.count > 1 ? ": of several, put one such first" : "");
     }
     int needed = 0;
     if (result == REY_OK) {
