@@ -155,6 +155,9 @@ void cli_warn_nonfinite(const rey_stats *stats);
 void cli_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // The same of a session, kept for "notes" of --json.
 void cli_session_note(Session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Adds a name to a list, "A, B, C and 2 more"; *count: of those so far. cli_list_end says how many are not shown.
+void cli_list_add(char *text, size_t size, int *count, const char *name);
+void cli_list_end(char *text, size_t size, int count);
 // Says which parameters the session's picture does not depend on, in one line for all of them: a derivative of 0 may be a
 // misunderstanding.
 rey_result cli_note_unreached(Session *session, const int *params, int count);

@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SHOWN_NAMES = 3 }; // of a note
+enum { SHOWN_NAMES = 3 }; // of a list
 
 static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
 
@@ -324,15 +324,14 @@ void cli_session_close(Session *session) {
     session->note_count = 0;
 }
 
-// Adds a name to "A, B, C and 2 more".
-static void add_name(char *text, size_t size, int *count, const char *name) {
+void cli_list_add(char *text, size_t size, int *count, const char *name) {
     size_t used = strlen(text);
     if ((*count)++ < SHOWN_NAMES) {
         snprintf(text + used, size - used, "%s%s", used ? ", " : "", name);
     }
 }
 
-static void end_names(char *text, size_t size, int count) {
+void cli_list_end(char *text, size_t size, int count) {
     size_t used = strlen(text);
     if (count > SHOWN_NAMES) {
         snprintf(text + used, size - used, " and %d more", count - SHOWN_NAMES);
@@ -350,13 +349,13 @@ rey_result cli_note_unreached(Session *s, const int *params, int count) {
         rey_param_info info;
         result = rey_param_get_info(s->scene, params[i], &info);
         if (!result && !used[params[i]]) {
-            add_name(unused, sizeof unused, &unused_count, info.name);
+            cli_list_add(unused, sizeof unused, &unused_count, info.name);
         } else if (!result && !reached[params[i]]) {
-            add_name(elsewhere, sizeof elsewhere, &elsewhere_count, info.name);
+            cli_list_add(elsewhere, sizeof elsewhere, &elsewhere_count, info.name);
         }
     }
-    end_names(unused, sizeof unused, unused_count);
-    end_names(elsewhere, sizeof elsewhere, elsewhere_count);
+    cli_list_end(unused, sizeof unused, unused_count);
+    cli_list_end(elsewhere, sizeof elsewhere, elsewhere_count);
     if (!result && unused_count) {
         cli_session_note(s, "nothing in the scene uses %s: %s 0", unused,
                          unused_count == 1 ? "its derivative is" : "their derivatives are");

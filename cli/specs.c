@@ -7,8 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { SHOWN_NAMES = 3 };
-
 // NAME and the operation of a spec.
 static rey_result add_spec(rey_context *ctx, const char *name, const char *op, Array *specs) {
     size_t size = strlen(name) + strlen(op) + 1;
@@ -48,15 +46,11 @@ static rey_result expand(Session *s, const char *spec, bool listing, Array *spec
         }
         if (listing || cli_direction_fits(&info, spec)) {
             result = add_spec(s->ctx, info.name, spec + length, specs);
-        } else if (left_out++ < SHOWN_NAMES) {
-            size_t used = strlen(passed);
-            snprintf(passed + used, sizeof passed - used, "%s%s", used ? ", " : "", info.name);
+        } else {
+            cli_list_add(passed, sizeof passed, &left_out, info.name);
         }
     }
-    if (left_out > SHOWN_NAMES) {
-        size_t used = strlen(passed);
-        snprintf(passed + used, sizeof passed - used, " and %d more", left_out - SHOWN_NAMES);
-    }
+    cli_list_end(passed, sizeof passed, left_out);
     return result || specs->count > before ? result : nothing_fits(s->ctx, spec, pattern, passed);
 }
 

@@ -3,7 +3,7 @@
 
 #include "emitter/light.h"
 
-#define CONSTANT_PARAMS(P) P(EMISSION, radiance, 1, 0, INFINITY, "radiance from everywhere", "W/(m^2 sr)")
+#define CONSTANT_PARAMS(P) P(SPECTRUM, radiance, 1, 0, INFINITY, "radiance from everywhere", "W/(m^2 sr)")
 EMITTER_SLOTS(Constant, CONSTANT_PARAMS)
 
 KFN LightSample constant_sample(const SceneView *scene, const Light *l, Vec3 ref, Vec2 u) {

@@ -4,7 +4,7 @@
 #include "emitter/light.h"
 
 #define DIRECTIONAL_PARAMS(P)                                                                                          \
-    P(EMISSION, irradiance, 1, 0, INFINITY, "irradiance of a facing plane", "W/m^2")                                   \
+    P(SPECTRUM, irradiance, 1, 0, INFINITY, "irradiance of a facing plane", "W/m^2")                                   \
     P(AXIS, to_world, 0, -INFINITY, INFINITY, "turns +z into the direction in which the light travels", "")
 EMITTER_SLOTS(Directional, DIRECTIONAL_PARAMS)
 

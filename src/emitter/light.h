@@ -36,7 +36,8 @@ typedef struct LightMove {
 KFN LightMove light_move_zero(void) { return (LightMove){v3_zero(), f_set(0), {f_set(0), f_set(0)}, v3_zero()}; }
 
 // A kind's parameters as rows P(type, field, default, low, high, description, unit):
-//   EMISSION  colour texture of radiance, intensity, irradiance    COLOUR    colour texture that filters it
+//   SPECTRUM  colour of intensity, radiance, irradiance, no picture
+//   EMISSION  colour texture of radiance, irradiance               COLOUR    colour texture that filters it
 //   REAL      constant number                                      FRACTION  the same; its default is relative to the row before
 //   IMAGE     environment picture from `filename`                  FOV       horizontal field of view of a camera; no parameter
 //   POSITION  three numbers: `position`, or from to_world          POSE      to_world, whose motion moves shadows

@@ -4,7 +4,7 @@
 #include "emitter/light.h"
 
 #define POINT_PARAMS(P)                                                                                                \
-    P(EMISSION, intensity, 1, 0, INFINITY, "radiant intensity", "W/sr")                                                \
+    P(SPECTRUM, intensity, 1, 0, INFINITY, "radiant intensity", "W/sr")                                                \
     P(POSITION, position, 0, -INFINITY, INFINITY, "position of the light", "scene units")
 EMITTER_SLOTS(Point, POINT_PARAMS)
 

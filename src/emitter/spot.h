@@ -6,7 +6,7 @@
 #include "emitter/light.h"
 
 #define SPOT_PARAMS(P)                                                                                                 \
-    P(EMISSION, intensity, 1, 0, INFINITY, "radiant intensity on the axis", "W/sr")                                    \
+    P(SPECTRUM, intensity, 1, 0, INFINITY, "radiant intensity on the axis", "W/sr")                                    \
     P(REAL, cutoff_angle, 20, 1e-3f, 89.9f, "angle from the axis beyond which nothing is emitted", "degrees")          \
     P(FRACTION, beam_width, 0.75f, 0, 89.9f, "angle from the axis up to which the intensity is whole", "degrees")             \
     P(COLOUR, texture, 1, 0, INFINITY, "factor on the intensity, over the cone", "")                                   \

@@ -5,6 +5,7 @@
 
 // The forms of parameter rows (light.h).
 typedef enum EmitterParamType {
+    EMITTER_PARAM_SPECTRUM,
     EMITTER_PARAM_EMISSION,
     EMITTER_PARAM_COLOUR,
     EMITTER_PARAM_REAL,

@@ -27,7 +27,7 @@ static int32_t family_sort(const SceneView *view, const EmitterRecord *e) {
     int32_t black = 0;
     for (int i = 0; i < kind->param_count; i++) {
         EmitterParamType type = kind->params[i].type;
-        bool colour = type == EMITTER_PARAM_EMISSION || type == EMITTER_PARAM_COLOUR;
+        bool colour = type <= EMITTER_PARAM_COLOUR;
         const TextureNode *t = view->textures + e->slot[i];
         if (colour && ((t->kind != TEXTURE_CONSTANT && t->kind != TEXTURE_BLACKBODY) || t->channels != 3)) {
             return -1;

@@ -19,13 +19,20 @@ static const char *emitter_word(void *user, int i) {
 // ---- parameters --------------------------------------------------------------------------------------------------
 
 static rey_result colour_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, const char *path, int32_t *out) {
-    rey_colour_use colour = p->type == EMITTER_PARAM_EMISSION ? REY_COLOUR_EMISSION : REY_COLOUR_UNBOUNDED;
+    rey_colour_use colour = p->type <= EMITTER_PARAM_EMISSION ? REY_COLOUR_EMISSION : REY_COLOUR_UNBOUNDED;
     TextureUse use = {colour, false, p->low, p->high, p->unit, p->text, 0, NULL};
     double value = (double)p->value;
     TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
-    return !build_is_volume(b, *out) ? REY_OK
-                                     : rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_UNSUPPORTED,
-                                                    "'%s' of a light cannot be a volume", p->name);
+    int kind = ARRAY_AT(b->scene->build.textures, TextureNode, *out).kind;
+    if (build_is_volume(b, *out)) {
+        return rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_UNSUPPORTED, "'%s' of a light cannot be a volume",
+                            p->name);
+    }
+    bool one = kind == TEXTURE_CONSTANT || kind == TEXTURE_BLACKBODY;
+    return one || p->type != EMITTER_PARAM_SPECTRUM
+               ? REY_OK
+               : rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_SCENE,
+                              "'%s' of '%s' is one colour or spectrum for all directions, not a picture", p->name, node->type);
 }
 
 static rey_result number_slot(Builder *b, rey_xml_node *node, const EmitterParam *p, double value, const char *path,
@@ -197,18 +204,6 @@ static Param place_param(const Builder *b, const EmitterKind *kind, const Emitte
     return p;
 }
 
-// Lights without an extent over which a picture could vary, and skies of one colour, have one spectrum.
-static rey_result check_spectrum(Builder *b, rey_xml_node *node, const EmitterKind *kind, const EmitterParam *row,
-                                 int32_t texture) {
-    bool one = strcmp(kind->name, "constant") == 0 || strcmp(kind->name, "point") == 0 || strcmp(kind->name, "spot") == 0 ||
-               strcmp(kind->name, "directional") == 0;
-    int form = ARRAY_AT(b->scene->build.textures, TextureNode, texture).kind;
-    return !one || row->type != EMITTER_PARAM_EMISSION || form == TEXTURE_CONSTANT || form == TEXTURE_BLACKBODY
-               ? REY_OK
-               : rey_xml_fail(b->ctx, rey_xml_place(node, row->name), REY_ERROR_SCENE,
-                              "'%s' of '%s' is one colour or spectrum for all directions, not a picture", row->name, kind->name);
-}
-
 // Brings the rows of the kind's parameters into the record's slots.
 static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *kind, int32_t id, const char *path,
                              EmitterRecord *e) {
@@ -219,10 +214,10 @@ static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *
         Param place = place_param(b, kind, e, id, i);
         int32_t *slot = &e->slot[i];
         switch (row->type) {
+        case EMITTER_PARAM_SPECTRUM:
         case EMITTER_PARAM_EMISSION:
         case EMITTER_PARAM_COLOUR:
             TRY(colour_slot(b, node, row, name, slot));
-            TRY(check_spectrum(b, node, kind, row, *slot));
             break;
         case EMITTER_PARAM_REAL:
             TRY(number_slot(b, node, row, (double)row->value, name, slot));

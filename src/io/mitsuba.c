@@ -138,24 +138,14 @@ static rey_result build_child(Builder *b, rey_xml_child *child, int counts[REY_X
     }
 }
 
-// Whether a scattering function, itself or inside, has a smooth mirror, glass, or lets paths pass.
-static bool bends_within(const rey_scene *scene, int32_t bsdf) {
+// Whether a scattering function, or one inside of it, is of such a kind (bsdf/table.h). There is no view yet.
+static bool kind_within(const rey_scene *scene, int32_t bsdf, bool (*is)(int kind)) {
     const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
-    bool bends = rey_bsdf_bends(node->kind);
-    for (int i = 0; i < MAX_CHILDREN && !bends; i++) {
-        bends = node->child[i] >= 0 && bends_within(scene, node->child[i]);
+    bool within = is(node->kind);
+    for (int i = 0; i < MAX_CHILDREN && !within; i++) {
+        within = node->child[i] >= 0 && kind_within(scene, node->child[i], is);
     }
-    return bends;
-}
-
-// Whether normals turn paths at it: whatever passes undeviated does not depend on them.
-static bool mirrors_within(const rey_scene *scene, int32_t bsdf) {
-    const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
-    bool mirrors = rey_bsdf_mirrors(node->kind);
-    for (int i = 0; i < MAX_CHILDREN && !mirrors; i++) {
-        mirrors = node->child[i] >= 0 && mirrors_within(scene, node->child[i]);
-    }
-    return mirrors;
+    return within;
 }
 
 // Whether a texture turns the normals of a function that bends paths.
@@ -163,7 +153,7 @@ static bool texture_turns_mirror(const rey_scene *scene, int32_t texture) {
     bool turns = false;
     for (size_t i = 0; i < scene->build.bsdfs.count && !turns; i++) {
         const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, i);
-        if (!rey_bsdf_turns(node->kind) || !bends_within(scene, (int32_t)i)) {
+        if (!rey_bsdf_turns(node->kind) || !kind_within(scene, (int32_t)i, rey_bsdf_bends)) {
             continue;
         }
         for (int k = 0; k < MAX_SLOTS; k++) {
@@ -172,15 +162,6 @@ static bool texture_turns_mirror(const rey_scene *scene, int32_t texture) {
                                        : NULL;
             turns |= t && (node->slot[k] == texture || t->child[0] == texture || t->child[1] == texture);
         }
-    }
-    return turns;
-}
-
-static bool turns_within(const rey_scene *scene, int32_t bsdf) {
-    const BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
-    bool turns = node->turns;
-    for (int i = 0; i < MAX_CHILDREN && !turns; i++) {
-        turns = node->child[i] >= 0 && turns_within(scene, node->child[i]);
     }
     return turns;
 }
@@ -210,8 +191,8 @@ static void name_further_terms(Builder *b) {
     bool bends = false, turns = false;
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
-        bends |= bends_within(scene, shape->bsdf) && !only_separates(scene, shape);
-        turns |= turns_within(scene, shape->bsdf);
+        bends |= kind_within(scene, shape->bsdf, rey_bsdf_bends) && !only_separates(scene, shape);
+        turns |= kind_within(scene, shape->bsdf, rey_bsdf_turns);
     }
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
     for (size_t i = 0; i < scene->params.count; i++) {
@@ -222,7 +203,7 @@ static void name_further_terms(Builder *b) {
         p->terms |= p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) ? moving & REY_TERM_SPECULAR : 0; // its shadows
         int32_t texture = p->texture >= 0 ? p->texture : p->to_uv;
         bool mirror = p->normals >= 0
-                          ? mirrors_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf)
+                          ? kind_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf, rey_bsdf_mirrors)
                           : (p->terms & REY_TERM_TERMINATOR) && texture >= 0 && texture_turns_mirror(scene, texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
         p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them

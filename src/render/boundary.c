@@ -126,16 +126,15 @@ static rey_result check_lines(const Render *r, int term) {
 
 // What `direct` leaves out where one of its numbers of samples is 0, null where that is nothing.
 static const char *left_out(const SceneView *view, int term) {
-    bool points = false;
-    for (int64_t i = 0; i < view->emitters_count; i++) {
-        points = points || rey_emitter_kinds[view->emitters[i].kind].form == EMITTER_IS_DELTA;
-    }
     if (!view->split || term == REY_TERM_PRIMARY) {
         return NULL;
     }
-    return view->light_samples == 0 && points
-               ? "that 'direct' without emitter_samples never meets lights at a point or with one direction"
-           : view->scatter_samples == 0 && has_chains(view)
+    for (int64_t i = 0; i < view->emitters_count && view->light_samples == 0; i++) {
+        if (rey_emitter_kinds[view->emitters[i].kind].form == EMITTER_IS_DELTA) {
+            return "that 'direct' without emitter_samples never meets lights at a point or with one direction";
+        }
+    }
+    return view->scatter_samples == 0 && has_chains(view)
                ? "that 'direct' without bsdf_samples sees nothing in mirrors and glass"
                : NULL;
 }
@@ -149,8 +148,9 @@ static rey_result boundary_check(const Render *r, int term) {
     if (!boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic", NULL);
     }
-    if (left_out(view, term)) {
-        return refuse(scene, term, left_out(view, term), NULL);
+    const char *lacks = left_out(view, term);
+    if (lacks) {
+        return refuse(scene, term, lacks, NULL);
     }
     rey_result result = r->lines ? check_lines(r, term) : REY_OK;
     if (result != REY_OK || !(r->job.any_motion || r->job.any_places)) {

@@ -3,6 +3,7 @@
 
 #include "bsdf/table.h"
 #include "emitter/table.h"
+#include "render/blame.h"
 
 // Where a function stands: in one that lets a part of the light pass, and in one that turns the shading normal.
 typedef struct Place {
@@ -20,26 +21,11 @@ static bool texture_reads(const SceneView *view, int32_t id, const Param *p) {
            texture_reads(view, t->child[0], p) || texture_reads(view, t->child[1], p);
 }
 
-static bool lets_pass(const SceneView *view, const BsdfNode *bsdf) {
-    bool passes = rey_bsdf_opens(bsdf->kind);
-    for (int k = 0; k < MAX_CHILDREN && bsdf->child[k] >= 0; k++) {
-        passes = passes || lets_pass(view, view->bsdfs + bsdf->child[k]);
-    }
-    return passes;
-}
-
-static bool holds_thin_glass(const SceneView *view, const BsdfNode *bsdf) {
-    bool holds = rey_bsdf_tints(bsdf->kind);
-    for (int k = 0; k < MAX_CHILDREN && bsdf->child[k] >= 0; k++) {
-        holds = holds || holds_thin_glass(view, view->bsdfs + bsdf->child[k]);
-    }
-    return holds;
-}
-
 // Whether a parameter of a function decides in a way that is not known how much light is dropped.
-static bool gap_of_function(const SceneView *view, const BsdfNode *bsdf, const Param *p, Place place) {
-    const bool thin = holds_thin_glass(view, bsdf), turns = rey_bsdf_turns(bsdf->kind);
-    const bool shares = rey_bsdf_kinds[bsdf->kind].adapter && lets_pass(view, bsdf);
+static bool gap_of_function(const SceneView *view, int32_t id, const Param *p, Place place) {
+    const BsdfNode *bsdf = view->bsdfs + id;
+    const bool thin = rey_bsdf_holds(view, id, rey_bsdf_tints), turns = rey_bsdf_turns(bsdf->kind);
+    const bool shares = rey_bsdf_kinds[bsdf->kind].adapter && rey_bsdf_holds(view, id, rey_bsdf_opens);
     for (int k = 0; k < rey_bsdf_kinds[bsdf->kind].param_count; k++) {
         bool draws = place.lit && (shares ? place.turned || turns : place.shared && (turns || rey_bsdf_draws(bsdf->kind, k)));
         if ((thin || draws) && texture_reads(view, bsdf->slot[k], p)) {
@@ -50,7 +36,7 @@ static bool gap_of_function(const SceneView *view, const BsdfNode *bsdf, const P
     place.turned = place.turned || turns;
     bool gap = false;
     for (int k = 0; k < MAX_CHILDREN && bsdf->child[k] >= 0; k++) {
-        gap = gap || gap_of_function(view, view->bsdfs + bsdf->child[k], p, place);
+        gap = gap || gap_of_function(view, bsdf->child[k], p, place);
     }
     return gap;
 }
@@ -75,8 +61,8 @@ const char *rey_dropped_gap(const SceneView *view, const Param *p, int terms) {
         place.lit = place.lit || rey_emitter_kinds[view->emitters[i].kind].form != EMITTER_IS_DELTA;
         gap = gap || gap_of_light(view, view->emitters + i, p);
     }
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        gap = gap || gap_of_function(view, view->bsdfs + i, p, place);
+    for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
+        gap = gap || gap_of_function(view, i, p, place);
         gap = gap || (p->normals >= 0 && (place.lit || rey_bsdf_tints(view->bsdfs[i].kind)));
     }
     return moves ? "with hide_emitters, 'path' drops light of surfaces that let a part of it pass, also where this parameter moves "

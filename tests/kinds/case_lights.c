@@ -210,6 +210,7 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
         const EmitterParam *row = kind->params + i;
         int32_t *slot = &c->emitter.slot[i];
         switch (row->type) {
+        case EMITTER_PARAM_SPECTRUM:
         case EMITTER_PARAM_EMISSION:
             *slot = uniform(r) < 0.15 ? add_blackbody(c, r, i) : case_texture(c, r, &radiance, i, textured);
             break;
@@ -242,7 +243,7 @@ static bool can_gather(const KindCase *c, int light) {
     for (int i = 0; i < kind->param_count; i++) {
         EmitterParamType type = kind->params[i].type;
         const TextureNode *t = c->textures + c->emitter.slot[i];
-        if (type == EMITTER_PARAM_EMISSION || type == EMITTER_PARAM_COLOUR) {
+        if (type <= EMITTER_PARAM_COLOUR) {
             can &= (t->kind == TEXTURE_CONSTANT && t->channels == 3) || t->kind == TEXTURE_BLACKBODY;
         }
     }
