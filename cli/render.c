@@ -17,6 +17,20 @@ static void print_json(const Session *s, const rey_stats *stats) {
     json_end(&json);
 }
 
+// A black picture of a scene without light is what was asked for, and hardly what was meant.
+static void note_darkness(const Session *s, const float *image, int channels) {
+    rey_scene_info info;
+    rey_scene_get_info(s->scene, &info);
+    int64_t count = (int64_t)s->width * s->height * channels;
+    bool black = info.emitters == 0;
+    for (int64_t i = 0; i < count && black; i++) {
+        black = image[i] == 0 || i % channels >= 3;
+    }
+    if (black) {
+        cli_note("the picture is black: the scene has no emitter");
+    }
+}
+
 static rey_result render(Session *s, rey_stats *stats) {
     int channels = rey_film_channel_count(s->scene, s->def.sensor);
     float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, (size_t)channels * sizeof *image);
@@ -27,6 +41,9 @@ static rey_result render(Session *s, rey_stats *stats) {
     }
     result = result ? result : rey_render_film(s->scene, &s->def, image, stats);
     cli_progress_end(&s->progress);
+    if (!result) {
+        note_darkness(s, image, channels);
+    }
     if (!result && s->options->output) {
         result = cli_write_film(s->ctx, s->options->output, image, s->width, s->height, channels, names,
                                 rey_film_component(s->scene, s->def.sensor));

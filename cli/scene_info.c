@@ -110,13 +110,6 @@ static void print_info(const Session *s) {
     if (info.integrator[0]) {
         printf("%-17s %s, max_depth %d, rr_depth %d\n", "integrator", info.integrator, info.max_depth, info.rr_depth);
     }
-    if (rey_channel_count(s->scene) > 3) {
-        printf("%-17s", "channels");
-        for (int i = 0; i < rey_channel_count(s->scene); i++) {
-            printf(" %s", rey_channel_name(s->scene, i));
-        }
-        printf("\n");
-    }
     if (info.sensors > 0) {
         printf("%-17s %d\n", "samples per pixel", info.sample_count);
     }
@@ -126,7 +119,11 @@ static void print_info(const Session *s) {
             const char *id = rey_mitsuba_sensor_id(s->scene, i);
             char name[256];
             snprintf(name, sizeof name, "sensor %d%s%s%s", i, id ? " '" : "", id ? id : "", id ? "'" : "");
-            printf("%-17s %d x %d pixels\n", name, width, height);
+            printf("%-17s %d x %d pixels,", name, width, height);
+            for (int c = 0; c < rey_film_channel_count(s->scene, i); c++) {
+                printf(" %s", rey_film_channel_name(s->scene, i, c));
+            }
+            printf("\n");
         }
     }
     Lack lacks[MOST_LACKS];
@@ -145,6 +142,33 @@ static void json_missing(Json *json, const rey_scene_info *info) {
     json_array(json, "missing");
     for (int i = 0; i < count; i++) {
         json_string(json, NULL, lacks[i].name);
+    }
+    json_array_end(json);
+}
+
+static void json_sensors(Json *json, const Session *s) {
+    json_array(json, "films");
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        int width = 0, height = 0;
+        rey_scene_film_size(s->scene, i, &width, &height);
+        json_array(json, NULL);
+        json_integer(json, NULL, width);
+        json_integer(json, NULL, height);
+        json_array_end(json);
+    }
+    json_array_end(json);
+    json_array(json, "film_channels");
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        json_array(json, NULL);
+        for (int c = 0; c < rey_film_channel_count(s->scene, i); c++) {
+            json_string(json, NULL, rey_film_channel_name(s->scene, i, c));
+        }
+        json_array_end(json);
+    }
+    json_array_end(json);
+    json_array(json, "sensor_ids");
+    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
+        json_string(json, NULL, rey_mitsuba_sensor_id(s->scene, i));
     }
     json_array_end(json);
 }
@@ -177,21 +201,7 @@ static void print_info_json(const Session *s) {
     json_array_end(&json);
     json_number(&json, "sample_count", info.sensors ? info.sample_count : (double)NAN);
     json_missing(&json, &info);
-    json_array(&json, "films");
-    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
-        int width = 0, height = 0;
-        rey_scene_film_size(s->scene, i, &width, &height);
-        json_array(&json, NULL);
-        json_integer(&json, NULL, width);
-        json_integer(&json, NULL, height);
-        json_array_end(&json);
-    }
-    json_array_end(&json);
-    json_array(&json, "sensor_ids");
-    for (int i = 0; i < rey_scene_sensor_count(s->scene); i++) {
-        json_string(&json, NULL, rey_mitsuba_sensor_id(s->scene, i));
-    }
-    json_array_end(&json);
+    json_sensors(&json, s);
     json_array(&json, "notes");
     for (int i = 0; i < rey_scene_note_count(s->scene); i++) {
         json_string(&json, NULL, rey_scene_note(s->scene, i));

@@ -11,7 +11,8 @@ int main(int argc, char **argv) {
     rey_context *ctx = NULL;
     rey_scene *scene = NULL;
     int width, height, param, i;
-    if (argc != 4 || rey_context_create(NULL, &ctx) != REY_OK) { return 2; }
+    if (argc != 4) { fprintf(stderr, "usage: example SCENE.xml PARAMETER OUT.xml\n"); return 2; }
+    if (rey_context_create(NULL, &ctx) != REY_OK) { return 1; }
     CHECK(rey_scene_load(ctx, argv[1], NULL, 0, &scene));
     for (i = 0; i < rey_param_count(scene); i++) {
         rey_param_info info;

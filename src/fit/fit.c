@@ -170,7 +170,7 @@ static rey_result open_fit(Fit *fit) {
         result = rey_fit_check_derivatives(fit);
     }
     if (!result) {
-        result = rey_fit_note_unknowns(fit);
+        result = rey_fit_notes(fit);
     }
     if (!result) {
         result = allocate(fit);

@@ -1,4 +1,4 @@
-// notes.c: what is not wrong with the unknowns of a job and may be a mistake, told before the first iteration.
+// notes.c: what is not wrong with a job and may be a mistake, told before the first iteration.
 #include "fit/fit.h"
 
 #include "render/used.h"
@@ -42,13 +42,36 @@ static rey_result note_unreached(const Fit *fit) {
     return result;
 }
 
-rey_result rey_fit_note_unknowns(const Fit *fit) {
+// A relative loss weighs what is black by 1 / epsilon^2, and so what noise there is.
+static void note_black(const Fit *fit) {
+    int64_t count = 0, black = 0;
+    for (int v = 0; v < fit->job.view_count; v++) {
+        const FitView *view = fit->views + v;
+        for (int64_t i = 0; !fit->job.views[v].held_out && i < (int64_t)view->full_width * view->full_height; i++) {
+            const float *rgb = view->full_target + 3 * i;
+            bool seen = !view->full_mask || view->full_mask[i] > 0;
+            count += seen;
+            black += seen && rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
+        }
+    }
+    if (fit->job.loss == LOSS_RELATIVE_L2 && 10 * black > count) {
+        char words[256];
+        snprintf(words, sizeof words, "%.0f %% of the targets' pixels are black, which 'relative_l2' weighs most: 'l2', 'log_l2' "
+                                      "or a mask may lead farther", 100.0 * (double)black / (double)count);
+        fit->def->note(fit->def->user, words);
+    }
+}
+
+rey_result rey_fit_notes(const Fit *fit) {
     for (size_t k = 0; k < fit->unknowns.items.count && fit->def->note; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
         if (is_free_pose(fit, p)) {
             note(fit, p, "the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid' turns and shifts it, "
                          "'similarity' scales it besides");
         }
+    }
+    if (fit->def->note) {
+        note_black(fit);
     }
     return fit->def->note ? note_unreached(fit) : REY_OK;
 }

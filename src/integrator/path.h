@@ -89,7 +89,9 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     append_shadows(t, &ray, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
     if (record >= 0) {
         record_light(t, record, light, &s, f_zero_unless(m, weight), f);
-        f_store(t->ws.records.light_pdf + record, f_zero_unless(~light_is_delta(scene, light), own_pdf));
+        if (scene->drops) {
+            f_store(t->ws.records.light_pdf + record, f_zero_unless(~light_is_delta(scene, light), own_pdf));
+        }
     }
 }
 

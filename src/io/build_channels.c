@@ -67,6 +67,12 @@ static const char *aov_word(void *user, int i) {
     return i < COUNT_OF(names) ? names[i] : NULL;
 }
 
+static const char quantities[] =
+#define AOV(ENUM, name, components) ", " name
+#include "scene/aovs.inl"
+#undef AOV
+    ;
+
 // What the channels of one element have in common. All that `moment` holds is named twice: the second time, samples are squared.
 typedef struct Place {
     const char *prefix;
@@ -104,7 +110,7 @@ static rey_result name_quantities(Builder *b, rey_xml_node *node, Place at) {
         }
         if (kind < 0) {
             return rey_xml_fail_word(b->ctx, rey_xml_place(node, "aovs"), colon + 1, aov_word, NULL,
-                                     "there is no quantity '%s'", colon + 1);
+                                     "there is no quantity '%s', expected one of %s", colon + 1, quantities + 2);
         }
         Channel channel = {.source = CHANNEL_AOV, .integrator = at.first, .power = at.power};
         TRY(find_quantity(b, node, &ARRAY_AT(b->scene->integrators, Integrator, at.first), kind, &channel.component));

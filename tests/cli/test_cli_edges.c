@@ -247,9 +247,10 @@ static void several_integrators(void **state) {
     JsonNode *node = run_json(f, 0, "compare several.exr alone.exr --json");
     assert_true(json_value(node, "mse", 1) == 0);
     json_free(node);
-    expect_said(f, 0, "info several.xml", "channels          R G B a.R a.G a.B a.A b.R b.G b.B b.A dd.T");
+    expect_said(f, 0, "info several.xml", "6 x 4 pixels, R G B a.R a.G a.B a.A b.R b.G b.B b.A dd.T");
     node = run_json(f, 0, "info alone.xml --json");
     assert_string_equal(json_get(node, "channels")->first->text, "R");
+    assert_string_equal(json_get(node, "film_channels")->first->first->next->text, "G");
     json_free(node);
     expect_words(f, 0, "grad several.xml --param grey.reflectance.value --spp 16",
                  "derivatives: several.xml:1: 'aov' holds 2 integrators: R G B and derivatives are those of the first, 'path'");

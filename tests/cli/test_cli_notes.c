@@ -62,6 +62,17 @@ static void unknowns_out_of_sight_are_told(void **state) {
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=ball.to_world",
                 "parameter 'ball.to_world': the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid'");
     expect_note(f, "fit job.yaml --overwrite --json --set 'parameters.1={name: ball.to_world, parameterisation: rigid}'", NULL);
+    // So are black targets under a loss that weighs them most.
+    static const char *const losses[] = {"relative_l2", "l2"};
+    write_words("dark.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
+                            "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor></scene>");
+    expect(f, 0, "render dark.xml -o dark.npy --spp 1");
+    for (int i = 0; i < 2; i++) {
+        char arguments[128];
+        snprintf(arguments, sizeof arguments, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov --set loss=%s "
+                                              "--set views.0.target=dark.npy", losses[i]);
+        expect_note(f, arguments, i ? NULL : "100 % of the targets' pixels are black, which 'relative_l2' weighs most");
+    }
     // A truth that is missing is told before the work.
     expect_words(f, 1, "fit job.yaml -o before --set truth.scene=none.xml", "--set truth.scene=none.xml: none.xml: cannot open");
     assert_int_not_equal(access("before", F_OK), 0);
@@ -133,7 +144,7 @@ static void gradients_have_rows(void **state) {
 static void names_are_told(void **state) {
     Fixture *f = *state;
     write_scene();
-    expect_said(f, 0, "info two.xml", "sensor 0          8 x 8 pixels\nsensor 1 'side'   8 x 6 pixels\n");
+    expect_said(f, 0, "info two.xml", "sensor 0          8 x 8 pixels, R G B\nsensor 1 'side'   8 x 6 pixels, R G B\n");
     JsonNode *node = run_json(f, 0, "info two.xml --json");
     const JsonNode *ids = json_get(node, "sensor_ids");
     assert_true(ids->first->kind == JSON_NULL);

@@ -193,6 +193,9 @@ static void infos_say_what_is_missing(void **state) {
     json_free(node);
     expect(f, 0, "info %s");
     assert_null(strstr(f->out, "missing"));
+    write_words("dark.xml", "<scene version='3.0.0'><integrator type='direct'/><sensor type='perspective'/>"
+                            "<shape type='sphere'/></scene>");
+    expect_words(f, 0, "render dark.xml -o a.exr --spp 1", "the picture is black: the scene has no emitter");
     expect_words(f, 1, "render empty.xml -o a.exr", "empty.xml: the scene has no integrator, expected one such as");
     expect_words(f, 1, "render ball.xml -o a.exr", "ball.xml: the scene has no sensor to render with");
     FILE *file = fopen("wrong.npy", "wb"); // 2, where 1 is the most

@@ -59,6 +59,8 @@ KFN void batch_numbers(Tracer *t, int32_t i, int64_t first) {
 
 // Radians.
 #define OUTLINE_TURN 1e-3f
+// Half the angle between two directions on both sides of the plane at right angles to a normal.
+#define NORMAL_TURN 1e-4f
 
 #define EDGE_FIELD(job, i, field)                                                                                      \
     i_gather((const int32_t *)(job)->edges,                                                                            \

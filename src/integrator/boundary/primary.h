@@ -11,9 +11,6 @@
 // Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
 #define PRIMARY_STEP 2e-3f
 
-// Half the angle between the directions from which the two paths of a terminator come to it.
-#define PRIMARY_TURN 1e-4f
-
 // Dimensions of its own random numbers; the two paths draw theirs like those of the camera.
 #define DIMENSION_EDGE 0x80000001u
 
@@ -142,7 +139,7 @@ static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t h
     for (int side = 0; side < 2; side++) {
         int32_t at = side * half + k;
         Vec3 d = record_v3(p->dx, p->dy, p->dz, at), n = s->edge.normal;
-        Float turn = f_select(side ? above : ~above, f_set(-PRIMARY_TURN), f_set(PRIMARY_TURN));
+        Float turn = f_select(side ? above : ~above, f_set(-NORMAL_TURN), f_set(NORMAL_TURN));
         d = v3_select(m, v3_normalize(v3_madd(d, turn - v3_dot(d, n), n)), d);
         f_store(p->dx + at, d.x);
         f_store(p->dy + at, d.y);

@@ -19,11 +19,9 @@
 #include "integrator/boundary/segments.h"
 
 // What a segment says of its light in `lit`, beside "no" and "from a light": all that comes along it, or the difference
-// between two directions beside it, the other one in a second slot.
+// between two directions beside it (NORMAL_TURN), the other one in a second slot.
 enum { SEGMENT_ALL = 2, SEGMENT_JUMP = 3 };
 
-// Half the angle between those two.
-#define TURNING_STEP 1e-4f
 // How often directions leave on the side of the surface that its geometric normal is on.
 #define TURNING_OUTSIDE 0.75f
 
@@ -164,7 +162,7 @@ static void turning_start(Tracer *t, const Segments *q, int32_t half) {
         Hit hit = segment_edge(q, at);
         Vec3 d = LOAD_V3(*q, dx, dy, dz, at), n = v3_normalize(LOAD_V3(*q, nx, ny, nz, at));
         for (int side = 0; side < 2; side++) {
-            Vec3 to = v3_normalize(v3_madd(d, f_set(side ? TURNING_STEP : -TURNING_STEP), n)); // first from where n points to
+            Vec3 to = v3_normalize(v3_madd(d, f_set(side ? NORMAL_TURN : -NORMAL_TURN), n)); // first from where n points to
             Ray ray = {v3_sub(hit.p, to), to, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
             hit_store(t, side * half + k, &hit);
