@@ -22,12 +22,12 @@ typedef struct Face {
     Float at;     // distance
 } Face;
 
-// The part of s a S + j - s L at a point of a medium that does not scatter, and s; 0 outside of the medium.
+// The part of s a S + j - s L along d at a point of a medium that does not scatter, and s; 0 outside of the medium.
 typedef struct Filling {
     Spec extinction, emission;
 } Filling;
 
-static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p) {
+static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p, Vec3 d) {
     const SceneView *scene = t->scene;
     const MediumNode *medium = scene->media + id;
     Track track = track_of(t, id);
@@ -46,7 +46,7 @@ static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p) {
             inside = inside & m_ge(x, f_set(corner)) & m_le(x, f_set(corner + size));
         }
     }
-    f.extinction = spec_zero_unless(inside, medium_extinction(scene, &track, q));
+    f.extinction = spec_zero_unless(inside, medium_extinction(scene, &track, q, p, d, f_set(0)));
     if (medium->emission >= 0) {
         const VolumeNode *emission = scene->volumes + medium->emission;
         f.emission = spec_zero_unless(inside, volume_eval(scene, emission, volume_to_local(scene, emission, p, 1)));
@@ -230,7 +230,7 @@ static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
         for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
             int32_t id = i_lane(s.medium[side], m_first(left));
             mine = left & mi_eq(s.medium[side], i_set(id));
-            Filling f = medium_filling(t, id, s.p[side]);
+            Filling f = medium_filling(t, id, s.p[side], s.d);
             border_offer(t, batch, side, s.slot, id, s.p[side], s.d, spec_dot(s.beta, f.extinction) * f_abs(s.rcp), mine);
         }
     }
@@ -243,7 +243,7 @@ static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffi
         for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
             int32_t id = i_lane(s.medium[side], m_first(left));
             mine = left & mi_eq(s.medium[side], i_set(id));
-            Filling f = medium_filling(t, id, s.p[side]);
+            Filling f = medium_filling(t, id, s.p[side], s.d);
             Spec gain = border_gain(&f, border_scattered(t, batch, side, s.slot, mine), radiance);
             jump = spec_add(jump, spec_zero_unless(mine, spec_scale(gain, f_set(side ? -1 : 1))));
         }
@@ -296,7 +296,7 @@ static NOINLINE BorderBox border_box(const Tracer *t, const RecordBatch *batch) 
     for (int k = 0; k < 2; k++) {
         b.face[k].at = f_select(b.face[k].m, b.face[k].at, f_set(0));
         b.p[k] = v3_madd(b.o, b.face[k].at, b.d);
-        b.inside[k] = medium_filling(t, batch->group, face_inside(b.p[k], b.d, k));
+        b.inside[k] = medium_filling(t, batch->group, face_inside(b.p[k], b.d, k), b.d);
     }
     return b;
 }

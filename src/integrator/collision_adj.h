@@ -93,6 +93,7 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
     }
     Walk walk;
     CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
+    s.at.call.at.hit = &s.hit; // not where it was loaded
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
         // Where it goes on, its direction stays: the ray ahead is dragged along as a whole.

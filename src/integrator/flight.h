@@ -152,6 +152,7 @@ typedef struct Collision {
     PhaseCall call;
     Vec3 wi;
     Spec albedo;
+    bool backwards; // wi leads to the light and wo to the camera
 } Collision;
 
 KFN Collision collision_look(const Tracer *t, int32_t medium, const Hit *hit, Vec3 d) {
@@ -162,6 +163,13 @@ KFN Collision collision_look(const Tracer *t, int32_t medium, const Hit *hit, Ve
     c.call.at = texcoord((Vec2){f_set(0), f_set(0)}, hit);
     c.albedo = volume_eval(scene, albedo, volume_to_local(scene, albedo, hit->p, 1));
     return c;
+}
+
+// What is scattered between wi and wo per unit of the extinction that a flight meets which comes along -wi. The phase function is
+// given the camera's side first. Of flakes, extinction times phase function are the same both ways, otherwise the extinction alone.
+KFN Float collision_phase(const Collision *c, Vec3 wo) {
+    bool exchanged = c->backwards && c->medium->flakes < 0;
+    return phase_eval(&c->call, exchanged ? wo : c->wi, exchanged ? c->wi : wo);
 }
 
 KFN void collision_shadow_ray(Vec3 p, Vec3 d, Float distance, Ray *ray) {
@@ -200,7 +208,7 @@ static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c,
     w.sample.lobe = i_set(LOBE_SMOOTH);
     w.pdf = phase_pdf(&c->call, c->wi, w.d);
     w.rcp = f_safe_rcp(w.pdf);
-    w.f = spec_scale(c->albedo, phase_eval(&c->call, c->wi, w.d));
+    w.f = spec_scale(c->albedo, collision_phase(c, w.d));
     onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
     append_paths(t, v, v->hit.p, v->hit.p, &w, v->medium, next_count);

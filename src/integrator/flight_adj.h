@@ -10,11 +10,23 @@
 
 enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
 
-// Accumulates the adjoint d of the extinction at a point of the world.
-static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Spec d, Sink *sink, Mask m) {
+// The adjoint of the area of flakes, given that of the extinction at a point of the world, which is scale sigma_t area.
+KFN Float projection_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Spec d) {
+    const VolumeNode *v = scene->volumes + medium->sigma_t;
+    Spec bare = volume_eval(scene, v, volume_to_local(scene, v, p, 1));
+    return spec_dot(d, bare) * (real)scene->theta[medium->scale];
+}
+
+// Accumulates the adjoint d of the extinction along w at a point of the world.
+static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Vec3 w, Spec d, Sink *sink,
+                                    Mask m) {
     const VolumeNode *v = scene->volumes + medium->sigma_t;
     const int32_t at = sink->texture_at[v->texture], scale_at = sink->texture_at[medium->scale_texture];
     d = spec_zero_unless(m, d);
+    if (medium->flakes >= 0) {
+        flakes_area_adj(scene, medium->flakes, p, w, projection_adj(scene, medium, p, d), sink, m);
+        d = spec_scale(d, flakes_area(scene, medium->flakes, p, w));
+    }
     // extinction = scale sigma_t
     if (at >= 0 || volume_moves(scene, v, sink)) {
         volume_world_adj(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale])), sink, m);
@@ -22,6 +34,12 @@ static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *me
     if (scale_at >= 0) {
         sink_add_uniform(sink, scale_at, spec_dot(d, volume_eval(scene, v, volume_to_local(scene, v, p, 1))), m);
     }
+}
+
+// The same of the point and the direction, as far as flakes are concerned.
+static NOINLINE void extinction_turn(const SceneView *scene, const MediumNode *medium, Vec3 p, Vec3 w, Spec d, Mask m, Vec3 *dp,
+                                     Vec3 *dw) {
+    flakes_area_turn(scene, medium->flakes, p, w, projection_adj(scene, medium, p, spec_zero_unless(m, d)), dp, dw);
 }
 
 // Points spread evenly over [low, high], one in each of FLIGHT_POINTS parts of it.
@@ -66,8 +84,7 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     a.end = f_select(a.collided, f_load(ws->records.ldist + at), f_set(0));
     // Collisions have the density extinction, and the weight extinction / (extinction + sparse).
     Track track = track_of(t, batch->group);
-    Vec3 p = volume_to_local(scene, track.sigma_t, v3_madd(a.f.o, a.end, a.f.d), 1);
-    a.hit = medium_extinction(scene, &track, p);
+    a.hit = extinction_at(scene, &track, v3_madd(a.f.o, a.end, a.f.d), a.f.d);
     for (int c = 0; c < SPEC_N; c++) {
         a.hit.c[c] = a.onward.c[c] * f_safe_rcp(a.hit.c[c] + a.f.sparse);
     }
@@ -88,7 +105,14 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
 KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
     Vec3 p = v3_madd(a->f.o, at, a->f.d);
-    extinction_adj(scene, a->medium, p, d, sink, m);
+    extinction_adj(scene, a->medium, p, a->f.d, d, sink, m);
+    if (g && a->medium->flakes >= 0) {
+        Vec3 dp = v3_zero(), dw = v3_zero();
+        extinction_turn(scene, a->medium, p, a->f.d, d, m, &dp, &dw);
+        glide_add(g, p, dp, m);
+        g->turn = v3_add(g->turn, v3_select(m, dw, v3_zero()));
+        d = spec_scale(d, flakes_area(scene, a->medium->flakes, p, a->f.d));
+    }
     if (g) {
         glide_look(scene, g, scene->volumes + a->medium->sigma_t, p, spec_scale(d, f_set((real)scene->theta[a->medium->scale])), m);
     }
@@ -173,7 +197,7 @@ static NOINLINE void fog_adj(const Tracer *t, const Walk *walk, Spec transmittan
             Float each = (high - low) * ((real)-1 / FLIGHT_POINTS);
             for (int k = 0; k < FLIGHT_POINTS; k++) {
                 Float at = f_select(m, flight_point(low, high, key, (uint32_t)(i * FLIGHT_POINTS), k), f_set(0));
-                extinction_adj(scene, medium, v3_madd(walk->o[i], at, walk->d), spec_scale(dt, each), sink, m);
+                extinction_adj(scene, medium, v3_madd(walk->o[i], at, walk->d), walk->d, spec_scale(dt, each), sink, m);
             }
         }
     }

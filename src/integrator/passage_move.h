@@ -38,7 +38,7 @@ static NOINLINE void passed_surfaces_adj(const Tracer *t, const Walk *walk, int3
             for (Mask rest = m & mi_lt(i_set(-1), medium), own; m_any(rest); rest = rest & ~own) {
                 int32_t number = i_lane(medium, m_first(rest));
                 own = rest & mi_eq(medium, i_set(number));
-                Filling f = medium_filling(t, number, p);
+                Filling f = medium_filling(t, number, p, walk->d);
                 Float share = f_zero_unless(own, spec_dot(dt, f.extinction));
                 dx = side ? dx + share : dx - share;
             }
@@ -71,7 +71,7 @@ static NOINLINE void passed_boxes_adj(const Tracer *t, const Walk *walk, int32_t
         for (int k = 0; k < 2; k++) {
             Float at = f_select(face[k].m, face[k].at, f_set(0));
             Vec3 p = v3_madd(walk->o[i], at, walk->d);
-            Filling f = medium_filling(t, id, face_inside(p, walk->d, k));
+            Filling f = medium_filling(t, id, face_inside(p, walk->d, k), walk->d);
             Float dx = f_zero_unless(face[k].m, spec_dot(dt, f.extinction));
             dx = k ? -dx : dx;
             if (box_is_live(t, id)) {
@@ -98,7 +98,8 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
             Float low = f_set(0), high = walk->length[i];
             Mask ends = mine & m_finite(high) & (i < walk->count ? ~walk->m[i] : mine);
             if (m_any(ends)) {
-                Filling f = medium_filling(t, id, v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d));
+                Vec3 end = v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d);
+                Filling f = medium_filling(t, id, end, walk->d);
                 turn->distance = turn->distance - f_zero_unless(ends, spec_dot(dt, f.extinction));
                 // One lane alone may have slipped through the edge of a border.
                 Mask within = ends & turn->points & m_gt(spec_max(f.extinction), f_set(0));
@@ -107,15 +108,25 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);
             Mask m = mine & m_gt(high, low) & m_finite(high);
-            if (v->kind == VOLUME_CONSTANT || !m_any(m)) {
+            const bool grid = v->kind == VOLUME_GRID, flakes = medium->flakes >= 0;
+            if (!(grid || flakes) || !m_any(m)) {
                 continue;
             }
-            Float each = (high - low) * ((real)-1 / FLIGHT_POINTS) * (real)scene->theta[medium->scale];
+            Float along = (high - low) * ((real)-1 / FLIGHT_POINTS), each = along * (real)scene->theta[medium->scale];
             for (int k = 0; k < FLIGHT_POINTS; k++) {
                 Float at = f_select(m, flight_point(low, high, key, (uint32_t)(i * FLIGHT_POINTS), k), f_set(0));
                 Vec3 p = v3_madd(walk->o[i], at, walk->d);
                 Float far = v3_dot(v3_sub(p, turn->from), walk->d);
-                Vec3 slope = volume_slope(scene, v, p, spec_zero_unless(m, spec_scale(dt, each)));
+                Vec3 slope = v3_zero();
+                if (flakes) {
+                    Vec3 dw = v3_zero();
+                    extinction_turn(scene, medium, p, walk->d, spec_scale(dt, along), m, &slope, &dw);
+                    turn->d = v3_add(turn->d, v3_select(m, dw, v3_zero()));
+                }
+                if (grid) {
+                    Float area = flakes ? flakes_area(scene, medium->flakes, p, walk->d) : f_set(1);
+                    v3_acc(&slope, volume_slope(scene, v, p, spec_zero_unless(m, spec_scale(dt, each * area))));
+                }
                 turn->d = v3_madd(turn->d, f_zero_unless(m, far), slope);
                 turn->shift = v3_add(turn->shift, v3_select(m, slope, v3_zero()));
             }

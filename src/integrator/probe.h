@@ -47,7 +47,7 @@ KFN FlightSweep flight_load(const Tracer *t, const RecordBatch *batch) {
 // Weights of the probe at a point of the flight, by channel; collisions have the rest.
 KFN Spec probe_share(const Tracer *t, int32_t medium, const FlightSweep *f, Float at) {
     Track track = track_of(t, medium);
-    Spec sigma = medium_extinction(t->scene, &track, volume_to_local(t->scene, track.sigma_t, v3_madd(f->o, at, f->d), 1));
+    Spec sigma = extinction_at(t->scene, &track, v3_madd(f->o, at, f->d), f->d);
     for (int c = 0; c < SPEC_N; c++) {
         sigma.c[c] = f->sparse * f_safe_rcp(sigma.c[c] + f->sparse);
     }

@@ -2,6 +2,7 @@
 #include "io/build.h"
 #include "io/lenient.h"
 #include "medium/majorant_build.h"
+#include "medium/table.h"
 
 #include <string.h>
 
@@ -91,7 +92,10 @@ static rey_result build_medium_phase(Builder *b, rey_xml_node *node, const char 
         return build_isotropic_phase(b, &medium->phase);
     }
     build_join(name, path, "phase_function");
-    return build_phase(b, child->node, name, &medium->phase);
+    TRY(build_phase(b, child->node, name, &medium->phase));
+    const PhaseNode *phase = &ARRAY_AT(b->scene->build.phases, PhaseNode, medium->phase);
+    medium->flakes = phase->kind == rey_phase_kind_find("sggx") ? phase->slot[0] : -1;
+    return REY_OK;
 }
 
 static rey_result build_bounds(Builder *b, const rey_xml_node *node, MediumNode *medium) {
@@ -112,7 +116,7 @@ rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_
         *out = node->built;
         return REY_OK;
     }
-    MediumNode medium = {.emission = -1, .bounded = strcmp(node->type, words[HETEROGENEOUS]) == 0};
+    MediumNode medium = {.emission = -1, .flakes = -1, .bounded = strcmp(node->type, words[HETEROGENEOUS]) == 0};
     if (!medium.bounded && strcmp(node->type, words[HOMOGENEOUS]) != 0) {
         return build_unknown(b, node, medium_word, NULL);
     }

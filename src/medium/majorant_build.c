@@ -47,8 +47,29 @@ static float largest_in(const SceneView *view, const VolumeNode *v, const Medium
     return largest;
 }
 
+// A bound of the area that flakes show to any direction, squared: no eigenvalue of a matrix exceeds the largest sum of a row's
+// magnitudes (Gershgorin), and matrices between voxels have no larger ones than the voxels'.
+static float largest_square(const SceneView *view, int32_t flakes) {
+    static const int rows[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
+    const TextureNode *t = view->textures + flakes;
+    const VolumeNode *v = t->kind == TEXTURE_VOLUME ? view->volumes + t->volume : NULL;
+    int64_t count = v ? (int64_t)v->nx * v->ny * v->nz : 1;
+    float largest = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const float *s = view->theta + t->theta + 6 * i;
+        for (int k = 0; k < 3; k++) {
+            float sum = fabsf(s[rows[k][0]]) + fabsf(s[rows[k][1]]) + fabsf(s[rows[k][2]]);
+            largest = sum > largest ? sum : largest;
+        }
+    }
+    return largest;
+}
+
 void rey_medium_update(const SceneView *view, const VolumeNode *v, const MediumNode *m) {
     float scale = view->theta[m->scale] * 1.00001f;
+    if (m->flakes >= 0) {
+        scale *= sqrtf(largest_square(view, m->flakes));
+    }
     for (int32_t z = 0; z < m->nz; z++) {
         for (int32_t y = 0; y < m->ny; y++) {
             for (int32_t x = 0; x < m->nx; x++) {

@@ -47,42 +47,12 @@ KFN void phase_scatter_TABLE(const PhaseCall *call, int32_t slot, PhaseTable d, 
     }
 }
 
-// The grid of a matrix that differs from place to place; null = it is the same everywhere.
-KFN const VolumeNode *phase_matrix_grid(const PhaseCall *call, int32_t slot) {
-    const TextureNode *t = call->scene->textures + slot;
-    const VolumeNode *v = t->kind == TEXTURE_VOLUME && call->at.hit ? call->scene->volumes + t->volume : NULL;
-    return v && v->nx * v->ny * v->nz > 1 ? v : NULL;
-}
-
 KFN PhaseMatrix phase_fetch_MATRIX(const PhaseCall *call, int32_t slot) {
-    const VolumeNode *grid = phase_matrix_grid(call, slot);
-    const float *s = call->scene->theta + call->scene->textures[slot].theta;
-    PhaseMatrix matrix;
-    if (grid) {
-        gridvolume_eval_six(call->scene, grid, volume_to_local(call->scene, grid, call->at.hit->p, 1), matrix.m);
-        return matrix;
-    }
-    for (int i = 0; i < 6; i++) {
-        matrix.m[i] = f_set((real)s[i]);
-    }
-    return matrix;
+    return matrix_fetch(call->scene, slot, call->at.hit->p);
 }
 
 KFN void phase_scatter_MATRIX(const PhaseCall *call, int32_t slot, PhaseMatrix d, Sink *sink, Mask m) {
-    const VolumeNode *grid = phase_matrix_grid(call, slot);
-    int32_t at = sink->texture_at[slot];
-    if (grid) {
-        Vec3 q = volume_to_local(call->scene, grid, call->at.hit->p, 1), dq = v3_zero();
-        bool moves = volume_moves(call->scene, grid, sink);
-        gridvolume_adj_six(call->scene, grid, q, d.m, at, moves ? &dq : NULL, sink, m);
-        if (moves) {
-            volume_place_adj(call->scene, grid, q, dq, sink, m);
-        }
-        return;
-    }
-    for (int i = 0; i < 6 && at >= 0; i++) {
-        sink_add_uniform(sink, at + i, d.m[i], m);
-    }
+    matrix_scatter(call->scene, slot, call->at.hit->p, d, sink, m);
 }
 
 KFN PhaseWeights phase_fetch_WEIGHTS(const PhaseCall *call, int32_t slot) {

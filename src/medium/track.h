@@ -6,6 +6,7 @@
 
 #include "math/functions.h"
 #include "math/rng.h"
+#include "medium/flakes.h"
 #include "medium/majorant.h"
 
 // Tentative collisions of one walk; what is left is taken to be blocked.
@@ -29,8 +30,19 @@ typedef struct Track {
 #define PADDED_DEPTH 0.5f
 #define PADDED_SHARE 0.05f
 
-KFN Spec medium_extinction(const SceneView *scene, const Track *t, Vec3 p) {
-    return spec_scale(volume_eval(scene, t->sigma_t, p), f_set((real)scene->theta[t->medium->scale]));
+// At the distance `at` along the ray o, d of the world; p: the point there in the space of sigma_t.
+KFN Spec medium_extinction(const SceneView *scene, const Track *t, Vec3 p, Vec3 o, Vec3 d, Float at) {
+    Spec sigma = spec_scale(volume_eval(scene, t->sigma_t, p), f_set((real)scene->theta[t->medium->scale]));
+    if (t->medium->flakes >= 0) {
+        Vec3 world = v3_madd(o, f_zero_unless(m_finite(at), at), d);
+        sigma = spec_scale(sigma, flakes_area(scene, t->medium->flakes, world, d));
+    }
+    return sigma;
+}
+
+// The same, given only the point of the world.
+KFN Spec extinction_at(const SceneView *scene, const Track *t, Vec3 p, Vec3 d) {
+    return medium_extinction(scene, t, volume_to_local(scene, t->sigma_t, p, 1), p, d, f_set(0));
 }
 
 KFN MajorantWalk track_start(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m) {
@@ -44,15 +56,24 @@ KFN MajorantWalk track_start(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m)
 // Optical depth to the next tentative collision.
 KFN Float track_depth(Float u) { return -f_log(f_max(1.0f - u, f_set(1e-9f))); }
 
-// Whether all channels are alike, so that weights stay 1.
-KFN bool track_is_grey(const Track *t) { return t->sigma_t->channels == 1 && t->values == t->scene && !t->padded; }
+// Whether all channels are alike, so that weights stay 1. Flakes go the longer way, so that others do not meet them here.
+KFN bool track_is_grey(const Track *t) {
+    return t->sigma_t->channels == 1 && t->values == t->scene && !t->padded && t->medium->flakes < 0;
+}
 
 KFN Float grey_extinction(const Track *t, const MajorantWalk *w) {
     return volume_eval_real(t->scene, t->sigma_t, majorant_point(w)) * (real)t->scene->theta[t->medium->scale];
 }
 
-// Homogeneous media.
-KFN bool track_is_uniform(const Track *t) { return !t->medium->bounded && t->sigma_t->kind == VOLUME_CONSTANT; }
+// Homogeneous media, whose flakes are the same everywhere, too.
+KFN bool track_is_uniform(const Track *t) {
+    bool alike = t->medium->flakes < 0 || !matrix_grid(t->scene, t->medium->flakes);
+    return !t->medium->bounded && t->sigma_t->kind == VOLUME_CONSTANT && alike;
+}
+
+KFN Spec uniform_extinction(const SceneView *scene, const Track *t, Vec3 d) {
+    return medium_extinction(scene, t, v3_zero(), v3_zero(), d, f_set(0));
+}
 
 KFN Spec uniform_transmittance(Spec sigma, Float t) {
     for (int c = 0; c < SPEC_N; c++) {
@@ -67,7 +88,7 @@ KFN Spec uniform_transmittance(Spec sigma, Float t) {
 static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m, const SampleKey *key,
                                          uint32_t dimension) {
     if (track_is_uniform(t)) {
-        return uniform_transmittance(medium_extinction(t->values, t, v3_zero()), tmax);
+        return uniform_transmittance(uniform_extinction(t->values, t, d), tmax);
     }
     MajorantWalk w = track_start(t, o, d, tmax, m);
     Spec transmittance = spec_set(f_set(1));
@@ -83,7 +104,7 @@ static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float t
         if (grey) {
             passed = spec_set(transmittance.c[0] * (1.0f - grey_extinction(t, &w) * rcp));
         } else {
-            Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w)), rcp);
+            Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w), o, d, w.t), rcp);
             passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
         }
         if (t->roulette) {
@@ -103,10 +124,10 @@ typedef struct Flight {
 } Flight;
 
 // A channel is chosen by importance, and the distance by its extinction; what happens is weighed against all channels.
-static NOINLINE Flight uniform_flight(const Track *track, Float tmax, Spec importance, Mask m, const SampleKey *key,
+static NOINLINE Flight uniform_flight(const Track *track, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                       uint32_t dimension) {
     Vec2 u = rng_2d(key, dimension);
-    Spec sigma = medium_extinction(track->scene, track, v3_zero()), value = medium_extinction(track->values, track, v3_zero());
+    Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
     Float chosen = sigma.c[0], sum = importance.c[0];
     for (int c = 1; c < SPEC_N; c++) {
         chosen = f_select(m_ge(u.y, sum), sigma.c[c], chosen);
@@ -152,7 +173,7 @@ static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, M
 static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                     uint32_t dimension) {
     if (track_is_uniform(t)) {
-        return uniform_flight(t, tmax, importance, m, key, dimension);
+        return uniform_flight(t, d, tmax, importance, m, key, dimension);
     }
     SampleKey random = *key;
     random.sobol = false;
@@ -167,7 +188,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         Vec2 u = rng_2d(&random, dimension + i);
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Vec3 p = majorant_point(&w);
-        Spec sigma = medium_extinction(t->scene, t, p), counts = spec_mul(importance, weight);
+        Spec sigma = medium_extinction(t->scene, t, p, o, d, w.t), counts = spec_mul(importance, weight);
         Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
         real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
         Mask collided = met & m_lt(u.y, real_share);
@@ -175,7 +196,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         if (t->values == t->scene) {
             flight.weight = weight;
         } else {
-            Spec value = medium_extinction(t->values, t, p);
+            Spec value = medium_extinction(t->values, t, p, o, d, w.t);
             Spec other = collision_weight(flight.weight, value, w.majorant, real_share, collided);
             flight.weight = spec_select(met, other, flight.weight);
         }
@@ -190,8 +211,8 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
 static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Spec importance, Mask m, const SampleKey *key,
                                   uint32_t dimension) {
     if (track_is_uniform(t)) {
-        Spec density = uniform_transmittance(medium_extinction(t->scene, t, v3_zero()), far);
-        Spec passed = uniform_transmittance(medium_extinction(t->values, t, v3_zero()), far);
+        Spec density = uniform_transmittance(uniform_extinction(t->scene, t, d), far);
+        Spec passed = uniform_transmittance(uniform_extinction(t->values, t, d), far);
         return spec_scale(passed, f_safe_rcp(spec_dot(importance, density)));
     }
     if (track_is_grey(t)) {

@@ -60,11 +60,12 @@ static bool volume_live(const SceneView *view, const PathJob *job, int32_t id) {
 static bool volume_varies(const SceneView *view, int32_t id) { return id >= 0 && view->volumes[id].kind == VOLUME_GRID; }
 
 static int32_t medium_live(const SceneView *view, const PathJob *job, const MediumNode *medium) {
-    bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture);
+    bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture) ||
+                      texture_live(view, job, medium->flakes);
     bool emission = volume_live(view, job, medium->emission), borders = job->volume_at[medium->sigma_t] >= 0;
     bool albedo = volume_live(view, job, medium->albedo), phase = phase_live(view, job, medium->phase);
     if (job->glides) { // rays glide over them
-        extinction |= volume_varies(view, medium->sigma_t);
+        extinction |= volume_varies(view, medium->sigma_t) || medium->flakes >= 0; // which rays that turn see from another side
         albedo |= volume_varies(view, medium->albedo);
         emission |= volume_varies(view, medium->emission);
         borders = phase = true;

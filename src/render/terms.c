@@ -58,11 +58,15 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     return (p->emitter >= 0 ? light : still) | REY_TERM_INDIRECT | chains;
 }
 
+static bool jumps(const VolumeNode *v) { return v->kind == VOLUME_GRID && v->filter == FILTER_NEAREST; }
+
 // Whether some medium's extinction jumps from voxel to voxel.
 static bool has_jumping_media(const SceneView *view) {
     for (int64_t i = 0; i < view->media_count; i++) {
-        const VolumeNode *v = view->volumes + view->media[i].sigma_t;
-        if (v->kind == VOLUME_GRID && v->filter == FILTER_NEAREST) {
+        const MediumNode *medium = view->media + i;
+        const TextureNode *flakes = medium->flakes < 0 ? NULL : view->textures + medium->flakes;
+        bool found = flakes && flakes->kind == TEXTURE_VOLUME && jumps(view->volumes + flakes->volume);
+        if (found || jumps(view->volumes + medium->sigma_t)) {
             return true;
         }
     }
@@ -106,7 +110,7 @@ static const char *gap_of_cameras(const SceneView *view) {
         return "collisions that move with the camera look up volumes of phase functions elsewhere";
     }
     for (int64_t i = 0; i < view->volumes_count; i++) {
-        if (view->volumes[i].kind == VOLUME_GRID && view->volumes[i].filter == FILTER_NEAREST) {
+        if (jumps(view->volumes + i)) {
             return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
         }
     }
@@ -116,7 +120,7 @@ static const char *gap_of_cameras(const SceneView *view) {
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
 static const char *gap_in_media(const SceneView *view, const Param *p) {
     const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
-    if (volume && volume->kind == VOLUME_GRID && volume->filter == FILTER_NEAREST) {
+    if (volume && jumps(volume)) {
         return "with filter_type=\"nearest\" the volume jumps from voxel to voxel, and with \"trilinear\" it does not";
     }
     if (!view->has_media || rey_moves_border(view, p)) {

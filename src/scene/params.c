@@ -137,7 +137,8 @@ static void texture_changed(rey_scene *scene, int32_t texture) {
     }
     for (int64_t i = 0; i < scene->view.media_count; i++) {
         const MediumNode *m = scene->view.media + i;
-        scene->dirty_media[i] |= scene->view.volumes[m->sigma_t].texture == texture || m->scale_texture == texture;
+        bool read = scene->view.volumes[m->sigma_t].texture == texture || m->scale_texture == texture || m->flakes == texture;
+        scene->dirty_media[i] |= read;
     }
     for (int64_t i = 0; i < scene->view.phases_count; i++) {
         const PhaseNode *p = scene->view.phases + i;

@@ -75,11 +75,12 @@ typedef struct PhaseNode {
     int32_t table;                     // first derived value in `tables`, -1 = none
 } PhaseNode;
 
-// Extinction is scale x sigma_t, of which the share `albedo` scatters.
+// Extinction is scale x sigma_t, in media of flakes times their projected area; the share `albedo` of it scatters.
 typedef struct MediumNode {
     int32_t sigma_t, albedo;        // volumes
     int32_t emission;               // volume: radiance that is added per unit of length, whatever sigma_t and scale are; -1 = none
     int32_t phase;
+    int32_t flakes;                 // texture of their matrix (medium/flakes.h), -1 = there are none
     int32_t scale, scale_texture;   // theta offset, and the texture of that number
     int32_t bounded;                // heterogeneous: nothing lies outside of the cube of sigma_t
     int32_t nx, ny, nz, table;      // supervoxels, and the largest extinction in each of them

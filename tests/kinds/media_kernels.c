@@ -32,6 +32,8 @@ static void view_make(const MediaCase *c, View *v) {
     }
     v->scene.theta = v->theta;
     v->scene.tables = v->tables;
+    v->scene.textures = (TextureNode *)(uintptr_t)&c->flakes;
+    v->scene.volumes = (VolumeNode *)(uintptr_t)&c->grid;
 }
 
 static void run_eval(const MediaCase *c, int n, MediaLookup *q) {
@@ -73,6 +75,34 @@ static void run_adj(const MediaCase *c, int n, MediaLookup *q, double *gradient,
     }
 }
 
+static void run_flakes(const MediaCase *c, int n, MediaFlakes *q, double *gradient, const double *tangent) {
+    View view;
+    view_make(c, &view);
+    for (int i = 0; tangent && i < c->theta_count; i++) {
+        view.tangent[i] = (float)tangent[i];
+    }
+    const int32_t at = c->flakes.theta, nowhere = -1;
+    Sink sink = {.gradient = gradient, .tangent = gradient ? NULL : view.tangent, .texture_at = &at, .volume_at = &nowhere};
+    for (int first = 0; first < n; first += LANES) {
+        Vec3 p, w, dp = v3_zero(), dw = v3_zero();
+        Float d;
+        GATHER3(p, q[AT(lane)].p);
+        GATHER3(w, q[AT(lane)].w);
+        GATHER(d, q[AT(lane)].d);
+        sink.derivative = f_set(0);
+        Float area = flakes_area(&view.scene, 0, p, w);
+        flakes_area_adj(&view.scene, 0, p, w, d, &sink, m_first_n(n - first));
+        flakes_area_turn(&view.scene, 0, p, w, d, &dp, &dw);
+        for (int lane = 0; lane < LANES && first + lane < n; lane++) {
+            MediaFlakes *to = q + first + lane;
+            to->area = (double)f_lane(area, lane);
+            put3(to->dp, dp, lane);
+            put3(to->dw, dw, lane);
+            to->forward = (double)f_lane(sink.derivative, lane);
+        }
+    }
+}
+
 static void run_track(const MediaCase *c, int n, MediaRay *r) {
     View view;
     view_make(c, &view);
@@ -104,4 +134,4 @@ static void run_track(const MediaCase *c, int n, MediaRay *r) {
     }
 }
 
-const MediaKernels KERNELS = {run_eval, run_adj, run_track};
+const MediaKernels KERNELS = {run_eval, run_adj, run_flakes, run_track};

@@ -7,7 +7,8 @@ enum { MEDIA_THETA = 1024, MEDIA_TABLES = 256 };
 
 typedef struct MediaCase {
     int32_t theta_count;
-    VolumeNode sigma_t;
+    VolumeNode sigma_t, grid; // grid: of matrices
+    TextureNode flakes;       // texture 0
     MediumNode medium;
     double theta[MEDIA_THETA], tables[MEDIA_TABLES];
 } MediaCase;
@@ -24,9 +25,16 @@ typedef struct MediaRay {
     int32_t collided;
 } MediaRay;
 
+// The area that flakes show to w at p, and the adjoint d of it.
+typedef struct MediaFlakes {
+    double p[3], w[3], d;
+    double area, dp[3], dw[3], forward; // out
+} MediaFlakes;
+
 typedef struct MediaKernels {
     void (*eval)(const MediaCase *c, int n, MediaLookup *q);
     void (*adj)(const MediaCase *c, int n, MediaLookup *q, double *gradient, const double *tangent);
+    void (*flakes)(const MediaCase *c, int n, MediaFlakes *q, double *gradient, const double *tangent);
     void (*track)(const MediaCase *c, int n, MediaRay *r);
 } MediaKernels;
 

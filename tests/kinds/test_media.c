@@ -19,7 +19,7 @@ static void update(MediaCase *c) {
     for (int i = 0; i < MEDIA_THETA; i++) {
         theta[i] = (float)c->theta[i];
     }
-    SceneView view = {.theta = theta, .tables = tables};
+    SceneView view = {.theta = theta, .tables = tables, .textures = &c->flakes, .volumes = &c->grid};
     assert_true(rey_medium_table_size(&c->sigma_t, &c->medium) <= MEDIA_TABLES);
     rey_medium_update(&view, &c->sigma_t, &c->medium);
     for (int i = 0; i < MEDIA_TABLES; i++) {
@@ -33,7 +33,7 @@ static MediaCase case_of(int nx, int ny, int nz, int channels) {
     bool constant = nx * ny * nz == 1;
     c.sigma_t = (VolumeNode){.kind = constant ? VOLUME_CONSTANT : VOLUME_GRID, .theta = 1, .channels = channels, .nx = nx,
                              .ny = ny, .nz = nz, .filter = FILTER_BILINEAR, .wrap = WRAP_CLAMP, .table = -1};
-    c.medium = (MediumNode){.bounded = true};
+    c.medium = (MediumNode){.bounded = true, .flakes = -1};
     assert_true(c.theta_count <= MEDIA_THETA);
     return c;
 }
@@ -52,6 +52,53 @@ static MediaCase cloud(Random *r, int channels) {
     c.sigma_t.wrap = below(r, 3);
     update(&c);
     return c;
+}
+
+// Makes a case's medium one of flakes, whose matrices are alike everywhere or lie on a grid.
+static void add_flakes(MediaCase *c, Random *r) {
+    const bool grid = uniform(r) < 0.7;
+    const int n[3] = {grid ? 2 : 1, grid ? 3 : 1, grid ? 2 : 1}, count = n[0] * n[1] * n[2];
+    c->flakes = (TextureNode){.kind = grid ? TEXTURE_VOLUME : TEXTURE_TABLE, .theta = c->theta_count, .width = 6};
+    c->grid = (VolumeNode){.kind = VOLUME_GRID, .theta = c->theta_count, .channels = 6, .nx = n[0], .ny = n[1], .nz = n[2],
+                           .filter = FILTER_BILINEAR, .wrap = WRAP_CLAMP, .table = -1};
+    c->medium.flakes = 0;
+    assert_true(c->theta_count + 6 * count <= MEDIA_THETA);
+    for (int i = 0; i < count; i++, c->theta_count += 6) {
+        static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+        double b[3][3]; // S = b b'
+        for (int k = 0; k < 9; k++) {
+            b[k / 3][k % 3] = between(r, -1, 1) + (k % 4 == 0 ? 0.5 : 0);
+        }
+        for (int k = 0; k < 6; k++) {
+            const double *x = b[row[k]], *y = b[column[k]];
+            c->theta[c->theta_count + k] = x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+        }
+    }
+}
+
+static MediaCase flaky_cloud(Random *r, int channels) {
+    MediaCase c = cloud(r, channels);
+    add_flakes(&c, r);
+    update(&c);
+    return c;
+}
+
+static double area(const MediaCase *c, const double p[3], const double w[3]) {
+    double ignored[MEDIA_THETA];
+    MediaFlakes q = {.p = {p[0], p[1], p[2]}, .w = {w[0], w[1], w[2]}};
+    exact->flakes(c, 1, &q, ignored, NULL);
+    return q.area;
+}
+
+static void any_direction(Random *r, double w[3]) {
+    double length = 0;
+    for (int k = 0; k < 3; k++) {
+        w[k] = between(r, -1, 1);
+        length += w[k] * w[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        w[k] /= sqrt(length);
+    }
 }
 
 // Numbers of the conformance folder's facts.
@@ -134,6 +181,58 @@ static void test_bounds(void **state) {
         }
     }
     assert_true(tightest < 1.01); // no looser than it must be, where a voxel is met
+    for (int k = 0; k < 4000; k++) {
+        MediaCase c = flaky_cloud(&r, 1);
+        double p[3] = {uniform(&r), uniform(&r), uniform(&r)}, w[3];
+        const MediumNode *m = &c.medium;
+        int cell = ((int)(p[2] * m->nz) * m->ny + (int)(p[1] * m->ny)) * m->nx + (int)(p[0] * m->nx);
+        any_direction(&r, w);
+        assert_true(c.theta[0] * at(&c, p, 0) * area(&c, p, w) <= c.tables[m->table + cell]);
+    }
+}
+
+// The area of known flakes, and its adjoints against differences.
+static void test_flakes(void **state) {
+    (void)state;
+    Random r = {25};
+    MediaCase flat = case_of(1, 1, 1, 1);
+    add_flakes(&flat, &r);
+    flat.flakes.kind = TEXTURE_TABLE;
+    const double known[6] = {0.04, 0.25, 1, 0, 0, 0.1};
+    memcpy(flat.theta + flat.flakes.theta, known, sizeof known);
+    assert_true(fabs(area(&flat, (double[]){0, 0, 0}, (double[]){1, 0, 0}) - 0.2) < 1e-12);
+    assert_true(fabs(area(&flat, (double[]){0, 0, 0}, (double[]){0, 0.6, 0.8}) - sqrt(0.09 + 0.64 + 0.096)) < 1e-12);
+    for (int k = 0; k < 60; k++) {
+        MediaCase c = flaky_cloud(&r, 1);
+        MediaFlakes q = {.p = {between(&r, -0.2, 1.2), between(&r, -0.2, 1.2), between(&r, -0.2, 1.2)}, .d = between(&r, -1, 1)};
+        double gradient[MEDIA_THETA] = {0}, tangent[MEDIA_THETA], along = 0;
+        const double h = 1e-6;
+        any_direction(&r, q.w);
+        exact->flakes(&c, 1, &q, gradient, NULL);
+        for (int i = 0; i < c.theta_count; i++) {
+            double f[2], x = c.theta[i];
+            for (int side = 0; side < 2; side++) {
+                c.theta[i] = x + (side ? -h : h);
+                f[side] = q.d * area(&c, q.p, q.w);
+            }
+            c.theta[i] = x;
+            assert_true(fabs((f[0] - f[1]) / (2 * h) - gradient[i]) < 1e-6);
+            tangent[i] = between(&r, -1, 1);
+            along += tangent[i] * gradient[i];
+        }
+        for (int axis = 0; axis < 6; axis++) {
+            double f[2], *x = axis < 3 ? q.p + axis : q.w + axis - 3, from = *x;
+            for (int side = 0; side < 2; side++) {
+                *x = from + (side ? -h : h);
+                f[side] = q.d * area(&c, q.p, q.w);
+            }
+            *x = from;
+            double expected = (f[0] - f[1]) / (2 * h), found = axis < 3 ? q.dp[axis] : q.dw[axis - 3];
+            assert_true(fabs(expected - found) < 1e-5 * (1 + fabs(expected)));
+        }
+        exact->flakes(&c, 1, &q, NULL, tangent);
+        assert_true(fabs(q.forward - along) < 1e-9 * (1 + fabs(along)));
+    }
 }
 
 // Optical depth along a ray from its origin to t, by many small steps.
@@ -152,7 +251,8 @@ static double optical_depth(const MediaCase *c, const MediaRay *ray, double t, i
         for (int k = 0; k < 3; k++) {
             inside = inside && q[i].p[k] >= 0 && q[i].p[k] <= 1;
         }
-        sum += inside || !c->medium.bounded ? q[i].value[channel] : 0;
+        double shown = c->medium.flakes < 0 ? 1 : area(c, q[i].p, ray->d);
+        sum += inside || !c->medium.bounded ? q[i].value[channel] * shown : 0;
     }
     return c->theta[0] * sum * t / STEPS;
 }
@@ -194,8 +294,8 @@ static void test_tracking(void **state) {
     (void)state;
     static MediaRay rays[RAYS];
     Random r = {23};
-    for (int k = 0; k < 30; k++) {
-        MediaCase c = cloud(&r, k % 2 ? 3 : 1);
+    for (int k = 0; k < 60; k++) {
+        MediaCase c = k < 30 ? cloud(&r, k % 2 ? 3 : 1) : flaky_cloud(&r, k % 2 ? 3 : 1);
         c.medium.bounded = c.sigma_t.kind == VOLUME_GRID || uniform(&r) < 0.5;
         MediaRay ray = random_ray(&r);
         double half = 0.6 * ray.tmax;
@@ -223,8 +323,8 @@ static void test_widths(void **state) {
     (void)state;
     Random r = {24};
     static MediaRay rays[3][LOOKUPS];
-    for (int k = 0; k < 20; k++) {
-        MediaCase c = cloud(&r, 3);
+    for (int k = 0; k < 40; k++) {
+        MediaCase c = k < 20 ? cloud(&r, 3) : flaky_cloud(&r, 3);
         for (int i = 0; i < LOOKUPS; i++) {
             rays[0][i] = random_ray(&r);
             rays[0][i].sample = (uint32_t)i;
@@ -259,8 +359,8 @@ static void test_widths(void **state) {
 // The name of a test as an argument runs that one only.
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_lookups), cmocka_unit_test(test_adjoint),
-                                       cmocka_unit_test(test_bounds), cmocka_unit_test(test_tracking),
-                                       cmocka_unit_test(test_widths)};
+                                       cmocka_unit_test(test_bounds),   cmocka_unit_test(test_flakes),
+                                       cmocka_unit_test(test_tracking), cmocka_unit_test(test_widths)};
     if (argc > 1) {
         cmocka_set_test_filter(argv[1]);
     }

@@ -134,6 +134,39 @@ static void test_furnace(void **state) {
     judge(c);
 }
 
+// Transmittance and single scattering in flakes that show the area A along the view and m^1/2 across it, where they scatter back
+// p = A^2 / (4 pi m^1/2): both depend on the extinction sigma A, and all on the matrix.
+static void test_flakes(void **state) {
+    UNUSED(state);
+    const double albedo[3] = {0.9, 0.5, 0.2}, zz = 0.64, area = 0.8, minor = 0.5 * 0.4 - 0.1 * 0.1, light = 5;
+    const double p = zz / (4 * pi * sqrt(minor)), dminor = 0.4 + 0.5 - 2 * 0.1; // as all numbers of the matrix grow
+    const double dp = p * (1 / zz - 0.5 * dminor / minor), darea = 0.5 / area;
+    Case dark = {"transmittance of flakes", {{"sky", "1"}, {"medium", "flakes"}}, {0}, "flakes.phase_function.S",
+                 {1, 1, 1, 1, 1, 1}, {0}};
+    Case by_density = {"scattering of flakes", {{"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}, {"medium", "flakes"}},
+                       {0}, "flakes.sigma_t.value.value", {1, 1, 1}, {0}};
+    Case by_matrix = by_density, empty = by_density;
+    by_matrix.param = "flakes.phase_function.S";
+    by_matrix.tangent[3] = by_matrix.tangent[4] = by_matrix.tangent[5] = 1;
+    define(&empty, "scale", "0");
+    empty.param = "flakes.scale.value";
+    for (int k = 0; k < 3; k++) {
+        double s = sigma[k], once = (1 - exp(-4 * s * area)) / 2 * light, more = 2 * light * exp(-4 * s * area);
+        dark.value[k] = exp(-2 * s * area);
+        dark.derivative[k] = -2 * s * darea * dark.value[k];
+        by_density.value[k] = by_matrix.value[k] = albedo[k] * p * once;
+        by_density.derivative[k] = albedo[k] * p * area * more;
+        by_matrix.derivative[k] = albedo[k] * (dp * once + p * s * darea * more);
+        empty.derivative[k] = 2 * s * area * albedo[k] * p * light;
+    }
+    judge(dark);
+    judge(by_density);
+    judge(by_matrix);
+    if (slab_estimator == REY_ESTIMATOR_PROBE) {
+        judge(empty);
+    }
+}
+
 // The three of them as functions of where the slab begins and ends.
 static void test_borders(void **state) {
     UNUSED(state);
@@ -190,6 +223,7 @@ static void test_score(void **state) {
     slab_estimator = REY_ESTIMATOR_SCORE;
     test_transmittance(state);
     test_single_scattering(state);
+    test_flakes(state);
     test_furnace(state);
     refused(air, "fog.scale.value", "the score function has none where an extinction is 0");
     refused(fog, "slab.to_world", "the score function has none of media that move");
@@ -238,7 +272,7 @@ int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
-                                       cmocka_unit_test(test_score),
+                                       cmocka_unit_test(test_score),         cmocka_unit_test(test_flakes),
                                        cmocka_unit_test(test_borders),
                                        cmocka_unit_test(test_outline)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);

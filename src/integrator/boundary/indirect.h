@@ -99,7 +99,8 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Mask m = v.m & sight.valid & m_ge(sight.x, f_set((real)job->x)) & m_lt(sight.x, f_set((real)(job->x + job->width))) &
              m_ge(sight.y, f_set((real)job->y)) & m_lt(sight.y, f_set((real)(job->y + job->height)));
     Vec3 d = v3_select(m, sight.d, v3_neg(v.d));
-    Spec f = spec_scale(c.albedo, phase_eval(&c.call, d, c.wi) * sight.density);
+    c.backwards = true;
+    Spec f = spec_scale(c.albedo, collision_phase(&c, d) * sight.density);
     Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
     m = m & m_gt(spec_max(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
