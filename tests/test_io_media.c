@@ -211,6 +211,7 @@ static void test_records(void **state) {
     const PhaseNode *flakes = view->phases + view->phases[blend->child[1]].child[1];
     assert_int_equal(view->textures[table->slot[0]].width, 3);
     assert_true(view->theta[view->textures[flakes->slot[0]].theta + 2] == 0.25f);
+    assert_true(m->flakes < 0); // they only scatter
     float rows[12] = {0};
     assert_int_equal(rey_scene_update(scene), REY_OK);
     memcpy(rows, view->tables + v->table, sizeof rows);
@@ -231,7 +232,11 @@ static void test_use(void **state) {
     assert_true(scene->view.has_media && scene->view.sensors[0].medium == 0);
     find(scene, "eye.medium.sigma_t.value.value");
     rey_scene_destroy(scene);
+    scene = must_load(*state, HOMO("<phase type='sggx'>" GRID("S", "flakes.vol", "") "</phase>"));
+    assert_int_equal(scene->view.media[0].flakes, scene->view.phases[scene->view.media[0].phase].slot[0]);
+    rey_scene_destroy(scene);
     scene = must_load(*state, HOMO(""));
+    assert_true(scene->view.media[0].flakes < 0);
     assert_false(scene->view.has_media);
     rey_scene_destroy(scene);
 }

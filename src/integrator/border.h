@@ -46,7 +46,7 @@ static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p, Vec3
             inside = inside & m_ge(x, f_set(corner)) & m_le(x, f_set(corner + size));
         }
     }
-    f.extinction = spec_zero_unless(inside, medium_extinction(scene, &track, q, p, d, f_set(0)));
+    f.extinction = spec_zero_unless(inside, medium_extinction(scene, &track, p, d));
     if (medium->emission >= 0) {
         const VolumeNode *emission = scene->volumes + medium->emission;
         f.emission = spec_zero_unless(inside, volume_eval(scene, emission, volume_to_local(scene, emission, p, 1)));

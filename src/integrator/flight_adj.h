@@ -83,13 +83,10 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     a.collided = m_first_n(batch->count) & (Mask)i_load(ws->records.prim + at);
     a.end = f_select(a.collided, f_load(ws->records.ldist + at), f_set(0));
     // Collisions have the density extinction, and the weight extinction / (extinction + sparse).
-    Track track = track_of(t, batch->group);
-    a.hit = extinction_at(scene, &track, v3_madd(a.f.o, a.end, a.f.d), a.f.d);
-    for (int c = 0; c < SPEC_N; c++) {
-        a.hit.c[c] = a.onward.c[c] * f_safe_rcp(a.hit.c[c] + a.f.sparse);
-    }
+    a.hit = spec_mul(a.onward, flight_rcp(t, batch->group, &a.f, a.end));
     a.gain = spec_zero();
     if (m_any(a.probed)) {
+        Track track = track_of(t, batch->group);
         SampleKey own = stream_key(t, a.f.slot, batch->bounce, STREAM_FLIGHT);
         Spec weight = track_weight(&track, a.f.o, a.f.d, a.f.probe, channel_shares(t, a.f.beta), a.probed, &own, 0);
         // The flight was chosen with the probability worth / total.

@@ -44,14 +44,26 @@ KFN FlightSweep flight_load(const Tracer *t, const RecordBatch *batch) {
     return f;
 }
 
-// Weights of the probe at a point of the flight, by channel; collisions have the rest.
-KFN Spec probe_share(const Tracer *t, int32_t medium, const FlightSweep *f, Float at) {
-    Track track = track_of(t, medium);
-    Spec sigma = extinction_at(t->scene, &track, v3_madd(f->o, at, f->d), f->d);
+KFN Spec rcp_of_sum(Spec sigma, Float sparse) {
     for (int c = 0; c < SPEC_N; c++) {
-        sigma.c[c] = f->sparse * f_safe_rcp(sigma.c[c] + f->sparse);
+        sigma.c[c] = f_safe_rcp(sigma.c[c] + sparse);
     }
     return sigma;
+}
+
+// One over extinction + sparse at a point of the flight.
+KFN Spec flight_rcp(const Tracer *t, int32_t medium, const FlightSweep *f, Float at) {
+    Track track = track_of(t, medium);
+    Vec3 p = v3_madd(f->o, at, f->d);
+    if (track.medium->flakes >= 0) {
+        return rcp_of_sum(flakes_extinction(t->scene, &track, p, f->d), f->sparse);
+    }
+    return rcp_of_sum(bare_extinction(t->scene, &track, volume_to_local(t->scene, track.sigma_t, p, 1)), f->sparse);
+}
+
+// Weights of the probe at a point of the flight, by channel; collisions have the rest.
+KFN Spec probe_share(const Tracer *t, int32_t medium, const FlightSweep *f, Float at) {
+    return spec_scale(flight_rcp(t, medium, f, at), f->sparse);
 }
 
 KFN bool extinction_is_live(const Tracer *t, int32_t medium) {

@@ -30,19 +30,27 @@ typedef struct Track {
 #define PADDED_DEPTH 0.5f
 #define PADDED_SHARE 0.05f
 
-// At the distance `at` along the ray o, d of the world; p: the point there in the space of sigma_t.
-KFN Spec medium_extinction(const SceneView *scene, const Track *t, Vec3 p, Vec3 o, Vec3 d, Float at) {
-    Spec sigma = spec_scale(volume_eval(scene, t->sigma_t, p), f_set((real)scene->theta[t->medium->scale]));
-    if (t->medium->flakes >= 0) {
-        Vec3 world = v3_madd(o, f_zero_unless(m_finite(at), at), d);
-        sigma = spec_scale(sigma, flakes_area(scene, t->medium->flakes, world, d));
-    }
-    return sigma;
+// At a point of the space of sigma_t; of media without flakes.
+KFN Spec bare_extinction(const SceneView *scene, const Track *t, Vec3 p) {
+    return spec_scale(volume_eval(scene, t->sigma_t, p), f_set((real)scene->theta[t->medium->scale]));
 }
 
-// The same, given only the point of the world.
-KFN Spec extinction_at(const SceneView *scene, const Track *t, Vec3 p, Vec3 d) {
-    return medium_extinction(scene, t, volume_to_local(scene, t->sigma_t, p, 1), p, d, f_set(0));
+// Along d at a point of the world; of media of flakes.
+static NOINLINE Spec flakes_extinction(const SceneView *scene, const Track *t, Vec3 p, Vec3 d) {
+    Spec bare = bare_extinction(scene, t, volume_to_local(scene, t->sigma_t, p, 1));
+    return spec_scale(bare, flakes_area(scene, t->medium->flakes, p, d));
+}
+
+// Along d at a point of the world.
+KFN Spec medium_extinction(const SceneView *scene, const Track *t, Vec3 p, Vec3 d) {
+    return t->medium->flakes >= 0 ? flakes_extinction(scene, t, p, d)
+                                  : bare_extinction(scene, t, volume_to_local(scene, t->sigma_t, p, 1));
+}
+
+// Where a walk along o, d stands; lanes that are nowhere look at o.
+KFN Spec walk_extinction(const SceneView *scene, const Track *t, const MajorantWalk *w, Vec3 o, Vec3 d) {
+    return t->medium->flakes >= 0 ? flakes_extinction(scene, t, v3_madd(o, f_zero_unless(m_finite(w->t), w->t), d), d)
+                                  : bare_extinction(scene, t, majorant_point(w));
 }
 
 KFN MajorantWalk track_start(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m) {
@@ -72,7 +80,7 @@ KFN bool track_is_uniform(const Track *t) {
 }
 
 KFN Spec uniform_extinction(const SceneView *scene, const Track *t, Vec3 d) {
-    return medium_extinction(scene, t, v3_zero(), v3_zero(), d, f_set(0));
+    return t->medium->flakes >= 0 ? flakes_extinction(scene, t, v3_zero(), d) : bare_extinction(scene, t, v3_zero());
 }
 
 KFN Spec uniform_transmittance(Spec sigma, Float t) {
@@ -104,7 +112,7 @@ static NOINLINE Spec track_transmittance(const Track *t, Vec3 o, Vec3 d, Float t
         if (grey) {
             passed = spec_set(transmittance.c[0] * (1.0f - grey_extinction(t, &w) * rcp));
         } else {
-            Spec share = spec_scale(medium_extinction(t->values, t, majorant_point(&w), o, d, w.t), rcp);
+            Spec share = spec_scale(walk_extinction(t->values, t, &w, o, d), rcp);
             passed = spec_mul(transmittance, spec_sub(spec_set(f_set(1)), share));
         }
         if (t->roulette) {
@@ -187,8 +195,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
         Vec2 u = rng_2d(&random, dimension + i);
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
-        Vec3 p = majorant_point(&w);
-        Spec sigma = medium_extinction(t->scene, t, p, o, d, w.t), counts = spec_mul(importance, weight);
+        Spec sigma = walk_extinction(t->scene, t, &w, o, d), counts = spec_mul(importance, weight);
         Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
         real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
         Mask collided = met & m_lt(u.y, real_share);
@@ -196,7 +203,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         if (t->values == t->scene) {
             flight.weight = weight;
         } else {
-            Spec value = medium_extinction(t->values, t, p, o, d, w.t);
+            Spec value = walk_extinction(t->values, t, &w, o, d);
             Spec other = collision_weight(flight.weight, value, w.majorant, real_share, collided);
             flight.weight = spec_select(met, other, flight.weight);
         }

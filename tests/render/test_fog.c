@@ -134,6 +134,24 @@ static void test_furnace(void **state) {
     judge(c);
 }
 
+// Flakes that grow: what bounds their extinction must follow.
+static void test_growing_flakes(void **state) {
+    UNUSED(state);
+    const rey_define defines[MOST_DEFINES] = {{"sky", "1"}, {"medium", "flakes"}, {"kind", "heterogeneous"}};
+    const float wide[6] = {2, 1.6f, 2.56f, 0.4f, 0, 0};
+    Case c = {.text = "flakes that grow"};
+    double mean[3], error[3];
+    Room room = slab_open(defines, 2);
+    mean_of(room, -1, NULL, 64, mean, error);
+    ok(room, rey_param_set(room.scene, rey_param_find(room.scene, "flakes.phase_function.S"), wide, 6));
+    mean_of(room, -1, NULL, 1024, mean, error);
+    for (int k = 0; k < 3; k++) {
+        c.value[k] = exp(-2 * sigma[k] * 1.6);
+    }
+    expect(&c, "transmittance", mean, error, c.value, 1);
+    room_close(room);
+}
+
 // Transmittance and single scattering in flakes that show the area A along the view and m^1/2 across it, where they scatter back
 // p = A^2 / (4 pi m^1/2): both depend on the extinction sigma A, and all on the matrix.
 static void test_flakes(void **state) {
@@ -273,6 +291,7 @@ int main(int argc, char **argv) {
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_score),         cmocka_unit_test(test_flakes),
+                                       cmocka_unit_test(test_growing_flakes),
                                        cmocka_unit_test(test_borders),
                                        cmocka_unit_test(test_outline)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
