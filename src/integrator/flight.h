@@ -165,8 +165,8 @@ KFN Collision collision_look(const Tracer *t, int32_t medium, const Hit *hit, Ve
     return c;
 }
 
-// What is scattered between wi and wo per unit of the extinction that a flight meets which comes along -wi. The phase function is
-// given the camera's side first. Of flakes, extinction times phase function are the same both ways, otherwise the extinction alone.
+// The phase function between wi and wo where the flight that collided came along -wi. It is evaluated from the camera's side; but of
+// flakes, extinction times phase function is what is the same both ways, and the extinction that counts is that of the flight.
 KFN Float collision_phase(const Collision *c, Vec3 wo) {
     bool exchanged = c->backwards && c->medium->flakes < 0;
     return phase_eval(&c->call, exchanged ? wo : c->wi, exchanged ? c->wi : wo);

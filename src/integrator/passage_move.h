@@ -2,7 +2,7 @@
 // w the ray's direction, a point at distance s from where it begins moves by s dw, so that with the transmittance T
 //   dT = -T int s grad(extinction) . dw ds - T extinction(end) d(length) + T sum_i dx_i (extinction behind - in front),
 //   dx_i = n . (v_i - s_i dw) / n . w
-// at the borders i that it crosses (border.h).
+// at the borders i that it crosses (border.h). In media of flakes the extinction also changes by its slope along dw itself.
 // NOT differentiated: jumps between nearest voxels, and surfaces that dim what passes them, under rays that turn.
 #pragma once
 

@@ -51,7 +51,7 @@ KFN Spec rcp_of_sum(Spec sigma, Float sparse) {
     return sigma;
 }
 
-// One over extinction + sparse at a point of the flight.
+// One over extinction + sparse at a point of the flight. Flakes are apart, so that others have sum and product in one operation.
 KFN Spec flight_rcp(const Tracer *t, int32_t medium, const FlightSweep *f, Float at) {
     Track track = track_of(t, medium);
     Vec3 p = v3_madd(f->o, at, f->d);
