@@ -185,6 +185,23 @@ static void test_flakes(void **state) {
     }
 }
 
+// Flakes seen by a camera that turns about the slab's middle, d' = (0, 1, 0), and flakes in a slab that grows. Of the first, lengths
+// stay, and the area changes by -S_yz / A.
+static void test_turned_flakes(void **state) {
+    UNUSED(state);
+    const double area = 0.8, yz = 0.2;
+    Case turned = {"flakes from another side", {{"sky", "1"}, {"medium", "flakes"}, {"S", "0.5, 0.4, 0.64, 0, 0, 0.2"}}, {0},
+                   "camera.to_world", {[6] = 1, [7] = -3, [9] = 0.5f}, {0}};
+    Case grown = {"more flakes", {{"sky", "1"}, {"medium", "flakes"}}, {0}, "slab.to_world", {[10] = 1}, {0}};
+    for (int k = 0; k < 3; k++) {
+        turned.value[k] = grown.value[k] = exp(-2 * sigma[k] * area);
+        turned.derivative[k] = 2 * sigma[k] * yz / area * turned.value[k];
+        grown.derivative[k] = -2 * sigma[k] * area * grown.value[k];
+    }
+    judge(turned);
+    judge_kind(grown, "homogeneous");
+}
+
 // The three of them as functions of where the slab begins and ends.
 static void test_borders(void **state) {
     UNUSED(state);
@@ -291,7 +308,7 @@ int main(int argc, char **argv) {
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_score),         cmocka_unit_test(test_flakes),
-                                       cmocka_unit_test(test_growing_flakes),
+                                       cmocka_unit_test(test_growing_flakes), cmocka_unit_test(test_turned_flakes),
                                        cmocka_unit_test(test_borders),
                                        cmocka_unit_test(test_outline)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
