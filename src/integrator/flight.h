@@ -165,8 +165,8 @@ KFN Collision collision_look(const Tracer *t, int32_t medium, const Hit *hit, Ve
     return c;
 }
 
-// The phase function between wi and wo where the flight that collided came along -wi. It is evaluated from the camera's side; but of
-// flakes, extinction times phase function is what is the same both ways, and the extinction that counts is that of the flight.
+// The phase function between wi and wo where the flight that collided came along -wi. It is evaluated from the camera's side; but
+// of flakes, extinction times phase function is what is the same both ways, and the extinction that counts is that of the flight.
 KFN Float collision_phase(const Collision *c, Vec3 wo) {
     bool exchanged = c->backwards && c->medium->flakes < 0;
     return phase_eval(&c->call, exchanged ? wo : c->wi, exchanged ? c->wi : wo);

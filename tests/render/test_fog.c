@@ -185,8 +185,8 @@ static void test_flakes(void **state) {
     }
 }
 
-// Flakes seen by a camera that turns about the slab's middle, d' = (0, 1, 0), and flakes in a slab that grows. Of the first, lengths
-// stay, and the area changes by -S_yz / A.
+// Flakes seen by a camera that turns about the slab's middle, d' = (0, 1, 0), and flakes in a slab that grows. Of the first,
+// lengths stay, and the area changes by -S_yz / A.
 static void test_turned_flakes(void **state) {
     UNUSED(state);
     const double area = 0.8, yz = 0.2;
