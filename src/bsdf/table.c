@@ -48,6 +48,10 @@ bool rey_bsdf_bends(int kind) {
     return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_PLASTIC || rey_bsdf_opens(kind);
 }
 
+bool rey_bsdf_spreads(int kind) {
+    return !rey_bsdf_kinds[kind].adapter && (kind == BSDF_PLASTIC || !rey_bsdf_bends(kind));
+}
+
 bool rey_bsdf_mirrors(int kind) { return rey_bsdf_bends(kind) && kind != BSDF_MASK && kind != BSDF_NULL; }
 
 bool rey_bsdf_refracts(int kind) { return kind == BSDF_DIELECTRIC; }
@@ -59,7 +63,7 @@ bool rey_bsdf_tints(int kind) { return kind == BSDF_THINDIELECTRIC; }
 bool rey_bsdf_draws(int kind, int param) {
     ParamType type = rey_bsdf_kinds[kind].params[param].type;
     bool one_lobe = kind == BSDF_DIFFUSE || kind == BSDF_ROUGHCONDUCTOR, rough = type == PARAM_ALPHA_U || type == PARAM_ALPHA_V;
-    return one_lobe ? rough : kind == BSDF_PLASTIC || !(rey_bsdf_bends(kind) || rey_bsdf_kinds[kind].adapter);
+    return one_lobe ? rough : rey_bsdf_spreads(kind);
 }
 
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }

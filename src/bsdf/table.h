@@ -25,6 +25,8 @@ int rey_bsdf_kind_find(const char *name); // -1 when unknown
 
 // Whether paths go on from it in a direction that follows from where they came: by themselves, not through children.
 bool rey_bsdf_bends(int kind);
+// Whether light from other than single directions is scattered: by the function itself, not by its children.
+bool rey_bsdf_spreads(int kind);
 // Whether smooth surfaces of a kind turn paths into other directions by themselves.
 bool rey_bsdf_mirrors(int kind);
 // Whether smooth surfaces of a kind refract.

@@ -202,7 +202,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         find_surface(scene, group, &v.hit, &surface, &dp_dv);
         call.surface = &surface;
     }
-    if (scene->emitters_count > 0) {
+    if (scene->emitters_count > 0 && scene->bsdfs[group->bsdf].spreads) {
         connect_lights(t, group, &v, &si, &call, wi, &key, bounce, record);
     }
     return scatter_paths(t, group, &v, &si, &call, wi, &key, bounce, record, next_count);

@@ -248,6 +248,7 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         bsdf->surface |= nested->surface;
         bsdf->turns |= nested->turns;
         bsdf->transmits |= nested->transmits;
+        bsdf->spreads |= nested->spreads;
     }
     return REY_OK;
 }
@@ -256,6 +257,7 @@ static rey_result add_bsdf(Builder *b, int kind, BsdfNode bsdf, int32_t *out) {
     rey_scene *scene = b->scene;
     int32_t size = rey_bsdf_table_size(kind);
     bsdf.kind = kind;
+    bsdf.spreads |= rey_bsdf_spreads(kind);
     bsdf.table = -1;
     if (size > 0) {
         bsdf.table = rey_scene_append(scene, &scene->build.tables, sizeof(float), size);

@@ -44,6 +44,7 @@ typedef struct BsdfNode {
     int32_t child[MAX_CHILDREN]; // nested functions, -1 = none
     int32_t table;               // first derived value in `tables`, -1 = none
     int32_t transmits;           // lets light through, itself or in a child
+    int32_t spreads;             // scatters into more than single directions, itself or in a child
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
     int32_t turns;               // turns the shading normal, itself or in a child
 } BsdfNode;
