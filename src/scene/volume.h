@@ -11,6 +11,8 @@ typedef struct Voxels {
     Int at[8];
     Float f[3];
     int32_t count;
+    Mask apart; // lanes whose two voxels along x are neighbours in memory, not one and the same
+    bool near;  // in all lanes they are one of both
 } Voxels;
 
 // The two voxels along one axis, and the weight of the upper one. Voxel i lies at (i + 1/2) / n.
@@ -29,6 +31,8 @@ KFN Voxels voxels_around(const VolumeNode *v, Vec3 p) {
     voxels_along(v, p.x, v->nx, &x[0], &x[1], &s.f[0]);
     voxels_along(v, p.y, v->ny, &y[0], &y[1], &s.f[1]);
     voxels_along(v, p.z, v->nz, &z[0], &z[1], &s.f[2]);
+    s.apart = mi_eq(x[1], x[0] + 1);
+    s.near = !m_any(~(s.apart | mi_eq(x[1], x[0])));
     for (int k = 0; k < 8; k++) {
         s.at[k] = ((z[k >> 2] * v->ny + y[k >> 1 & 1]) * v->nx + x[k & 1]) * v->channels;
     }
@@ -43,14 +47,47 @@ KFN Float voxel_weight(const Voxels *s, int k) {
 
 KFN Spec voxel_value(const SceneView *scene, const VolumeNode *v, Int at) {
     Spec s;
-    for (int c = 0; c < SPEC_N; c++) {
-        s.c[c] = v->channels == 1 && c ? s.c[0] : theta_at(scene, at + (v->theta + c));
+    if (v->channels == 1) {
+        return spec_set(theta_at(scene, at + v->theta));
     }
+    static_assert(SPEC_N == 3, "colours are read as three numbers");
+    f_gather3(scene->theta, at + v->theta, s.c);
     return s;
+}
+
+// The values of the eight voxels of a volume of numbers: those that stand side by side are read together.
+KFN void voxel_numbers(const SceneView *scene, const VolumeNode *v, const Voxels *s, Float *values) {
+    for (int k = 0; k < 8; k += 2) {
+        if (s->near) {
+            Float row[3];
+            f_gather3(scene->theta, s->at[k] + v->theta, row);
+            values[k] = row[0];
+            values[k + 1] = f_select(s->apart, row[1], row[0]);
+        } else {
+            values[k] = theta_at(scene, s->at[k] + v->theta);
+            values[k + 1] = theta_at(scene, s->at[k + 1] + v->theta);
+        }
+    }
+}
+
+// A volume of numbers at the point that the voxels are around.
+KFN Float voxels_number(const SceneView *scene, const VolumeNode *v, const Voxels *s) {
+    if (s->count == 1) {
+        return theta_at(scene, s->at[0] + v->theta);
+    }
+    Float values[8], value = f_set(0);
+    voxel_numbers(scene, v, s, values);
+    for (int k = 0; k < 8; k++) {
+        value = value + voxel_weight(s, k) * values[k];
+    }
+    return value;
 }
 
 KFN Spec gridvolume_eval(const SceneView *scene, const VolumeNode *v, Vec3 p) {
     Voxels s = voxels_around(v, p);
+    if (v->channels == 1) {
+        return spec_set(voxels_number(scene, v, &s));
+    }
     if (s.count == 1) {
         return voxel_value(scene, v, s.at[0]);
     }
@@ -76,6 +113,18 @@ KFN Vec3 voxels_slope(const VolumeNode *v, const Voxels *s, const Float *along) 
     return v3(slope[0], slope[1], slope[2]);
 }
 
+// Adds w_k d to the voxels of a volume of numbers, those that stand side by side together.
+KFN void voxels_add(const Voxels *s, Float d, double *gradient, Mask m) {
+    for (int k = 0; k < 8; k += 2) {
+        f_prefetch_double(gradient, s->at[k]);
+    }
+    for (int k = 0; k < 8; k += 2) {
+        Float low = voxel_weight(s, k) * d, high = voxel_weight(s, k + 1) * d;
+        f_scatter_add_doubles(gradient, s->at[k], low, high, m & s->apart);
+        f_scatter_add_double(gradient, s->at[k], low + high, m & ~s->apart);
+    }
+}
+
 // at: where the values begin in the sink, -1 = not asked for; dp may be null.
 KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spec d, int32_t at, Vec3 *dp, Sink *sink,
                         Mask m) {
@@ -83,10 +132,14 @@ KFN void gridvolume_adj(const SceneView *scene, const VolumeNode *v, Vec3 p, Spe
     Float along[8];
     const int channels = v->channels == 1 ? 1 : SPEC_N;
     Spec each = v->channels == 1 ? spec_set(spec_sum(d)) : d;
+    const bool rows = at >= 0 && v->channels == 1 && s.count == 8 && s.near && sink->gradient;
+    if (rows) {
+        voxels_add(&s, each.c[0], sink->gradient + at, m);
+    }
     for (int k = 0; k < s.count; k++) {
         // value = sum_k w_k voxel_k
         Float w = voxel_weight(&s, k);
-        for (int c = 0; c < channels && at >= 0; c++) {
+        for (int c = 0; c < channels && at >= 0 && !rows; c++) {
             sink_add(sink, s.at[k] + (at + c), w * each.c[c], m);
         }
         along[k] = dp ? spec_dot(d, voxel_value(scene, v, s.at[k])) : f_set(0);
@@ -158,11 +211,7 @@ KFN Float volume_eval_real(const SceneView *scene, const VolumeNode *v, Vec3 p) 
         return f_set((real)scene->theta[v->theta]);
     }
     Voxels s = voxels_around(v, p);
-    Float value = f_set(0);
-    for (int k = 0; k < s.count; k++) {
-        value = value + voxel_weight(&s, k) * theta_at(scene, s.at[k] + v->theta);
-    }
-    return value;
+    return voxels_number(scene, v, &s);
 }
 
 // At a point of the volume's own space.
