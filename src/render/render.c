@@ -158,7 +158,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     job->paths = job->rays = job->nonfinite = 0;
     job->trace_seconds = 0;
     job->faces = 0;
-    double start = rey_thread_seconds();
+    double start = rey_thread_seconds(), clock = rey_seconds();
     if (unit.particles) {
         r->backend->run_particles(unit.particles);
     } else if (unit.boundary) {
@@ -166,7 +166,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     } else {
         r->backend->run(job);
     }
-    double seconds = rey_thread_seconds() - start;
+    double seconds = rey_thread_seconds() - start, passed = rey_seconds() - clock;
     pthread_mutex_lock(&r->lock);
     r->stats.paths += job->paths;
     r->stats.rays += job->rays;
@@ -174,7 +174,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->faces |= job->faces;
     bool turned = (r->faces & FACES_BOTH) == FACES_BOTH, mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
     r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
-    r->stats.trace_seconds += job->trace_seconds;
+    r->stats.trace_seconds += passed > 0 ? job->trace_seconds * seconds / passed : 0; // what the thread worked of it
     r->stats.thread_seconds += seconds;
     r->done += 1;
     pthread_mutex_unlock(&r->lock);
