@@ -187,6 +187,7 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     filter_tabulate(t.sensor, &filter);
     t.derivative = mode_records(job->mode);
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
+    t.shadows_later = t.derivative && t.scene->through && (job->mode == MODE_REPLAY || passing_is_live(&t));
     int64_t total = (int64_t)job->width * job->height * job->spp;
     t.most = t.ws.chunk;
     for (int64_t first = 0, count; first < total && (!job->go_on || job->go_on(job->user)); first += count) {

@@ -19,7 +19,7 @@ typedef struct CollisionSweep {
     Collision at;
 } CollisionSweep;
 
-static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Walk *walk) {
+static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Passage *p) {
     const Records *r = &t->ws.records;
     const int32_t at = batch->first;
     CollisionSweep s = {.m = m_first_n(batch->count)};
@@ -27,7 +27,8 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
     s.beta = spec_load(r->beta, at);
     s.unshadowed = spec_load(r->light_weight, at);
-    s.connected = s.m & m_gt(spec_max(s.unshadowed), f_set(0));
+    collision_passage_find(t, batch, s.hit.p, slot, p);
+    s.connected = p->open;
     s.scattered = s.m & m_gt(f_load(r->sw + at), f_set(0));
     s.light = i_load(r->light + at);
     s.light_prim = i_load(r->lprim + at);
@@ -39,10 +40,8 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     s.at = collision_look(t, batch->group, &s.hit, d);
     s.light_phase = phase_eval(&s.at.call, s.at.wi, s.light_d);
     s.phase = phase_eval(&s.at.call, s.at.wi, s.wo);
-    s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
-    Ray ray;
-    collision_shadow_ray(s.hit.p, s.light_d, s.light_distance, &ray);
-    s.transmittance = walk_again(t, &ray, slot, i_set(batch->group), batch->bounce, s.connected, walk);
+    s.light_value = p->light_value;
+    s.transmittance = p->transmittance;
     s.lit = spec_mul(s.light_value, spec_mul(s.unshadowed, s.transmittance));
     return s;
 }
@@ -85,14 +84,13 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
 }
 
 static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
-                            Sink *sink) {
+                            Passage *p, Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
     const bool glides = t->job->glides;
     if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing && !glides) {
         return;
     }
-    Walk walk;
-    CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
+    CollisionSweep s = collision_load(t, batch, slot, suffix, p);
     s.at.call.at.hit = &s.hit; // not where it was loaded
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
@@ -105,7 +103,7 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         if (live_passing) {
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
-            Vec3 dp = connection_passage_adj(t, &walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p,
+            Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p,
                                              s.light, s.connected, s.light_d, s.light_distance, sink);
             g.position = v3_add(g.position, dp);
         }

@@ -144,10 +144,9 @@ KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
 
 // The adjoint of a batch of surface vertices that something selected reaches.
 static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Spec attached, Mask finite,
-                          bool live_passing, Sink *sink) {
+                          bool live_passing, Passage *p, Sink *sink) {
     PathJob *job = t->job;
     int32_t live = job->live[batch->group];
-    Walk walk;
     SurfaceSweep s = surface_load(t, batch, slot, suffix);
     s.attached = attached;
     surface_parameterise(t, &s);
@@ -157,7 +156,11 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     if ((job->any_motion || job->any_places) && s.first && m_any(s.scattered & s.chained)) {
         sink->faces |= CAMERA_MIRRORED;
     }
-    if ((live & LIVE_SCATTERING) || live_passing) {
+    if (t->scene->through) {
+        surface_passage_find(t, batch, &s, p);
+        s.connected = p->open;
+        s.light_value = p->light_value;
+    } else if (live & LIVE_SCATTERING) {
         s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
     }
     Corner corner;
@@ -168,10 +171,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     }
     Spec unshadowed = s.light_weight, transmittance = spec_set(f_set(1));
     if (t->scene->through) {
-        Ray ray;
-        shadow_ray(&s.si, s.light_d, s.light_distance, &ray);
-        Int medium = medium_behind(s.group, s.si.ng, s.light_d, i_load(t->ws.records.medium + s.at));
-        transmittance = walk_again(t, &ray, slot, medium, batch->bounce, s.connected, &walk);
+        transmittance = p->transmittance;
         s.light_weight = spec_mul(unshadowed, transmittance);
     }
     for (int c = 0; c < drives(t); c++) {
@@ -180,7 +180,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
         if (live_passing) {
             // L += f Le w_l T
             Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
-            connection_passage_adj(t, &walk, transmittance, dt, slot, batch->bounce, s.si.p, s.light, s.connected, s.light_d,
+            connection_passage_adj(t, &p->walk, transmittance, dt, slot, batch->bounce, s.si.p, s.light, s.connected, s.light_d,
                                    s.light_distance, sink);
         }
         forward_flush(t, sink, slot, c, s.m);
@@ -222,6 +222,7 @@ static void path_backward(Tracer *t, int32_t count) {
     const Records *r = &t->ws.records;
     Sink sink = sink_of(job);
     bool live_passing = passing_is_live(t);
+    Passage p;
     if (job->any_motion) {
         vertices_forget(t);
     }
@@ -237,6 +238,10 @@ static void path_backward(Tracer *t, int32_t count) {
         Mask m = m_first_n(batch->count);
         Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
         Spec suffix = spec_gather(t->ws.suffix, slot);
+        p.found = false;
+        if (t->shadows_later && batch->tag != VERTEX_FLIGHT) {
+            passage_light(t, batch, slot, &p);
+        }
         // L = local + weight L_next
         Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
         Mask finite = m & m_finite(spec_sum(l));
@@ -246,7 +251,7 @@ static void path_backward(Tracer *t, int32_t count) {
             continue;
         }
         if (batch->tag == VERTEX_MEDIUM) {
-            collision_sweep(t, batch, slot, suffix, finite, live_passing, &sink);
+            collision_sweep(t, batch, slot, suffix, finite, live_passing, &p, &sink);
             continue;
         }
         if (border_is_live(t, batch)) {
@@ -254,7 +259,7 @@ static void path_backward(Tracer *t, int32_t count) {
         }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
         if (job->live[batch->group] || job->live_lights || live_passing) {
-            surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &sink);
+            surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &p, &sink);
         }
     }
     if (job->glides) {

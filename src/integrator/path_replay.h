@@ -27,11 +27,10 @@ static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec s
         Spec value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
         Spec f = bsdf_eval(&s.call, s.wi, s.wl, i_set(LOBE_SMOOTH)), weight = s.light_weight;
         if (t->scene->through) {
-            Walk walk;
-            Ray ray;
-            shadow_ray(&s.si, s.light_d, s.light_distance, &ray);
-            Int medium = medium_behind(s.group, s.si.ng, s.light_d, i_load(t->ws.records.medium + s.at));
-            weight = spec_mul(weight, walk_again(t, &ray, slot, medium, batch->bounce, s.connected, &walk));
+            Passage p;
+            p.found = false;
+            surface_passage_find(t, batch, &s, &p);
+            weight = spec_mul(weight, p.transmittance);
         }
         weight = t->scene->drops ? kept_replay(t, &s, weight) : weight;
         l = spec_add(l, spec_zero_unless(s.connected, spec_mul(spec_mul(f, value), weight)));
@@ -60,8 +59,9 @@ static Spec replay_flight(Tracer *t, const RecordBatch *batch, Int slot, Spec su
 }
 
 static Spec replay_collision(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
-    Walk walk;
-    CollisionSweep s = collision_load(t, batch, slot, suffix, &walk);
+    Passage p;
+    p.found = false;
+    CollisionSweep s = collision_load(t, batch, slot, suffix, &p);
     Spec l = spec_zero_unless(s.connected, spec_scale(s.lit, s.light_phase));
     return spec_mul(s.at.albedo, spec_add(l, spec_scale(s.onward, s.phase)));
 }

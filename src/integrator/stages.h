@@ -48,6 +48,7 @@ typedef struct Tracer {
     Fork *fork;              // or null
     int32_t *lobes;          // per slot, of the last vertex of a particle; or null
     bool placed;             // the paths' first vertices are known
+    bool shadows_later;      // shadow rays are traced by the sweep, which must know what they pass
     real *nudge[2];          // per slot, what is added to the uv of those; or null
     bool overflow;           // the chunk's vertices did not fit the records
     int32_t most;            // paths of the next chunk

@@ -134,6 +134,9 @@ KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
 
 // Appends the shadow rays of m: what they bring, to whom, and the media that they start in.
 KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t record, Int medium, Mask m) {
+    if (t->derivative && t->shadows_later) {
+        return;
+    }
     Shadows *q = &t->ws.shadows;
     int32_t at = t->shadow_count;
     v3_compress(q->ox + at, q->oy + at, q->oz + at, ray->o, m);

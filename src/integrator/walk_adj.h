@@ -40,18 +40,71 @@ static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *
     }
 }
 
-// Finds the transmittance of shadow rays again, which start in `medium` at vertices of a bounce.
-static NOINLINE Spec walk_again(Tracer *t, const Ray *ray, Int slot, Int medium, int32_t bounce, Mask m, Walk *walk) {
+// The light samples of a batch of vertices, and what their shadow rays pass: found once.
+typedef struct Passage {
+    bool found;
+    Mask open;          // lanes that have one, and that some choice of parameters would not block
+    Spec transmittance, light_value;
+    Walk walk;
+} Passage;
+
+// The shadow rays of the lanes of m begin in `medium`.
+static NOINLINE void passage_find(Tracer *t, const RecordBatch *batch, const Ray *ray, Int slot, Int medium, Mask m, Passage *p) {
+    const Records *r = &t->ws.records;
+    const int32_t at = batch->first;
     Mask blocked;
     Fog fog;
+    Walk *walk = &p->walk;
+    if (p->found) {
+        return;
+    }
     walk->count = walk->segments = 0;
     walk->d = ray->d;
     walk->clear = spec_set(f_set(1));
     if (t->scene->has_media) {
         fog.medium = medium;
-        fog.key = stream_key(t, slot, bounce, STREAM_SHADOW);
+        fog.key = stream_key(t, slot, batch->bounce, STREAM_SHADOW);
     }
-    return walk_transmittance(t, *ray, m, t->scene->has_media ? &fog : NULL, &blocked, walk);
+    p->transmittance = walk_transmittance(t, *ray, m, t->scene->has_media ? &fog : NULL, &blocked, walk);
+    p->open = m & ~blocked;
+    p->light_value = lights_eval(t->scene, i_load(r->light + at), m, (Vec2){f_load(r->lu + at), f_load(r->lv + at)},
+                                 i_load(r->lprim + at), f_load(r->ldist + at));
+    p->found = true;
+}
+
+static void surface_passage_find(Tracer *t, const RecordBatch *batch, const SurfaceSweep *s, Passage *p) {
+    Ray ray;
+    shadow_ray(&s->si, s->light_d, s->light_distance, &ray);
+    Int medium = medium_behind(s->group, s->si.ng, s->light_d, i_load(t->ws.records.medium + s->at));
+    passage_find(t, batch, &ray, s->slot, medium, s->connected, p);
+}
+
+static void collision_passage_find(Tracer *t, const RecordBatch *batch, Vec3 from, Int slot, Passage *p) {
+    const Records *r = &t->ws.records;
+    const int32_t at = batch->first;
+    Mask connected = m_first_n(batch->count) & m_gt(spec_max(spec_load(r->light_weight, at)), f_set(0));
+    Vec3 d = v3_select(connected, record_v3(r->ldx, r->ldy, r->ldz, at), record_v3(r->dx, r->dy, r->dz, at));
+    Ray ray;
+    collision_shadow_ray(from, d, f_load(r->ldist + at), &ray);
+    passage_find(t, batch, &ray, slot, i_set(batch->group), connected, p);
+}
+
+// Adds what the light samples of a batch bring, whose shadow rays were left to the sweep, to what leaves its vertices.
+static NOINLINE void passage_light(Tracer *t, const RecordBatch *batch, Int slot, Passage *p) {
+    const Records *r = &t->ws.records;
+    const int32_t at = batch->first;
+    if (!m_any(m_first_n(batch->count) & m_gt(spec_max(spec_load(r->light_weight, at)), f_set(0)))) {
+        return;
+    }
+    if (batch->tag == VERTEX_MEDIUM) {
+        collision_passage_find(t, batch, record_v3(r->px, r->py, r->pz, at), slot, p);
+    } else {
+        SurfaceSweep s = surface_load(t, batch, slot, spec_zero());
+        surface_passage_find(t, batch, &s, p);
+    }
+    Spec arrives = spec_mul(spec_mul(p->light_value, p->transmittance), spec_load(r->light_weight, at));
+    Spec lit = spec_zero_unless(p->open, spec_mul(arrives, spec_load(r->light_f, at)));
+    spec_store(r->local, at, spec_add(spec_load(r->local, at), lit));
 }
 
 // Accumulates the adjoint dt of a walk's transmittance, whose value is `transmittance`; turn: as passage_move_adj.
