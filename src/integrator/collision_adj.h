@@ -103,8 +103,9 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         if (live_passing) {
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
-            Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, spec_scale(dt, s.light_phase), slot, batch->bounce, s.hit.p,
-                                             s.light, s.connected, s.light_d, s.light_distance, sink);
+            dt = spec_scale(dt, s.light_phase);
+            Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, s.hit.p, s.light, s.connected,
+                                             s.light_d, s.light_distance, sink);
             g.position = v3_add(g.position, dp);
         }
         forward_flush(t, sink, slot, c, s.m);

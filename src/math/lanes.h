@@ -361,12 +361,6 @@ KFN void f_scatter_add_double(double *base, Int index, Float x, Mask m) {
         base[i_lane(index, lane)] += (double)f_lane(x, lane);
     }
 }
-// Fetches what is added to soon: additions wait for one another, the memory would too.
-KFN void f_prefetch_double(const double *base, Int index) {
-    for (int lane = 0; lane < LANES; lane++) {
-        __builtin_prefetch(base + i_lane(index, lane), 1);
-    }
-}
 // The same for base[index] and base[index + 1], which gain x and y.
 KFN void f_scatter_add_doubles(double *base, Int index, Float x, Float y, Mask m) {
     for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {

@@ -116,9 +116,6 @@ KFN Vec3 voxels_slope(const VolumeNode *v, const Voxels *s, const Float *along) 
 // Adds w_k d to the voxels of a volume of numbers, those that stand side by side together.
 KFN void voxels_add(const Voxels *s, Float d, double *gradient, Mask m) {
     for (int k = 0; k < 8; k += 2) {
-        f_prefetch_double(gradient, s->at[k]);
-    }
-    for (int k = 0; k < 8; k += 2) {
         Float low = voxel_weight(s, k) * d, high = voxel_weight(s, k + 1) * d;
         f_scatter_add_doubles(gradient, s->at[k], low, high, m & s->apart);
         f_scatter_add_double(gradient, s->at[k], low + high, m & ~s->apart);
