@@ -72,11 +72,6 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
             return (ChainObstacle){rey_bsdf_opens(kind) ? "light that passes undeviated through" : "the normals of", -1, i, -1};
         }
     }
-    for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
-        if ((view->shapes[i].flags & SHAPE_HAS_NORMALS) && rey_bsdf_holds(view, view->shapes[i].bsdf, rey_bsdf_refracts)) {
-            return (ChainObstacle){"the vertex normals of the smooth glass", i, -1, -1};
-        }
-    }
     return (ChainObstacle){NULL, -1, -1, -1};
 }
 

@@ -389,6 +389,12 @@ static Weigher weigher_of(const Render *r, int32_t kind) {
     return w;
 }
 
+// Whether what a surface sends out jumps where its shading normal turns away: not that of smooth glass, which mirrors all of the
+// light there, from both sides and into the same direction.
+static bool ends_at_normals(const SceneView *view, const ShapeRecord *shape) {
+    return shape->emitter >= 0 || !rey_bsdf_refracts(view->bsdfs[shape->bsdf].kind);
+}
+
 // May cut the edge to what the film sees.
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
@@ -419,6 +425,9 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     case EDGE_MARK:
         return w->kind == BOUNDARY_PRIMARY ? see_mark(r, &w->projection, e) : factor * mark_weight(r, e);
     case EDGE_TERMINATOR:
+        if (!boundary_is_horizon(w->kind) && !ends_at_normals(view, view->shapes + e->shape)) {
+            return 0;
+        }
         return turning ? factor * turning_weight(view, e) : see_terminator(view, &w->projection, w->eye, e);
     case EDGE_MESH:
         return w->kind == BOUNDARY_PRIMARY ? see_mesh_edge(view, &w->projection, w->eye, e)

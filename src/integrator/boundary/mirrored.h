@@ -79,7 +79,8 @@ static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again
 enum { LINES_ALIKE = -1 };
 
 // The first vertex at which two lines of sight part because they meet different surfaces there, or different fields of one's
-// textures: 0 is what the sensor sees itself. LINES_ALIKE: none, or they are mirrored or refracted differently.
+// textures. 0: it is what the sensor sees itself, or they take different lobes, where nothing jumps on average, but thin bands may
+// lie beside, as where glass refracts rays into itself shortly before all of the light is mirrored. LINES_ALIKE: none of these.
 static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *a, const Sightline *b, Mask m) {
     Int level = i_set(LINES_ALIKE);
     for (int32_t i = 0; i < a->last && i < b->last; i++) {
@@ -90,7 +91,9 @@ static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *
         Mask met = m & same & mi_lt(i_set(-1), a->hit[i].shape);
         same = same & ~fields_part(t->scene, job, a->hit[i].shape, a->uv[i], b->uv[i], met, &unused, &step);
         level = i_select(m & ~same, i_set(i), level);
-        m = m & same & mi_eq(a->lobe[i], b->lobe[i]) & lobe_turns(a->lobe[i]);
+        Mask alike = mi_eq(a->lobe[i], b->lobe[i]);
+        level = i_select(m & same & ~alike, i_set(0), level);
+        m = m & same & alike & lobe_turns(a->lobe[i]);
     }
     return level;
 }

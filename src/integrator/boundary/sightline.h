@@ -18,6 +18,12 @@ typedef struct Sightline {
     int32_t last;            // levels that are filled
 } Sightline;
 
+// Whether what a surface sends out jumps where its shading normal is at right angles to a line. Smooth glass mirrors all of the
+// light there, from both sides and into the same direction.
+KFN bool sightline_ends_at_normals(const SceneView *scene, const Group *group) {
+    return scene->bsdfs[group->bsdf].kind != BSDF_DIELECTRIC || group->emitter >= 0;
+}
+
 // Where vertices of level i lie on surfaces that mirror or refract, turns the ray; returns these lanes.
 static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, Mask m, Sightline *s, Ray *ray) {
     const SceneView *scene = t->scene;
@@ -42,7 +48,9 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
             find_surface(scene, group, &h, &surface, &dp_dv);
             call.surface = &surface;
         }
-        s->behind[i] = i_select(mine & m_lt(wi.z, f_set(0)), i_set(1), s->behind[i]);
+        if (sightline_ends_at_normals(scene, group)) {
+            s->behind[i] = i_select(mine & m_lt(wi.z, f_set(0)), i_set(1), s->behind[i]);
+        }
         BsdfSample b = bsdf_sample(&call, wi, u, at);
         Float pdf;
         Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
