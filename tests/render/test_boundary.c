@@ -188,6 +188,7 @@ static const Motion motions[] = {
     {"smooth_lid.xml", "lamp.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 2},
     {"smooth_tank.xml", "glass.eta", ADD, {0}, 0.005, 2},
     {"smooth_glass.xml", "ball.positions", SHEAR, {0}, 0.005, 1},
+    {"smooth_band.xml", "ball.positions", SHEAR, {0}, 0.001, 2},
     {"seen_lines.xml", "mirror.bsdf.specular_reflectance.to_uv", ADD, {0}, 0.008, 1},
     {"seen_lines.xml", "floor.bsdf.reflectance.to_uv", ADD, {0}, 0.01, 1},
     {"seen_lines.xml", "ball.emitter.radiance.to_uv", ADD, {0}, 0.01, 1},
