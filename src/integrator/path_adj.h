@@ -142,51 +142,54 @@ KFN void watch_normals(const Tracer *t, const SurfaceSweep *s, Sink *sink) {
     }
 }
 
-// The adjoint of a batch of surface vertices that something selected reaches.
-static void surface_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Spec attached, Mask finite,
-                          bool live_passing, Passage *p, Sink *sink) {
+// Whether something selected reaches a batch of surface vertices.
+KFN bool surface_is_live(const Tracer *t, const RecordBatch *batch, bool live_passing) {
+    return batch->tag == VERTEX_SURFACE && (t->job->live[batch->group] || t->job->live_lights || live_passing);
+}
+
+// The adjoint of such a batch.
+static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, Mask finite, bool live_passing, Passage *p,
+                          Sink *sink) {
     PathJob *job = t->job;
-    int32_t live = job->live[batch->group];
-    SurfaceSweep s = surface_load(t, batch, slot, suffix);
-    s.attached = attached;
-    surface_parameterise(t, &s);
+    const int32_t live = job->live[batch->group];
+    surface_parameterise(t, s);
     if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
-        watch_normals(t, &s, sink);
+        watch_normals(t, s, sink);
     }
-    if ((job->any_motion || job->any_places) && s.first && m_any(s.scattered & s.chained)) {
+    if ((job->any_motion || job->any_places) && s->first && m_any(s->scattered & s->chained)) {
         sink->faces |= CAMERA_MIRRORED;
     }
     if (t->scene->through) {
-        surface_passage_find(t, batch, &s, p);
-        s.connected = p->open;
-        s.light_value = p->light_value;
+        surface_passage_find(t, batch, s, p);
+        s->connected = p->open;
+        s->light_value = p->light_value;
     } else if (live & LIVE_SCATTERING) {
-        s.light_value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
+        s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
     }
     Corner corner;
     if (job->corner_at && !batch->ends) {
         corner = corner_load(t, batch);
-        s.corner = m_any(corner.m) ? &corner : NULL;
-        corner_meet(t, slot, &corner);
+        s->corner = m_any(corner.m) ? &corner : NULL;
+        corner_meet(t, s->slot, &corner);
     }
-    Spec unshadowed = s.light_weight, transmittance = spec_set(f_set(1));
+    Spec unshadowed = s->light_weight, transmittance = spec_set(f_set(1));
     if (t->scene->through) {
         transmittance = p->transmittance;
-        s.light_weight = spec_mul(unshadowed, transmittance);
+        s->light_weight = spec_mul(unshadowed, transmittance);
     }
     for (int c = 0; c < drives(t); c++) {
-        Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
-        surface_adj(t, &s, live, delta, c, sink);
+        Spec delta = spec_zero_unless(finite, slot_adjoint(t, s->slot, c));
+        surface_adj(t, s, live, delta, c, sink);
         if (live_passing) {
             // L += f Le w_l T
-            Spec dt = spec_mul(spec_mul(spec_mul(delta, s.beta), unshadowed), spec_mul(s.f_light, s.light_value));
-            connection_passage_adj(t, &p->walk, transmittance, dt, slot, batch->bounce, s.si.p, s.light, s.connected, s.light_d,
-                                   s.light_distance, sink);
+            Spec dt = spec_mul(spec_mul(spec_mul(delta, s->beta), unshadowed), spec_mul(s->f_light, s->light_value));
+            connection_passage_adj(t, &p->walk, transmittance, dt, s->slot, batch->bounce, s->si.p, s->light, s->connected,
+                                   s->light_d, s->light_distance, sink);
         }
-        forward_flush(t, sink, slot, c, s.m);
+        forward_flush(t, sink, s->slot, c, s->m);
     }
     if (job->any_motion) {
-        vertex_keep(t, &s);
+        vertex_keep(t, s);
     }
 }
 
@@ -222,6 +225,7 @@ static void path_backward(Tracer *t, int32_t count) {
     const Records *r = &t->ws.records;
     Sink sink = sink_of(job);
     bool live_passing = passing_is_live(t);
+    SurfaceSweep s;
     Passage p;
     if (job->any_motion) {
         vertices_forget(t);
@@ -238,9 +242,13 @@ static void path_backward(Tracer *t, int32_t count) {
         Mask m = m_first_n(batch->count);
         Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
         Spec suffix = spec_gather(t->ws.suffix, slot);
+        const bool surface = surface_is_live(t, batch, live_passing);
+        if (surface) {
+            s = surface_load(t, batch, slot, suffix);
+        }
         p.found = false;
         if (t->shadows_later && batch->tag != VERTEX_FLIGHT) {
-            passage_light(t, batch, slot, &p);
+            passage_light(t, batch, slot, &s, &p);
         }
         // L = local + weight L_next
         Spec l = spec_add(spec_load(r->local, batch->first), spec_mul(spec_load(r->weight, batch->first), suffix));
@@ -258,8 +266,9 @@ static void path_backward(Tracer *t, int32_t count) {
             border_surface_sweep(t, batch, suffix, finite, &sink);
         }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
-        if (job->live[batch->group] || job->live_lights || live_passing) {
-            surface_sweep(t, batch, slot, suffix, attached, finite, live_passing, &p, &sink);
+        if (surface) {
+            s.attached = attached;
+            surface_sweep(t, batch, &s, finite, live_passing, &p, &sink);
         }
     }
     if (job->glides) {

@@ -24,13 +24,15 @@ static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec s
         l = spec_zero_unless(s.lit, spec_scale(emission, s.mis));
     }
     if (m_any(s.connected)) {
-        Spec value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
-        Spec f = bsdf_eval(&s.call, s.wi, s.wl, i_set(LOBE_SMOOTH)), weight = s.light_weight;
+        Spec f = bsdf_eval(&s.call, s.wi, s.wl, i_set(LOBE_SMOOTH)), value, weight = s.light_weight;
         if (t->scene->through) {
             Passage p;
             p.found = false;
             surface_passage_find(t, batch, &s, &p);
+            value = p.light_value;
             weight = spec_mul(weight, p.transmittance);
+        } else {
+            value = lights_eval(t->scene, s.light, s.connected, s.light_uv, s.light_prim, s.light_distance);
         }
         weight = t->scene->drops ? kept_replay(t, &s, weight) : weight;
         l = spec_add(l, spec_zero_unless(s.connected, spec_mul(spec_mul(f, value), weight)));

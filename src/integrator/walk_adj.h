@@ -90,7 +90,8 @@ static void collision_passage_find(Tracer *t, const RecordBatch *batch, Vec3 fro
 }
 
 // Adds what the light samples of a batch bring, whose shadow rays were left to the sweep, to what leaves its vertices.
-static NOINLINE void passage_light(Tracer *t, const RecordBatch *batch, Int slot, Passage *p) {
+// s: what the sweep knows of them where they are on surfaces.
+static NOINLINE void passage_light(Tracer *t, const RecordBatch *batch, Int slot, const SurfaceSweep *s, Passage *p) {
     const Records *r = &t->ws.records;
     const int32_t at = batch->first;
     if (!m_any(m_first_n(batch->count) & m_gt(spec_max(spec_load(r->light_weight, at)), f_set(0)))) {
@@ -99,8 +100,7 @@ static NOINLINE void passage_light(Tracer *t, const RecordBatch *batch, Int slot
     if (batch->tag == VERTEX_MEDIUM) {
         collision_passage_find(t, batch, record_v3(r->px, r->py, r->pz, at), slot, p);
     } else {
-        SurfaceSweep s = surface_load(t, batch, slot, spec_zero());
-        surface_passage_find(t, batch, &s, p);
+        surface_passage_find(t, batch, s, p);
     }
     Spec arrives = spec_mul(spec_mul(p->light_value, p->transmittance), spec_load(r->light_weight, at));
     Spec lit = spec_zero_unless(p->open, spec_mul(arrives, spec_load(r->light_f, at)));
