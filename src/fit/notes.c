@@ -63,15 +63,16 @@ static void note_black(const Fit *fit) {
 }
 
 rey_result rey_fit_notes(const Fit *fit) {
-    for (size_t k = 0; k < fit->unknowns.items.count && fit->def->note; k++) {
+    if (!fit->def->note) {
+        return REY_OK;
+    }
+    for (size_t k = 0; k < fit->unknowns.items.count; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
         if (is_free_pose(fit, p)) {
             note(fit, p, "the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid' turns and shifts it, "
                          "'similarity' scales it besides");
         }
     }
-    if (fit->def->note) {
-        note_black(fit);
-    }
-    return fit->def->note ? note_unreached(fit) : REY_OK;
+    note_black(fit);
+    return note_unreached(fit);
 }

@@ -192,7 +192,7 @@ static void name_further_terms(Builder *b) {
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
         bends |= kind_within(scene, shape->bsdf, rey_bsdf_bends) && !only_separates(scene, shape);
-        turns |= kind_within(scene, shape->bsdf, rey_bsdf_turns);
+        turns |= ARRAY_AT(scene->build.bsdfs, BsdfNode, shape->bsdf).turns != 0;
     }
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
     for (size_t i = 0; i < scene->params.count; i++) {
