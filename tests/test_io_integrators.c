@@ -119,7 +119,8 @@ static void test_nested(void **state) {
         {"<integrator type='aov'><string name='aovs' value='a:depth, a:depth'/></integrator>", REY_ERROR_SCENE,
          "two channels have the name 'a.T'"},
         {"<integrator type='aov'><string name='aovs' value='a:dept'/></integrator>", REY_ERROR_SCENE,
-         "there is no quantity 'dept', expected one of depth, position, uv"},
+         "there is no quantity 'dept', expected one of depth, position, uv, geo_normal, sh_normal, dp_du, dp_dv, duv_dx, duv_dy"},
+        {"<integrator type='aov'><string name='aovs' value='a:dept'/></integrator>", REY_ERROR_SCENE, "did you mean 'depth'?"},
         {"<integrator type='aov'><string name='aovs' value='depth'/></integrator>", REY_ERROR_SCENE,
          "'depth' in 'aovs', expected NAME:QUANTITY"},
         {"<integrator type='aov'><string name='aovs' value='a:depth'/><integrator type='path'/><integrator type='path'/>"
