@@ -75,3 +75,14 @@ KFN void blendbsdf_adj(const BsdfCall *call, const BlendBsdf *p, Vec3 wi, Vec3 w
         }
     }
 }
+
+KFN void blendbsdf_pdf_adj(const BsdfCall *call, const BlendBsdf *p, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m,
+                           BlendBsdf *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
+    const Int smooth = i_set(LOBE_SMOOTH);
+    BsdfCall first = bsdf_child(call, 0), second = bsdf_child(call, 1);
+    Float w = blendbsdf_weight(p), slope = bsdf_pdf(&second, wi, wo, smooth) - bsdf_pdf(&first, wi, wo, smooth);
+    // pdf = (1 - w) first + w second
+    dp->weight = dp->weight + f_zero_unless(share_inside(p->weight), dpdf * slope);
+    bsdf_pdf_adj(&first, wi, wo, dpdf * (1.0f - w), sink, m, dwi, dwo, duv);
+    bsdf_pdf_adj(&second, wi, wo, dpdf * w, sink, m, dwi, dwo, duv);
+}

@@ -157,27 +157,46 @@ static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, 
 #undef BSDF_LEAF
 #undef BSDF_ADAPTER
 
-static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
-                              Vec3 *dwo, Vec2 *duv) {
-    switch (call->scene->bsdfs[call->node].kind) {
+// One case per function, as above: its record is p and that record's adjoint dp.
 #define BSDF_LEAF(ENUM, prefix, Record, ...)                                                                           \
     case BSDF_##ENUM: {                                                                                                \
         Record p = prefix##_fetch(call), dp = {0};                                                                     \
-        prefix##_adj(&p, wi, wo, lobe, df, &dp, dwi, dwo);                                                             \
+        RUN_LEAF(prefix)                                                                                               \
         prefix##_scatter(call, dp, sink, m, duv);                                                                      \
         break;                                                                                                         \
     }
 #define BSDF_ADAPTER(ENUM, prefix, Record, ...)                                                                        \
     case BSDF_##ENUM: {                                                                                                \
         Record p = prefix##_fetch(call), dp = {0};                                                                     \
-        prefix##_adj(call, &p, wi, wo, lobe, df, sink, m, &dp, dwi, dwo, duv);                                         \
+        RUN_ADAPTER(prefix)                                                                                            \
         prefix##_scatter(call, dp, sink, m, duv);                                                                      \
         break;                                                                                                         \
     }
+
+static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
+                              Vec3 *dwo, Vec2 *duv) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define RUN_LEAF(prefix) prefix##_adj(&p, wi, wo, lobe, df, &dp, dwi, dwo);
+#define RUN_ADAPTER(prefix) prefix##_adj(call, &p, wi, wo, lobe, df, sink, m, &dp, dwi, dwo, duv);
 #include "bsdf/kinds.inl"
-#undef BSDF_LEAF
-#undef BSDF_ADAPTER
+#undef RUN_LEAF
+#undef RUN_ADAPTER
     default:
         break;
     }
 }
+
+static NOINLINE void bsdf_pdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m, Vec3 *dwi,
+                                  Vec3 *dwo, Vec2 *duv) {
+    switch (call->scene->bsdfs[call->node].kind) {
+#define RUN_LEAF(prefix) prefix##_pdf_adj(&p, wi, wo, dpdf, &dp, dwi, dwo);
+#define RUN_ADAPTER(prefix) prefix##_pdf_adj(call, &p, wi, wo, dpdf, sink, m, &dp, dwi, dwo, duv);
+#include "bsdf/kinds.inl"
+#undef RUN_LEAF
+#undef RUN_ADAPTER
+    default:
+        break;
+    }
+}
+#undef BSDF_LEAF
+#undef BSDF_ADAPTER

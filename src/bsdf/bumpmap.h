@@ -20,10 +20,34 @@ KFN Float bumpmap_side(Vec3 product, const BsdfSurface *s) {
     return f_select(m_lt(v3_dot(product, s->ng), f_set(0)), f_set(-1), f_set(1));
 }
 
-KFN Vec3 bumpmap_normal(const BsdfCall *call, const BumpMap *p, Vec3 wi) {
+// Before it is mirrored for viewers that it faces away from.
+KFN Vec3 bumpmap_turned(const BsdfCall *call, const BumpMap *p) {
     Vec3 product = bumpmap_product(p, call->surface);
-    Vec3 n = v3_scale(v3_normalize(product), bumpmap_side(product, call->surface));
-    return turned_valid(n, wi, p->flip_invalid_normals);
+    return v3_scale(v3_normalize(product), bumpmap_side(product, call->surface));
+}
+
+KFN Vec3 bumpmap_normal(const BsdfCall *call, const BumpMap *p, Vec3 wi) {
+    return turned_valid(bumpmap_turned(call, p), wi, p->flip_invalid_normals);
+}
+
+KFN void bumpmap_normal_adj(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 dvalid, BumpMap *dp) {
+    const BsdfSurface *s = call->surface;
+    Vec3 product = bumpmap_product(p, s), d = v3_zero();
+    Float side = bumpmap_side(product, s), a = p->scale * p->nested_texture.x, b = p->scale * p->nested_texture.y;
+    // valid = (+-x, +-y, z) of side normalize(product)
+    Vec3 dn = turned_valid_adj(bumpmap_turned(call, p), wi, p->flip_invalid_normals, dvalid);
+    v3_normalize_adj(product, v3_scale(dn, side), &d);
+    // product = (-a vy, a vx - b ux, ux vy)
+    Float da = d.y * s->vx - d.x * s->vy, db = -d.y * s->ux;
+    dp->nested_texture.x = dp->nested_texture.x + da * p->scale;
+    dp->nested_texture.y = dp->nested_texture.y + db * p->scale;
+    dp->scale = dp->scale + da * p->nested_texture.x + db * p->nested_texture.y;
+    if (call->dsurface) {
+        BsdfSurface *ds = call->dsurface;
+        ds->ux = ds->ux - b * d.y + s->vy * d.z;
+        ds->vx = ds->vx + a * d.y;
+        ds->vy = ds->vy - a * d.x + s->ux * d.z;
+    }
 }
 
 KFN Spec bumpmap_eval(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 wo, Int lobe) {
@@ -40,24 +64,16 @@ KFN BsdfSample bumpmap_sample(const BsdfCall *call, const BumpMap *p, Vec3 wi, F
 
 KFN void bumpmap_adj(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m,
                      BumpMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
-    const BsdfSurface *s = call->surface;
-    Vec3 product = bumpmap_product(p, s), dvalid = v3_zero(), d = v3_zero();
-    Float side = bumpmap_side(product, s), a = p->scale * p->nested_texture.x, b = p->scale * p->nested_texture.y;
+    Vec3 dvalid = v3_zero();
     turned_adj(call, bumpmap_normal(call, p, wi), p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi,
                dwo, duv);
-    // valid = (+-x, +-y, z) of side normalize(product)
-    Vec3 n = v3_scale(v3_normalize(product), side);
-    turned_watch(n, wi, sink, m);
-    v3_normalize_adj(product, v3_scale(turned_valid_adj(n, wi, p->flip_invalid_normals, dvalid), side), &d);
-    // product = (-a vy, a vx - b ux, ux vy)
-    Float da = d.y * s->vx - d.x * s->vy, db = -d.y * s->ux;
-    dp->nested_texture.x = dp->nested_texture.x + da * p->scale;
-    dp->nested_texture.y = dp->nested_texture.y + db * p->scale;
-    dp->scale = dp->scale + da * p->nested_texture.x + db * p->nested_texture.y;
-    if (call->dsurface) {
-        BsdfSurface *ds = call->dsurface;
-        ds->ux = ds->ux - b * d.y + s->vy * d.z;
-        ds->vx = ds->vx + a * d.y;
-        ds->vy = ds->vy - a * d.x + s->ux * d.z;
-    }
+    turned_watch(bumpmap_turned(call, p), wi, sink, m);
+    bumpmap_normal_adj(call, p, wi, dvalid, dp);
+}
+
+KFN void bumpmap_pdf_adj(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m,
+                         BumpMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
+    Vec3 dvalid = v3_zero();
+    turned_pdf_adj(call, bumpmap_normal(call, p, wi), wi, wo, dpdf, sink, m, &dvalid, dwi, dwo, duv);
+    bumpmap_normal_adj(call, p, wi, dvalid, dp);
 }

@@ -27,6 +27,10 @@ static NOINLINE BsdfSample bsdf_sample(const BsdfCall *call, Vec3 wi, Float u1, 
 static NOINLINE void bsdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m, Vec3 *dwi,
                               Vec3 *dwo, Vec2 *duv);
 
+// Accumulates the adjoint dpdf of bsdf_pdf in the smooth lobe, whose floor is 0, in the same way.
+static NOINLINE void bsdf_pdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m, Vec3 *dwi,
+                                  Vec3 *dwo, Vec2 *duv);
+
 // Where the clamp of a share to [0, 1] lets derivatives through. Interpolation of equal texels rounds, and must not take
 // a share of 0 or 1 out of its range.
 KFN Mask share_inside(Float share) { return m_ge(share, f_set(-1e-5f)) & m_le(share, f_set(1 + 1e-5f)); }

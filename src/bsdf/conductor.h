@@ -40,3 +40,5 @@ KFN void conductor_adj(const Conductor *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, 
     spec_acc(&dp->specular_reflectance, spec_mul(df, fresnel));
     fresnel_conductor_adj(wi.z, p->eta, p->k, spec_mul(df, p->specular_reflectance), &dwi->z, &dp->eta, &dp->k);
 }
+
+NO_SMOOTH_LOBE(conductor, Conductor)

@@ -63,3 +63,5 @@ KFN void dielectric_adj(const Dielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df
     Float deta_ti = 2.0f * tint * (1.0f - f) * eta_ti - wi.x * dbent.x - wi.y * dbent.y;
     dp->eta = dp->eta + f_select(m_ge(wi.z, f_set(0)), -deta_ti * eta_ti * eta_ti, deta_ti);
 }
+
+NO_SMOOTH_LOBE(dielectric, Dielectric)

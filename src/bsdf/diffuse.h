@@ -33,3 +33,9 @@ KFN void diffuse_adj(const Diffuse *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Diff
     spec_acc(&dp->reflectance, spec_scale(df, wo.z * INV_PI));
     dwo->z = dwo->z + spec_dot(df, p->reflectance) * INV_PI;
 }
+
+KFN void diffuse_pdf_adj(const Diffuse *p, Vec3 wi, Vec3 wo, Float dpdf, Diffuse *dp, Vec3 *dwi, Vec3 *dwo) {
+    UNUSED(p), UNUSED(dp), UNUSED(dwi);
+    // pdf = wo.z / pi
+    dwo->z = dwo->z + f_zero_unless(m_gt(wi.z, f_set(0)) & m_gt(wo.z, f_set(0)), dpdf * INV_PI);
+}

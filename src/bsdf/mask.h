@@ -43,3 +43,12 @@ KFN void mask_adj(const BsdfCall *call, const MaskBsdf *p, Vec3 wi, Vec3 wo, Int
     dp->opacity = dp->opacity + f_zero_unless(share_inside(p->opacity), d);
     bsdf_adj(&child, wi, wo, lobe, spec_scale(df, o), sink, m, dwi, dwo, duv);
 }
+
+KFN void mask_pdf_adj(const BsdfCall *call, const MaskBsdf *p, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m,
+                      MaskBsdf *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
+    BsdfCall child = bsdf_child(call, 0);
+    // pdf = o nested
+    Float d = f_zero_unless(share_inside(p->opacity), dpdf * bsdf_pdf(&child, wi, wo, i_set(LOBE_SMOOTH)));
+    dp->opacity = dp->opacity + d;
+    bsdf_pdf_adj(&child, wi, wo, dpdf * mask_opacity(p), sink, m, dwi, dwo, duv);
+}

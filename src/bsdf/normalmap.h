@@ -18,6 +18,15 @@ KFN Vec3 normalmap_normal(const NormalMap *p, Vec3 wi) {
     return turned_valid(v3_normalize(normalmap_encoded(p)), wi, p->flip_invalid_normals);
 }
 
+KFN void normalmap_normal_adj(const NormalMap *p, Vec3 wi, Vec3 dvalid, NormalMap *dp) {
+    Vec3 encoded = normalmap_encoded(p), n = v3_normalize(encoded), dencoded = v3_zero();
+    // valid = (+-x, +-y, z) of n = normalize(2 c - 1)
+    v3_normalize_adj(encoded, turned_valid_adj(n, wi, p->flip_invalid_normals, dvalid), &dencoded);
+    dp->normalmap.c[0] = dp->normalmap.c[0] + 2.0f * dencoded.x;
+    dp->normalmap.c[1] = dp->normalmap.c[1] + 2.0f * dencoded.y;
+    dp->normalmap.c[2] = dp->normalmap.c[2] + 2.0f * dencoded.z;
+}
+
 KFN Spec normalmap_eval(const BsdfCall *call, const NormalMap *p, Vec3 wi, Vec3 wo, Int lobe) {
     return turned_eval(call, normalmap_normal(p, wi), p->use_shadowing_function, wi, wo, lobe);
 }
@@ -32,13 +41,15 @@ KFN BsdfSample normalmap_sample(const BsdfCall *call, const NormalMap *p, Vec3 w
 
 KFN void normalmap_adj(const BsdfCall *call, const NormalMap *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m,
                        NormalMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
-    Vec3 encoded = normalmap_encoded(p), n = v3_normalize(encoded), valid = normalmap_normal(p, wi);
-    Vec3 dvalid = v3_zero(), dencoded = v3_zero();
-    turned_watch(n, wi, sink, m);
-    turned_adj(call, valid, p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi, dwo, duv);
-    // valid = (+-x, +-y, z) of n = normalize(2 c - 1)
-    v3_normalize_adj(encoded, turned_valid_adj(n, wi, p->flip_invalid_normals, dvalid), &dencoded);
-    dp->normalmap.c[0] = dp->normalmap.c[0] + 2.0f * dencoded.x;
-    dp->normalmap.c[1] = dp->normalmap.c[1] + 2.0f * dencoded.y;
-    dp->normalmap.c[2] = dp->normalmap.c[2] + 2.0f * dencoded.z;
+    Vec3 dvalid = v3_zero();
+    turned_watch(v3_normalize(normalmap_encoded(p)), wi, sink, m);
+    turned_adj(call, normalmap_normal(p, wi), p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi, dwo, duv);
+    normalmap_normal_adj(p, wi, dvalid, dp);
+}
+
+KFN void normalmap_pdf_adj(const BsdfCall *call, const NormalMap *p, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m,
+                           NormalMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
+    Vec3 dvalid = v3_zero();
+    turned_pdf_adj(call, normalmap_normal(p, wi), wi, wo, dpdf, sink, m, &dvalid, dwi, dwo, duv);
+    normalmap_normal_adj(p, wi, dvalid, dp);
 }

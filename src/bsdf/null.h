@@ -28,3 +28,5 @@ KFN void null_adj(const Null *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Null *dp, 
     // The coefficient is constant.
     UNUSED(p), UNUSED(wi), UNUSED(wo), UNUSED(lobe), UNUSED(df), UNUSED(dp), UNUSED(dwi), UNUSED(dwo);
 }
+
+NO_SMOOTH_LOBE(null, Null)

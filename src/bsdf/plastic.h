@@ -90,3 +90,15 @@ KFN void plastic_adj(const Plastic *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Plas
     drcp = drcp + 2.0f * dthrough * ti * to * wo.z * rcp_eta * INV_PI;
     dp->eta = dp->eta - drcp * rcp_eta * rcp_eta;
 }
+
+KFN void plastic_pdf_adj(const Plastic *p, Vec3 wi, Vec3 wo, Float dpdf, Plastic *dp, Vec3 *dwi, Vec3 *dwo) {
+    Float f = plastic_fresnel(p, wi.z), coat = spec_mean(p->specular_reflectance), base = spec_mean(p->diffuse_reflectance);
+    dpdf = f_zero_unless(m_gt(wi.z, f_set(0)) & m_gt(wo.z, f_set(0)), dpdf * INV_PI);
+    // pdf = (1 - q) wo.z / pi, q the share of a = F ks beside b = (1 - F) kd
+    Float da = f_set(0), db = f_set(0);
+    dwo->z = dwo->z + dpdf * (1.0f - plastic_probability(p, wi));
+    lobe_probability_adj(f * coat, (1.0f - f) * base, -dpdf * wo.z, &da, &db);
+    spec_acc(&dp->specular_reflectance, spec_set(da * f * (1.0f / SPEC_N)));
+    spec_acc(&dp->diffuse_reflectance, spec_set(db * (1.0f - f) * (1.0f / SPEC_N)));
+    fresnel_dielectric_adj(wi.z, p->eta, da * coat - db * base, f_set(0), &dwi->z, &dp->eta);
+}

@@ -161,13 +161,17 @@ typedef struct PrincipledChoice {
     Mask any;                      // is there anything to sample?
 } PrincipledChoice;
 
+KFN void principled_weights(const Principled *p, Float weights[PRINCIPLED_LOBES]) {
+    weights[PRINCIPLED_MAIN] = p->main_specular_sampling_rate;
+    weights[PRINCIPLED_COAT] = 0.25f * p->clearcoat * p->clearcoat_sampling_rate;
+    weights[PRINCIPLED_DIFFUSE] = (1.0f - p->metallic) * (1.0f - p->spec_trans) * p->diffuse_reflectance_sampling_rate;
+}
+
 KFN PrincipledChoice principled_choice(const Principled *p, Vec3 wi) {
     Mask front = m_gt(wi.z, f_set(0));
     Float fm = 1.0f - p->metallic;
     PrincipledChoice c;
-    c.lobes[PRINCIPLED_MAIN] = p->main_specular_sampling_rate;
-    c.lobes[PRINCIPLED_COAT] = 0.25f * p->clearcoat * p->clearcoat_sampling_rate;
-    c.lobes[PRINCIPLED_DIFFUSE] = fm * (1.0f - p->spec_trans) * p->diffuse_reflectance_sampling_rate;
+    principled_weights(p, c.lobes);
     principled_probabilities(PRINCIPLED_LOBES, c.lobes, p->floor);
     for (int i = 0; i < PRINCIPLED_LOBES; i++) {
         c.lobes[i] = f_select(front, c.lobes[i], f_set(i == PRINCIPLED_MAIN));

@@ -259,3 +259,19 @@ KFN void principled_probabilities(int n, Float *weights, real floor) {
         weights[i] = floor + f_select(some, weights[i] * scale, f_set(i == 0 ? 1 - (real)n * floor : 0));
     }
 }
+
+// Adjoint of the same without a floor, from those of the n probabilities to those of the weights, in place.
+KFN void principled_probabilities_adj(int n, const Float *weights, Float *d) {
+    Float sum = f_set(0), mean = f_set(0);
+    for (int i = 0; i < n; i++) {
+        sum = sum + f_max(weights[i], f_set(0));
+    }
+    Float scale = f_zero_unless(m_gt(sum, f_set(1e-30f)), f_safe_rcp(sum));
+    for (int i = 0; i < n; i++) {
+        mean = mean + d[i] * f_max(weights[i], f_set(0)) * scale;
+    }
+    for (int i = 0; i < n; i++) {
+        // p_i = w_i / sum_j w_j
+        d[i] = f_zero_unless(m_ge(weights[i], f_set(0)), (d[i] - mean) * scale);
+    }
+}

@@ -90,12 +90,16 @@ KFN Spec principledthin_eval(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe
 
 enum { THIN_REFLECTION, THIN_TRANSMISSION, THIN_MATTE, THIN_THROUGH, THIN_LOBES };
 
-KFN void principledthin_choice(const PrincipledThin *p, Float lobes[THIN_LOBES]) {
+KFN void principledthin_weights(const PrincipledThin *p, Float lobes[THIN_LOBES]) {
     Float d = 0.5f * p->diff_trans, diffuse = 1.0f - p->spec_trans;
     lobes[THIN_REFLECTION] = 0.5f * p->spec_trans * p->specular_reflectance_sampling_rate;
     lobes[THIN_TRANSMISSION] = 0.5f * p->spec_trans * p->specular_transmittance_sampling_rate;
     lobes[THIN_MATTE] = diffuse * (1.0f - d) * p->diffuse_reflectance_sampling_rate;
     lobes[THIN_THROUGH] = diffuse * d * p->diffuse_transmittance_sampling_rate;
+}
+
+KFN void principledthin_choice(const PrincipledThin *p, Float lobes[THIN_LOBES]) {
+    principledthin_weights(p, lobes);
     principled_probabilities(THIN_LOBES, lobes, p->floor);
 }
 
@@ -197,6 +201,25 @@ KFN void principledthin_diffuse_adj(const PrincipledThin *p, const ThinTerms *t,
     dp->diff_trans = dp->diff_trans + 0.5f * (1.0f - p->spec_trans) * (dthrough - dmatte);
 }
 
+// Back to the parameters and directions that eval and pdf share.
+KFN void principledthin_terms_adj(const PrincipledThin *p, const ThinTerms *t, ThinBack *back, PrincipledThin *dp, Vec3 *dwi,
+                                  Vec3 *dwo) {
+    // F(a, eta), a = wi . m, b = wo . m
+    fresnel_dielectric_adj(t->a, p->eta, back->fresnel, f_set(0), &back->a, &back->eta);
+    dp->eta = dp->eta + back->eta;
+    v3_acc(&back->wi, v3_scale(t->m, back->a));
+    v3_acc(&back->wo, v3_scale(t->m, back->b));
+    v3_acc(&back->m, v3_madd(v3_scale(t->wi, back->a), back->b, t->wo));
+    // m = normalize(h), h = wi + (wo.x, wo.y, |wo.z|)
+    Vec3 dh = v3_zero();
+    v3_normalize_adj(t->h, back->m, &dh);
+    v3_acc(&back->wi, dh);
+    v3_acc(&back->wo, v3(dh.x, dh.y, f_sign(t->wo.z) * dh.z));
+    // turned to the side of wi
+    v3_acc(dwi, v3_scale(back->wi, t->side));
+    v3_acc(dwo, v3_scale(back->wo, t->side));
+}
+
 KFN void principledthin_adj(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, PrincipledThin *dp, Vec3 *dwi,
                             Vec3 *dwo) {
     ThinTerms t = principledthin_terms(p, wi, wo, lobe);
@@ -204,18 +227,55 @@ KFN void principledthin_adj(const PrincipledThin *p, Vec3 wi, Vec3 wo, Int lobe,
     df = spec_zero_unless(t.counts, df);
     principledthin_clear_adj(p, &t, df, dp, &back);
     principledthin_diffuse_adj(p, &t, df, dp, &back);
-    // F(a, eta), a = wi . m, b = wo . m
-    fresnel_dielectric_adj(t.a, p->eta, back.fresnel, f_set(0), &back.a, &back.eta);
-    dp->eta = dp->eta + back.eta;
-    v3_acc(&back.wi, v3_scale(t.m, back.a));
-    v3_acc(&back.wo, v3_scale(t.m, back.b));
-    v3_acc(&back.m, v3_madd(v3_scale(t.wi, back.a), back.b, t.wo));
-    // m = normalize(h), h = wi + (wo.x, wo.y, |wo.z|)
-    Vec3 dh = v3_zero();
-    v3_normalize_adj(t.h, back.m, &dh);
-    v3_acc(&back.wi, dh);
-    v3_acc(&back.wo, v3(dh.x, dh.y, f_sign(t.wo.z) * dh.z));
-    // turned to the side of wi
-    v3_acc(dwi, v3_scale(back.wi, t.side));
-    v3_acc(dwo, v3_scale(back.wo, t.side));
+    principledthin_terms_adj(p, &t, &back, dp, dwi, dwo);
+}
+
+KFN void principledthin_choice_adj(const PrincipledThin *p, Float d[THIN_LOBES], PrincipledThin *dp) {
+    Float weights[THIN_LOBES], half = 0.5f * p->diff_trans, diffuse = 1.0f - p->spec_trans;
+    principledthin_weights(p, weights);
+    principled_probabilities_adj(THIN_LOBES, weights, d);
+    Float dmatte = d[THIN_MATTE] * p->diffuse_reflectance_sampling_rate;
+    Float dthrough = d[THIN_THROUGH] * p->diffuse_transmittance_sampling_rate;
+    // reflection, transmission = spec_trans / 2 rate
+    dp->specular_reflectance_sampling_rate = dp->specular_reflectance_sampling_rate + 0.5f * d[THIN_REFLECTION] * p->spec_trans;
+    dp->specular_transmittance_sampling_rate =
+        dp->specular_transmittance_sampling_rate + 0.5f * d[THIN_TRANSMISSION] * p->spec_trans;
+    dp->spec_trans = dp->spec_trans + 0.5f * (d[THIN_REFLECTION] * p->specular_reflectance_sampling_rate +
+                                              d[THIN_TRANSMISSION] * p->specular_transmittance_sampling_rate);
+    // matte = (1 - spec_trans) (1 - diff_trans / 2) rate, through = (1 - spec_trans) diff_trans / 2 rate
+    dp->diffuse_reflectance_sampling_rate =
+        dp->diffuse_reflectance_sampling_rate + d[THIN_MATTE] * diffuse * (1.0f - half);
+    dp->diffuse_transmittance_sampling_rate = dp->diffuse_transmittance_sampling_rate + d[THIN_THROUGH] * diffuse * half;
+    dp->spec_trans = dp->spec_trans - dmatte * (1.0f - half) - dthrough * half;
+    dp->diff_trans = dp->diff_trans + 0.5f * diffuse * (dthrough - dmatte);
+}
+
+KFN void principledthin_pdf_adj(const PrincipledThin *p, Vec3 wi, Vec3 wo, Float dpdf, PrincipledThin *dp, Vec3 *dwi,
+                                Vec3 *dwo) {
+    ThinTerms t = principledthin_terms(p, wi, wo, i_set(LOBE_SMOOTH));
+    ThinBack back = {.wi = v3_zero()};
+    Float lobes[THIN_LOBES], dlobes[THIN_LOBES];
+    principledthin_choice(p, lobes);
+    dpdf = f_zero_unless(t.counts, dpdf);
+    // pdf = clear facets / (4 c) + diffuse |wo.z| / pi, c = (wo.x, wo.y, |wo.z|) . m
+    Vec3 mirrored = v3_sub(t.h, t.wi), dup = v3_zero();
+    Float clear = f_select(t.reflects, lobes[THIN_REFLECTION], lobes[THIN_TRANSMISSION]);
+    Float diffuse = f_select(t.reflects, lobes[THIN_MATTE], lobes[THIN_THROUGH]);
+    Float rcp = f_safe_rcp(v3_dot(mirrored, t.m)), k = 0.25f * f_zero_unless(t.visible, dpdf) * rcp;
+    Float facets = microfacet_pdf(&t.mf, t.wi, t.m), du = f_set(0), dv = f_set(0), dr = f_set(0);
+    microfacet_pdf_adj(&t.mf, t.wi, t.m, k * clear, &du, &dv, &back.wi, &back.m);
+    principled_facets_adj(p->roughness * t.scale, p->anisotropic, du, dv, &dr, &dp->anisotropic);
+    dp->roughness = dp->roughness + dr * t.scale;
+    back.eta = f_zero_unless(~t.reflects, 0.65f * dr * p->roughness);
+    Float dc = -k * clear * facets * rcp;
+    v3_acc(&dup, v3_scale(t.m, dc));
+    v3_acc(&back.m, v3_scale(mirrored, dc));
+    v3_acc(&back.wo, v3(dup.x, dup.y, f_sign(t.wo.z) * (dup.z + dpdf * diffuse * INV_PI)));
+    Float dclear = k * facets, ddiffuse = dpdf * f_abs(t.wo.z) * INV_PI;
+    dlobes[THIN_REFLECTION] = f_zero_unless(t.reflects, dclear);
+    dlobes[THIN_TRANSMISSION] = f_zero_unless(~t.reflects, dclear);
+    dlobes[THIN_MATTE] = f_zero_unless(t.reflects, ddiffuse);
+    dlobes[THIN_THROUGH] = f_zero_unless(~t.reflects, ddiffuse);
+    principledthin_choice_adj(p, dlobes, dp);
+    principledthin_terms_adj(p, &t, &back, dp, dwi, dwo);
 }

@@ -60,3 +60,17 @@ KFN Float lobe_probability(Float a, Float b, real floor) {
     p = f_select(m_gt(a + b, f_set(1e-30f)), p, f_set(0.5f));
     return f_clamp(p, f_set(floor), f_set(1 - floor));
 }
+
+// Adjoint of lobe_probability without a floor.
+KFN void lobe_probability_adj(Float a, Float b, Float dp, Float *da, Float *db) {
+    // p = a / (a + b)
+    Float r = f_zero_unless(m_gt(a + b, f_set(1e-30f)), dp * f_sqr(f_safe_rcp(a + b)));
+    *da = *da + r * b;
+    *db = *db - r * a;
+}
+
+// The density of functions that have no smooth lobe is 0 there.
+#define NO_SMOOTH_LOBE(prefix, Record)                                                                                 \
+    KFN void prefix##_pdf_adj(const Record *p, Vec3 wi, Vec3 wo, Float dpdf, Record *dp, Vec3 *dwi, Vec3 *dwo) {       \
+        UNUSED(p), UNUSED(wi), UNUSED(wo), UNUSED(dpdf), UNUSED(dp), UNUSED(dwi), UNUSED(dwo);                         \
+    }

@@ -74,3 +74,22 @@ KFN void roughconductor_adj(const RoughConductor *p, Vec3 wi, Vec3 wo, Int lobe,
     v3_acc(dwi, dh);
     v3_acc(dwo, dh);
 }
+
+KFN void roughconductor_pdf_adj(const RoughConductor *p, Vec3 wi, Vec3 wo, Float dpdf, RoughConductor *dp, Vec3 *dwi,
+                                Vec3 *dwo) {
+    Microfacet mf = roughconductor_facets(p);
+    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
+    Float rcp = f_safe_rcp(v3_dot(wo, m)), du = f_set(0), dv = f_set(0);
+    dpdf = f_zero_unless(roughconductor_counts(wi, wo, i_set(LOBE_SMOOTH)), 0.25f * dpdf * rcp);
+    // pdf = facets / (4 wo . m)
+    Float dcosine = -dpdf * microfacet_pdf(&mf, wi, m) * rcp;
+    microfacet_pdf_adj(&mf, wi, m, dpdf, &du, &dv, dwi, &dm);
+    microfacet_alpha_adj(p->alpha_u, du, &dp->alpha_u);
+    microfacet_alpha_adj(p->alpha_v, dv, &dp->alpha_v);
+    v3_acc(dwo, v3_scale(m, dcosine));
+    v3_acc(&dm, v3_scale(wo, dcosine));
+    // m = normalize(wi + wo)
+    v3_normalize_adj(h, dm, &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, dh);
+}

@@ -70,6 +70,11 @@ KFN Float roughdielectric_probability(const RoughDielectric *p, Float fresnel) {
     return f_select(m_lt(fresnel, f_set(1)), q, f_set(1));
 }
 
+// Facets seen from their back cannot have been sampled.
+KFN Mask roughdielectric_visible(const RoughDielectricTerms *t, Vec3 wi, Vec3 wo) {
+    return m_gt(t->a * wi.z, f_set(0)) & m_gt(t->b * wo.z, f_set(0));
+}
+
 KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe) {
     Microfacet mf = roughdielectric_facets(p);
     RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, lobe);
@@ -77,9 +82,7 @@ KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lo
     Float choice = roughdielectric_probability(p, t.fresnel);
     Float reflected = choice * f_safe_rcp(4.0f * f_abs(t.b));
     Float refracted = (1.0f - choice) * f_abs(t.b) * t.e * t.e * f_safe_rcp(t.q * t.q);
-    // Facets seen from their back cannot have been sampled.
-    Mask visible = m_gt(t.a * wi.z, f_set(0)) & m_gt(t.b * wo.z, f_set(0));
-    return f_zero_unless(t.counts & visible,
+    return f_zero_unless(t.counts & roughdielectric_visible(&t, wi, wo),
                          interface_pdf(&mf, up, t.m, t.e, p->floor) * f_select(t.reflects, reflected, refracted));
 }
 
@@ -98,6 +101,29 @@ KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u
     return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(reflects, f_set(1), eta_it)};
 }
 
+// Adjoints of what eval and pdf share.
+typedef struct RoughDielectricBack {
+    Float a, b, e, fresnel;
+    Vec3 m;
+} RoughDielectricBack;
+
+KFN void roughdielectric_terms_adj(const RoughDielectricTerms *t, Vec3 wi, Vec3 wo, RoughDielectricBack *back,
+                                   RoughDielectric *dp, Vec3 *dwi, Vec3 *dwo) {
+    Vec3 dh = v3_zero();
+    fresnel_dielectric_adj(t->a, t->eta, f_zero_unless(t->counts, back->fresnel), f_set(0), &back->a, &dp->eta);
+    // a = wi . m, b = wo . m
+    v3_acc(dwi, v3_scale(t->m, back->a));
+    v3_acc(dwo, v3_scale(t->m, back->b));
+    v3_acc(&back->m, v3_madd(v3_scale(wi, back->a), back->b, wo));
+    // m = turn normalize(h), h = wi + wo or wi + e wo
+    v3_normalize_adj(t->h, v3_scale(back->m, t->turn), &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, v3_scale(dh, f_select(t->reflects, f_set(1), t->e)));
+    Float de = back->e + f_zero_unless(~t->reflects, v3_dot(dh, wo));
+    // e = eta, or 1 / eta from inside
+    dp->eta = dp->eta + f_zero_unless(t->counts, f_select(m_gt(wi.z, f_set(0)), de, -de * t->e * t->e));
+}
+
 KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, RoughDielectric *dp,
                              Vec3 *dwi, Vec3 *dwo) {
     Microfacet mf = roughdielectric_facets(p);
@@ -112,10 +138,9 @@ KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lob
     spec_acc(&dp->specular_reflectance, spec_scale(dr, share * k));
     spec_acc(&dp->specular_transmittance, spec_scale(ds, share * k));
     Float dvalue = spec_dot(dr, p->specular_reflectance) + spec_dot(ds, p->specular_transmittance);
-    Float dfresnel = f_select(t.reflects, dvalue * k, -dvalue * k), dk = dvalue * share;
-    Float du = f_set(0), dv = f_set(0), da = f_set(0), db = f_set(0), de = f_set(0);
-    Vec3 dm = v3_zero(), dh = v3_zero();
-    microfacet_D_adj(&mf, t.m, dk * gi * go * jacobian, &du, &dv, &dm);
+    Float dk = dvalue * share, du = f_set(0), dv = f_set(0);
+    RoughDielectricBack back = {.fresnel = f_select(t.reflects, dvalue * k, -dvalue * k), .m = v3_zero()};
+    microfacet_D_adj(&mf, t.m, dk * gi * go * jacobian, &du, &dv, &back.m);
     smith_G1_adj(&mf, wi, t.m, dk * d * go * jacobian, &du, &dv, dwi);
     smith_G1_adj(&mf, wo, t.m, dk * d * gi * jacobian, &du, &dv, dwo);
     microfacet_alpha_adj(p->alpha_u, du, &dp->alpha_u);
@@ -124,19 +149,31 @@ KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lob
     Float g = f_zero_unless(t.counts, dk * k);
     dwi->z = dwi->z - g * rcp_ci;
     Float gt = f_zero_unless(~t.reflects, g), rcp_q = f_safe_rcp(t.q);
-    da = gt * (f_safe_rcp(t.a) - 2.0f * rcp_q);
-    db = gt * (f_safe_rcp(t.b) - 2.0f * t.e * rcp_q);
-    de = -2.0f * gt * t.b * rcp_q;
-    fresnel_dielectric_adj(t.a, t.eta, f_zero_unless(t.counts, dfresnel), f_set(0), &da, &dp->eta);
-    // a = wi . m, b = wo . m
-    v3_acc(dwi, v3_scale(t.m, da));
-    v3_acc(dwo, v3_scale(t.m, db));
-    v3_acc(&dm, v3_madd(v3_scale(wi, da), db, wo));
-    // m = turn normalize(h), h = wi + wo or wi + e wo
-    v3_normalize_adj(t.h, v3_scale(dm, t.turn), &dh);
-    v3_acc(dwi, dh);
-    v3_acc(dwo, v3_scale(dh, f_select(t.reflects, f_set(1), t.e)));
-    de = de + f_zero_unless(~t.reflects, v3_dot(dh, wo));
-    // e = eta, or 1 / eta from inside
-    dp->eta = dp->eta + f_zero_unless(t.counts, f_select(m_gt(wi.z, f_set(0)), de, -de * t.e * t.e));
+    back.a = gt * (f_safe_rcp(t.a) - 2.0f * rcp_q);
+    back.b = gt * (f_safe_rcp(t.b) - 2.0f * t.e * rcp_q);
+    back.e = -2.0f * gt * t.b * rcp_q;
+    roughdielectric_terms_adj(&t, wi, wo, &back, dp, dwi, dwo);
+}
+
+KFN void roughdielectric_pdf_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Float dpdf, RoughDielectric *dp, Vec3 *dwi,
+                                 Vec3 *dwo) {
+    Microfacet mf = roughdielectric_facets(p);
+    RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, i_set(LOBE_SMOOTH));
+    dpdf = f_zero_unless(t.counts & roughdielectric_visible(&t, wi, wo), dpdf);
+    Float side = f_sign(wi.z), rcp_q = f_safe_rcp(t.q), rcp_b = f_safe_rcp(t.b), du = f_set(0), dv = f_set(0);
+    Vec3 up = v3_scale(wi, side), dup = v3_zero();
+    Float reflects = roughdielectric_probability(p, t.fresnel), share = f_select(t.reflects, reflects, 1.0f - reflects);
+    Float jacobian = f_select(t.reflects, 0.25f * f_abs(rcp_b), f_abs(t.b) * f_sqr(t.e * rcp_q));
+    // pdf = facets share jacobian
+    Float k = microfacet_pdf(&mf, up, t.m) * jacobian, g = dpdf * k * share, gt = f_zero_unless(~t.reflects, g);
+    RoughDielectricBack back = {.fresnel = f_select(t.reflects, dpdf * k, -dpdf * k), .m = v3_zero()};
+    microfacet_pdf_adj(&mf, up, t.m, dpdf * share * jacobian, &du, &dv, &dup, &back.m);
+    microfacet_alpha_adj(p->alpha_u, du, &dp->alpha_u);
+    microfacet_alpha_adj(p->alpha_v, dv, &dp->alpha_v);
+    v3_acc(dwi, v3_scale(dup, side));
+    // jacobian = 1 / (4 |b|), or |b| e^2 / q^2 with q = a + e b
+    back.a = -2.0f * gt * rcp_q;
+    back.b = f_select(t.reflects, -g * rcp_b, gt * (rcp_b - 2.0f * t.e * rcp_q));
+    back.e = 2.0f * gt * (f_safe_rcp(t.e) - t.b * rcp_q);
+    roughdielectric_terms_adj(&t, wi, wo, &back, dp, dwi, dwo);
 }

@@ -130,3 +130,27 @@ KFN void roughplastic_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Int lobe, Spe
     dp->eta = dp->eta - 2.0f * dthrough * ti * to * wo.z * rest * rcp_eta + dfdr * (real)p->table[COAT_INTERNAL + 2];
     dp->alpha = dp->alpha + dfdr * (real)p->table[COAT_INTERNAL + 1];
 }
+
+KFN void roughplastic_pdf_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Float dpdf, RoughPlastic *dp, Vec3 *dwi, Vec3 *dwo) {
+    Microfacet mf = roughplastic_facets(p);
+    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
+    Float q = roughplastic_probability(p, wi), rcp = f_safe_rcp(4.0f * v3_dot(wo, m)), facets = microfacet_pdf(&mf, wi, m);
+    dpdf = f_zero_unless(roughplastic_counts(wi, wo, i_set(LOBE_SMOOTH)), dpdf);
+    // pdf = q coat + (1 - q) wo.z / pi, coat = facets / (4 wo . m)
+    Float du = f_set(0), dv = f_set(0), dcosine = -4.0f * dpdf * q * facets * rcp * rcp;
+    dwo->z = dwo->z + dpdf * (1.0f - q) * INV_PI;
+    microfacet_pdf_adj(&mf, wi, m, dpdf * q * rcp, &du, &dv, dwi, &dm);
+    microfacet_alpha_adj(p->alpha, du + dv, &dp->alpha);
+    v3_acc(dwo, v3_scale(m, dcosine));
+    v3_acc(&dm, v3_scale(wo, dcosine));
+    v3_normalize_adj(h, dm, &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, dh);
+    // q the share of a = (1 - T) ks beside b = T kd
+    Float t = roughplastic_transmittance(p, wi.z), da = f_set(0), db = f_set(0);
+    Float ks = spec_mean(p->specular_reflectance), kd = spec_mean(p->diffuse_reflectance);
+    lobe_probability_adj((1.0f - t) * ks, t * kd, dpdf * (facets * rcp - wo.z * INV_PI), &da, &db);
+    spec_acc(&dp->specular_reflectance, spec_set(da * (1.0f - t) * (1.0f / SPEC_N)));
+    spec_acc(&dp->diffuse_reflectance, spec_set(db * t * (1.0f / SPEC_N)));
+    roughplastic_transmittance_adj(p, wi.z, db * kd - da * ks, dp, &dwi->z);
+}

@@ -60,12 +60,6 @@ bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
 bool rey_bsdf_tints(int kind) { return kind == BSDF_THINDIELECTRIC; }
 
-bool rey_bsdf_draws(int kind, int param) {
-    ParamType type = rey_bsdf_kinds[kind].params[param].type;
-    bool one_lobe = kind == BSDF_DIFFUSE || kind == BSDF_ROUGHCONDUCTOR, rough = type == PARAM_ALPHA_U || type == PARAM_ALPHA_V;
-    return one_lobe ? rough : rey_bsdf_spreads(kind);
-}
-
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 
 // Of TURNED_CONFIG the second switch.

@@ -37,8 +37,6 @@ bool rey_bsdf_opens(int kind);
 bool rey_bsdf_tints(int kind);
 // Whether light passes it undeviated and undimmed.
 bool rey_bsdf_passes(int kind);
-// Whether the density of the smooth lobe of a function that has no children depends on one of its parameters.
-bool rey_bsdf_draws(int kind, int param);
 // Whether a kind turns the shading normal of the function inside it.
 bool rey_bsdf_turns(int kind);
 // Whether it drops light abruptly at the plane of the normal that it turns: without use_shadowing_function.

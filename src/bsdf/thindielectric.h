@@ -59,3 +59,5 @@ KFN void thindielectric_adj(const ThinDielectric *p, Vec3 wi, Vec3 wo, Int lobe,
     fresnel_dielectric_adj(f_abs(wi.z), p->eta, 2.0f * dreflected * f_sqr(inv), f_set(0), &dcos, &dp->eta);
     dwi->z = dwi->z + f_sign(wi.z) * dcos;
 }
+
+NO_SMOOTH_LOBE(thindielectric, ThinDielectric)

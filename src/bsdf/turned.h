@@ -130,3 +130,16 @@ KFN void turned_adj(const BsdfCall *call, Vec3 n, int32_t shadowing, Vec3 wi, Ve
     frame_to_local_adj(&t.frame, wo, v3_select(delta, v3_zero(), db), &dframe, dwo);
     turned_frame_adj(&t.frame, &dframe, dn);
 }
+
+// The same of turned_pdf.
+KFN void turned_pdf_adj(const BsdfCall *call, Vec3 n, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m, Vec3 *dn, Vec3 *dwi,
+                        Vec3 *dwo, Vec2 *duv) {
+    Turned t = turned_make(n, wi, wo);
+    BsdfCall child = bsdf_child(call, 0);
+    Vec3 da = v3_zero(), db = v3_zero();
+    Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
+    bsdf_pdf_adj(&child, t.wi, t.wo, f_zero_unless(t.counts, dpdf), sink, m, &da, &db, duv);
+    frame_to_local_adj(&t.frame, wi, da, &dframe, dwi);
+    frame_to_local_adj(&t.frame, wo, db, &dframe, dwo);
+    turned_frame_adj(&t.frame, &dframe, dn);
+}

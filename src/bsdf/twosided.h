@@ -81,3 +81,21 @@ KFN void twosided_adj(const BsdfCall *call, const Twosided *p, Vec3 wi, Vec3 wo,
     v3_acc(dwi, v3_flip_z(back, da));
     *dwo = v3_flip_z(back, db);
 }
+
+KFN void twosided_pdf_adj(const BsdfCall *call, const Twosided *p, Vec3 wi, Vec3 wo, Float dpdf, Sink *sink, Mask m,
+                          Twosided *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
+    UNUSED(p), UNUSED(dp);
+    Mask back = m_lt(wi.z, f_set(0));
+    Vec3 a = v3_flip_z(back, wi), b = v3_flip_z(back, wo), da = v3_zero(), db = v3_zero();
+    BsdfCall front_call = twosided_side(call, false);
+    if (twosided_shared(call)) {
+        bsdf_pdf_adj(&front_call, a, b, dpdf, sink, m, &da, &db, duv);
+    } else {
+        BsdfCall back_call = twosided_side(call, true);
+        bsdf_pdf_adj(&front_call, a, b, f_zero_unless(~back, dpdf), sink, m & ~back, &da, &db, duv);
+        bsdf_pdf_adj(&back_call, a, b, f_zero_unless(back, dpdf), sink, m & back, &da, &db, duv);
+    }
+    // a = flip(wi), b = flip(wo)
+    v3_acc(dwi, v3_flip_z(back, da));
+    v3_acc(dwo, v3_flip_z(back, db));
+}

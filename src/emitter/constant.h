@@ -43,3 +43,7 @@ KFN void constant_move_adj(const SceneView *scene, const Light *l, Vec3 ref, Vec
                            LightMove *move, Sink *sink, Mask m) {
     UNUSED(scene), UNUSED(l), UNUSED(ref), UNUSED(d), UNUSED(distance), UNUSED(move), UNUSED(sink), UNUSED(m);
 }
+
+KFN void constant_pdf_adj(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv, Float dpdf, Sink *sink, Mask m) {
+    UNUSED(scene), UNUSED(e), UNUSED(d), UNUSED(uv), UNUSED(dpdf), UNUSED(sink), UNUSED(m);
+}

@@ -121,6 +121,19 @@ KFN Float environment_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d
 #undef EMITTER_CASE
     }
 }
+
+KFN void environment_pdf_adj(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv, Float dpdf, Sink *sink, Mask m) {
+    switch (e->kind) {
+#define EMITTER_CASE(ENUM, prefix, ...)                                                                                \
+    case EMITTER_##ENUM:                                                                                               \
+        prefix##_pdf_adj(scene, e, d, uv, dpdf, sink, m);                                                              \
+        break;
+#include "emitter/kinds.inl"
+#undef EMITTER_CASE
+    default:
+        break;
+    }
+}
 #undef EMITTER_ENVIRONMENT
 #define EMITTER_ENVIRONMENT(...)
 

@@ -17,10 +17,19 @@ EMITTER_SLOTS(Envmap, ENVMAP_PARAMS)
 
 enum { ENVMAP_FLOOR = 12, ENVMAP_SCALE = 13, ENVMAP_SINES = 14 };
 
+// The share of every direction, over that of the picture.
+#define ENVMAP_UNIFORM 0.02
+
 // ---- host --------------------------------------------------------------------------------------------------------
 
+static const double envmap_weights[3] = {0.212671, 0.715160, 0.072169}; // of luminance
+
 static inline double envmap_luminance(const float *texel) {
-    return fmax(0, 0.212671 * (double)texel[0] + 0.715160 * (double)texel[1] + 0.072169 * (double)texel[2]);
+    double y = 0;
+    for (int c = 0; c < 3; c++) {
+        y += envmap_weights[c] * (double)texel[c];
+    }
+    return y;
 }
 
 // Of the latitude in the middle of a row of cells.
@@ -30,7 +39,7 @@ static inline double envmap_row_sine(int64_t y, int64_t rows) {
 
 // Luminance of a row of texels; the picture has one row more than the table, and that one is never kept.
 static inline float envmap_row_luminance(const float *texels, const float *kept, bool last, int64_t x) {
-    return last ? (float)envmap_luminance(texels + 3 * x) : kept[x];
+    return last ? (float)fmax(0, envmap_luminance(texels + 3 * x)) : kept[x];
 }
 
 // Masses of the cells, each between texel columns x, x + 1 and rows y, y + 1: their mean luminance, in place of the
@@ -59,7 +68,6 @@ static inline double envmap_cell_masses(const float *last_row, int64_t width, in
 // The distribution: luminance times sine, with a share for every direction, because the derivative with respect to a
 // black texel is not 0. Every texel is looked at once.
 static inline void envmap_distribution(const SceneView *view, const EmitterRecord *e) {
-    const double uniform_share = 0.02;
     const TextureNode *t = view->textures + e->slot[SLOT(Envmap, data)];
     const float *texels = view->theta + t->theta;
     int64_t width = t->width, rows = t->height - 1;
@@ -67,15 +75,15 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
     float *cells = grid_cells(row_cdf, (int32_t)width, (int32_t)rows);
     double sines = 0, row_sum = 0;
     for (int64_t i = 0; i < rows * width; i++) {
-        cells[i] = (float)envmap_luminance(texels + 3 * i);
+        cells[i] = (float)fmax(0, envmap_luminance(texels + 3 * i));
     }
     double total = envmap_cell_masses(texels + 3 * rows * width, width, rows, cells);
     for (int64_t y = 0; y < rows; y++) {
         sines += envmap_row_sine(y, rows) * (double)width;
         table_sines[y] = (float)envmap_row_sine(y, rows);
     }
-    double floor = total > 0 ? uniform_share * total / sines : 1;
-    double all = total > 0 ? total * (1 + uniform_share) : sines;
+    double floor = total > 0 ? ENVMAP_UNIFORM * total / sines : 1;
+    double all = total > 0 ? total * (1 + ENVMAP_UNIFORM) : sines;
     view->tables[e->table + ENVMAP_FLOOR] = (float)floor;
     view->tables[e->table + ENVMAP_SCALE] = (float)((double)(rows * width) / all);
     for (int64_t y = 0; y < rows; y++) {
@@ -92,6 +100,18 @@ static inline void envmap_distribution(const SceneView *view, const EmitterRecor
         row_cdf[y] = y + 1 == rows ? 1 : (float)(row_sum / all);
     }
     grid_finish(row_cdf, (int32_t)width, (int32_t)rows);
+}
+
+// The derivative of the logarithm of the sum of all masses by a number of the picture.
+static inline double envmap_log_sum_slope(const SceneView *view, const EmitterRecord *e, int64_t number) {
+    const TextureNode *t = view->textures + e->slot[SLOT(Envmap, data)];
+    const int64_t rows = t->height - 1, texel = number / t->channels, y = texel / t->width;
+    const double scale = (double)view->tables[e->table + ENVMAP_SCALE];
+    const double sum = (double)(rows * t->width) / (scale * (1 + ENVMAP_UNIFORM));
+    const double above = y > 0 ? envmap_row_sine(y - 1, rows) : 0, below = y < rows ? envmap_row_sine(y, rows) : 0;
+    // A texel is a corner of two cells of either row.
+    bool counts = envmap_luminance(view->theta + t->theta + t->channels * texel) >= 0;
+    return counts ? 0.5 * (above + below) * envmap_weights[number % t->channels] / sum : 0;
 }
 
 static inline int64_t envmap_size(const TextureNode *textures, const EmitterRecord *e) {
@@ -269,15 +289,42 @@ KFN LightSample envmap_sample(const SceneView *scene, const Light *l, Vec3 ref, 
     return s;
 }
 
-KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv) {
+// The cell of a direction, and the factor from densities per unit square to those per solid angle.
+KFN EnvmapCell envmap_cell_towards(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv, Footprint *f, Float *factor) {
     const TextureNode *t = scene->textures + e->slot[SLOT(Envmap, data)];
     Light l = light_alone(e, i_set(0));
-    // The same with y = A^-1 d = v / |A v|: |A v|^3 / sin = 1 / (|y|^2 |(x, z)|).
+    // With y = A^-1 d = v / |A v|: |A v|^3 / sin = 1 / (|y|^2 |(x, z)|).
     Vec3 y = light_direction_to_local(scene, &l, d);
     Float ring2 = y.x * y.x + y.z * y.z;
-    Footprint f = envmap_footprint(t, uv);
+    *factor = envmap_shrinking(scene, e) * f_safe_rcp(2.0f * PI * PI * f_sqrt(ring2) * (ring2 + y.y * y.y));
+    *f = envmap_footprint(t, uv);
     Int row = i_max(i_min(i_from_f(uv.y * (real)(t->height - 1)), i_set(t->height - 2)), i_set(0));
-    EnvmapCell cell = envmap_cell(scene, e, &f, row);
-    return envmap_cell_density(&cell, f.fx, f.fy) * envmap_shrinking(scene, e) *
-           f_safe_rcp(2.0f * PI * PI * f_sqrt(ring2) * (ring2 + y.y * y.y));
+    return envmap_cell(scene, e, f, row);
+}
+
+KFN Float envmap_pdf(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv) {
+    Footprint f;
+    Float factor;
+    EnvmapCell cell = envmap_cell_towards(scene, e, d, uv, &f, &factor);
+    return envmap_cell_density(&cell, f.fx, f.fy) * factor;
+}
+
+// Adjoint of envmap_pdf by the texels' luminance y, and by the logarithm of the sum of all masses (sink->sky_at):
+// the density is that of a constant share plus one in proportion to sum_k w_k y_k / sum.
+KFN void envmap_pdf_adj(const SceneView *scene, const EmitterRecord *e, Vec3 d, Vec2 uv, Float dpdf, Sink *sink, Mask m) {
+    const int32_t image = e->slot[SLOT(Envmap, data)];
+    const TextureNode *t = scene->textures + image;
+    Footprint f;
+    Float factor, share = f_set(0);
+    EnvmapCell cell = envmap_cell_towards(scene, e, d, uv, &f, &factor);
+    for (int k = 0; k < 4; k++) {
+        Float w = footprint_weight(&f, k) * cell.scale * factor * dpdf, y = luminance(bitmap_texel(scene, t, f.at[k]));
+        Spec dtexel = luminance_adj(f_zero_unless(m_ge(y, f_set(0)), w));
+        Int at = f.at[k] * t->channels + sink->texture_at[image];
+        for (int c = 0; c < SPEC_N; c++) {
+            sink_add(sink, at + c, dtexel.c[c], m);
+        }
+        share = share + w * f_max(y, f_set(0));
+    }
+    sink_add_uniform(sink, sink->sky_at, -share, m);
 }

@@ -2,7 +2,8 @@
 // numbers that `table`_follow brings up to date. The form says what the header provides beside prefix_sample, prefix_eval
 // and prefix_adj:
 //   EMITTER_SURFACE      radiance of a shape: prefix_pdf of directions that meet it
-//   EMITTER_ENVIRONMENT  radiance from beyond the scene: prefix_uv of a direction, prefix_pdf of both, prefix_move_adj
+//   EMITTER_ENVIRONMENT  radiance from beyond the scene: prefix_uv of a direction, prefix_pdf and prefix_pdf_adj of
+//                        both, prefix_move_adj
 //   EMITTER_DELTA        from one direction at each point, so that light sampling alone meets it: prefix_move_adj
 EMITTER_SURFACE(AREA, area, Area, "area", AREA_PARAMS, light_nothing)
 EMITTER_SURFACE(DIRECTIONALAREA, directionalarea, DirectionalArea, "directionalarea", DIRECTIONALAREA_PARAMS, light_nothing)

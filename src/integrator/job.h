@@ -39,6 +39,8 @@ typedef struct PathJob {
     const int32_t *texture_at, *to_uv_at, *normals_at, *attribute_at, *place_at;
     const int32_t *points_at, *pose_at, *instance_at, *camera_at, *volume_at;
     bool any_normals, any_attributes, any_places, any_motion, any_camera;
+    bool any_sky;                 // the density of the environment is (render/dropped.c)
+    int32_t sky_at;
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
     const int32_t *none;          // the offsets of a selection of nothing

@@ -7,11 +7,10 @@
 // the sum met up to vertex k, times dD_k / dP_k. And that of the weights of MIS: as far as light that was sampled at
 // vertex k is dropped and light that scattered rays meet is not, the picture is
 //     f Le (D_k w + 1 - w),  w = a^2 / (a^2 + s^2),
-// a the density of the light sample, s that of scattering, which depends on what masks and blends share out.
-// NOT differentiated: P of thin glass and roulette by its colours, and densities other than by shares.
+// a the density of the light sample, which the texels of an environment decide, s that of scattering.
+// NOT differentiated: P of thin glass and roulette by its colours.
 #pragma once
 
-#include "bsdf/shares.h"
 #include "integrator/path_move.h"
 
 // Survival of roulette in the picture, of paths with throughput beta.
@@ -111,11 +110,14 @@ static void kept_stage(Tracer *t, const SceneView *moved, int32_t count) {
     kept_backward(t, count);
 }
 
-// w / a of light samples, by the density of scattering; *slope: its derivative.
-KFN Float kept_light_weight(Float a, Float s, Float *slope) {
-    Float inv = f_safe_rcp(a * a + s * s);
-    *slope = -2.0f * a * s * f_sqr(inv);
-    return a * inv;
+// w / a of light samples, by the densities of the sample and of scattering; and its slopes, of w alone: samples stay.
+typedef struct KeptWeight {
+    Float value, by_light, by_scattering;
+} KeptWeight;
+
+KFN KeptWeight kept_weight(Float a, Float s) {
+    Float inv = f_safe_rcp(a * a + s * s), k = 2.0f * s * f_sqr(inv);
+    return (KeptWeight){a * inv, k * s, -k * a};
 }
 
 // Lanes of a batch whose light samples are dropped by another share than what scattered rays meet, and their densities.
@@ -124,9 +126,15 @@ KFN Mask kept_lights(const Tracer *t, const SurfaceSweep *s, Float *a) {
     return s->connected & m_gt(*a, f_set(0)) & ~m_eq(s->kept, f_set(1));
 }
 
-// Adjoint of keeping what the paths of a batch had met so far, for one delta; weight: delta times throughput.
-KFN void kept_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, Spec delta, Spec weight, VertexAdj *d,
-                  Sink *sink) {
+// The density of scattering along the light samples, as pictures draw it.
+KFN Float kept_scattering(const BsdfCall *call, const SurfaceSweep *s) {
+    BsdfCall picture = *call;
+    picture.floor = 0;
+    return bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH));
+}
+
+// Adjoint of keeping what the paths of a batch had met so far, for one delta.
+KFN void kept_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, Spec delta, VertexAdj *d, Sink *sink) {
     const Records *r = &t->ws.records;
     Float dp = f_load(r->slope + s->at) * spec_dot(delta, spec_load(r->met, s->at));
     Mask m = s->m & m_finite(dp) & ~m_eq(dp, f_set(0));
@@ -136,26 +144,49 @@ KFN void kept_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, 
         bsdf_adj(call, s->wi, v3_neg(s->wi), i_set(LOBE_NULL), spec_set(f_zero_unless(m, dp) * (1.0f / SPEC_N)), sink, m,
                  &d->wi, &dwo, vertex_uv_adj(s, d, sink));
     }
-    Float a, tilt;
+}
+
+// Adjoint of the weights of MIS of a batch's light samples, for one delta; weight: delta times throughput.
+KFN void kept_weights_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, int32_t live, Spec weight,
+                          VertexAdj *d, Sink *sink) {
+    Float a;
     Mask lights = kept_lights(t, s, &a);
-    if (m_any(lights)) {
+    if (!m_any(lights)) {
+        return;
+    }
+    // f Le (D - 1) w / a
+    Float dw = f_zero_unless(lights, spec_dot(spec_mul(weight, s->f_light), s->light_value) * (s->kept - 1.0f));
+    KeptWeight w = kept_weight(a, kept_scattering(call, s));
+    if (live & LIVE_SCATTERING) {
         BsdfCall picture = *call;
         picture.floor = 0;
-        kept_light_weight(a, bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH)), &tilt);
-        // f Le (D - 1) w / a
-        Float dpdf = spec_dot(spec_mul(weight, s->f_light), s->light_value) * (s->kept - 1.0f) * tilt;
-        bsdf_shares_adj(&picture, s->wi, s->wl, f_zero_unless(lights, dpdf), sink, lights, vertex_uv_adj(s, d, sink));
+        Vec3 dwl = v3_zero();
+        bsdf_pdf_adj(&picture, s->wi, s->wl, dw * w.by_scattering, sink, lights, &d->wi, &dwl, vertex_uv_adj(s, d, sink));
+        // wl = to_local(d), and d stays
+        Vec3 stays = v3_zero();
+        frame_to_local_adj(&s->si.sh, s->light_d, dwl, &d->frame, &stays);
+    }
+    if (sink->any_sky) {
+        const EmitterRecord *e = t->scene->emitters + t->scene->environment;
+        Mask sky = lights & mi_eq(s->light, i_set(t->scene->environment));
+        environment_pdf_adj(t->scene, e, s->light_d, s->light_uv, f_zero_unless(sky, dw * w.by_light * e->weight), sink, sky);
     }
 }
 
 // The weights of light samples along recorded paths, of which D is that of the scene whose picture is asked for: kept, and
 // moved with respect to what scattered rays meet, whose weights are the recording scene's.
 KFN Spec kept_replay(const Tracer *t, const SurfaceSweep *s, Spec weight) {
-    BsdfCall picture = s->call;
-    picture.floor = 0;
-    Float a, slope;
+    Float a;
     Mask lights = kept_lights(t, s, &a);
-    Float moved = kept_light_weight(a, bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH)), &slope);
+    Float now = a;
+    if (t->scene->environment >= 0) {
+        const EmitterRecord *e = t->scene->emitters + t->scene->environment, *then = t->deciding->emitters + t->scene->environment;
+        Mask sky = lights & mi_eq(s->light, i_set(t->scene->environment));
+        Float ratio = environment_pdf(t->scene, e, s->light_d, s->light_uv) *
+                      f_safe_rcp(environment_pdf(t->deciding, then, s->light_d, s->light_uv));
+        now = f_select(sky, a * ratio, a);
+    }
+    Float moved = kept_weight(now, kept_scattering(&s->call, s)).value * now * f_safe_rcp(a);
     Float tilt = f_zero_unless(lights, (s->kept - 1.0f) * (moved - spec_max(weight)));
     return spec_add(spec_scale(weight, s->kept), spec_set(tilt));
 }

@@ -97,8 +97,11 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     if (m_any(s->connected)) {
         connections_adj(t, s, &call, live, weight, &d, sink);
     }
-    if ((live & LIVE_SCATTERING) && t->scene->drops) {
-        kept_adj(t, s, &call, delta, weight, &d, sink);
+    if (t->scene->drops) {
+        if (live & LIVE_SCATTERING) {
+            kept_adj(t, s, &call, delta, &d, sink);
+        }
+        kept_weights_adj(t, s, &call, live, weight, &d, sink);
     }
     Mask scattered = sink->any_motion ? s->scattered & ~s->chained : s->scattered;
     if ((live & LIVE_SCATTERING) && m_any(scattered)) {
@@ -163,7 +166,7 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, 
         surface_passage_find(t, batch, s, p);
         s->connected = p->open;
         s->light_value = p->light_value;
-    } else if (live & LIVE_SCATTERING) {
+    } else if ((live & LIVE_SCATTERING) || t->scene->drops) {
         s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
     }
     Corner corner;

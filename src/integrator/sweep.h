@@ -130,6 +130,8 @@ static Sink sink_of(const PathJob *job) {
                   .camera_at = job->camera_at,
                   .volume_at = job->volume_at,
                   .any_volumes = job->any_volumes,
+                  .any_sky = job->any_sky,
+                  .sky_at = job->sky_at,
                   .any_motion = job->any_motion,
                   .any_camera = job->any_camera,
                   .watch_turned = job->watch_turned,

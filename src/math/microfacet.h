@@ -1,7 +1,7 @@
 // microfacet.h: the Beckmann and GGX distributions of microfacet normals, Smith's masking, and sampling of all normals
 // or of the visible ones, with the adjoints of density and masking. Local frame, macro normal +z; anisotropic.
 //
-// Derivatives of sample and pdf do not exist: sampling is detached.
+// Sampling is detached; the adjoint of the density is for pictures that depend on densities (integrator/kept.h).
 #pragma once
 
 #include "math/fresnel.h"
@@ -165,6 +165,49 @@ KFN Float microfacet_pdf(const Microfacet *mf, Vec3 wi, Vec3 m) {
     Mask up = m_gt(wi.z, f_set(0));
     Float area = microfacet_projected_area(mf, v3_select(up, wi, v3(f_set(0), f_set(0), f_set(1))));
     return f_zero_unless(up, d * f_max(v3_dot(wi, m), f_set(0)) / area);
+}
+
+// Adjoint of microfacet_projected_area.
+KFN void microfacet_projected_area_adj(const Microfacet *mf, Vec3 wi, Float da, Float *dalpha_u, Float *dalpha_v,
+                                       Vec3 *dwi) {
+    Float x = mf->alpha_u * wi.x, y = mf->alpha_v * wi.y, s2 = x * x + y * y, k, dc;
+    if (mf->ggx) {
+        // A = (c + r) / 2, r^2 = s^2 + c^2
+        Float r = f_safe_rcp(f_sqrt(s2 + wi.z * wi.z));
+        k = 0.5f * da * r;
+        dc = 0.5f * da * (1.0f + wi.z * r);
+    } else {
+        // dA/dc = (1 + erf a) / 2, dA/ds = exp(-a^2) / (2 sqrt pi): what a = c / s brings cancels
+        Float s = f_sqrt(s2), a = f_min(wi.z * f_safe_rcp(s), f_set(9));
+        a = f_select(m_gt(s, f_set(1e-30f)), a, f_set(9));
+        k = 0.5f * da * f_exp(-a * a) * (1.0f / SQRT_PI) * f_safe_rcp(s);
+        dc = 0.5f * da * (1.0f + f_erf(a));
+    }
+    // s ds = au^2 x dx + av^2 y dy + ...
+    *dalpha_u = *dalpha_u + k * x * wi.x;
+    *dalpha_v = *dalpha_v + k * y * wi.y;
+    v3_acc(dwi, v3(k * x * mf->alpha_u, k * y * mf->alpha_v, dc));
+}
+
+// Adjoint of microfacet_pdf.
+KFN void microfacet_pdf_adj(const Microfacet *mf, Vec3 wi, Vec3 m, Float dpdf, Float *dalpha_u, Float *dalpha_v, Vec3 *dwi,
+                            Vec3 *dm) {
+    Float d = microfacet_D(mf, m);
+    if (!mf->sample_visible) {
+        // D m.z
+        microfacet_D_adj(mf, m, dpdf * f_max(m.z, f_set(0)), dalpha_u, dalpha_v, dm);
+        dm->z = dm->z + dpdf * d;
+        return;
+    }
+    // D (wi . m) / A(wi)
+    Float cosine = v3_dot(wi, m);
+    Mask seen = m_gt(wi.z, f_set(0)) & m_gt(cosine, f_set(0));
+    Vec3 up = v3_select(seen, wi, v3(f_set(0), f_set(0), f_set(1)));
+    Float rcp = 1.0f / microfacet_projected_area(mf, up), k = f_zero_unless(seen, dpdf) * rcp;
+    microfacet_D_adj(mf, m, k * cosine, dalpha_u, dalpha_v, dm);
+    microfacet_projected_area_adj(mf, up, -k * d * cosine * rcp, dalpha_u, dalpha_v, dwi);
+    v3_acc(dwi, v3_scale(m, k * d));
+    v3_acc(dm, v3_scale(wi, k * d));
 }
 
 // All normals, with density D m.z [walter2007 eq. 28, 29, 35, 36].

@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "math/rng.h"
 #include "render/boundary.h"
+#include "render/dropped.h"
 #include "render/live.h"
 #include "render/motion.h"
 #include "render/particles.h"
@@ -53,16 +54,14 @@ rey_result rey_render_check(rey_scene *scene, const rey_render_def *def) {
         return rey_fail(ctx, REY_ERROR_SCENE, "the scene has no sensor to render with");
     }
     if (rey_traces_particles(scene) && scene->view.media_count > 0) {
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED,
-                        "'ptracer' knows no participating media, 'volpath' does");
+        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "'ptracer' knows no participating media, 'volpath' does");
     }
     if (def->sensor < 0 || def->sensor >= scene->view.sensors_count) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sensor %d does not exist: the scene has %d", def->sensor,
                         (int)scene->view.sensors_count);
     }
     if (def->spp < 0 || def->spp > 1 << 24) {
-        return rey_fail(ctx, REY_ERROR_ARGUMENT, "spp = %d, expected 1 to %d, or 0 for the scene's own", def->spp,
-                        1 << 24);
+        return rey_fail(ctx, REY_ERROR_ARGUMENT, "spp = %d, expected 1 to %d, or 0 for the scene's own", def->spp, 1 << 24);
     }
     if (def->sets < 1 || def->sets > 4096) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "sets = %d, expected 1 to 4096", def->sets);
@@ -256,7 +255,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.instance_at = r->job.pose_at + shapes;
     r->job.camera_at = r->job.instance_at + view->instances_count;
     r->job.volume_at = r->job.camera_at + CAMERA_NUMBERS;
-    r->job.normals_at = normals_at;
+    r->job.texture_at = texture_at, r->job.to_uv_at = to_uv_at, r->job.normals_at = normals_at;
+    r->job.attribute_at = attribute_at, r->job.place_at = place_at;
     int64_t at = 0;
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
@@ -289,9 +289,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     }
     r->selection_size = at;
     rey_motion_add_normals(r, &at);
+    rey_dropped_add_sky(r, &at);
     r->gradient_size = at;
-    r->job.texture_at = texture_at, r->job.to_uv_at = to_uv_at;
-    r->job.attribute_at = attribute_at, r->job.place_at = place_at;
     return REY_OK;
 }
 
@@ -370,8 +369,7 @@ static rey_result prepare_adjoint(Render *r, const float *adjoint) {
         int64_t x = i / 3 % s->crop_width, y = i / 3 / s->crop_width;
         r->adjoint[i] = (float)(adjoint[i] / (r->columns[x] * r->rows[y] * set_spp(r)));
         if (!isfinite(r->adjoint[i])) {
-            return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "the adjoint image is not finite at pixel %d, %d", (int)x,
-                            (int)y);
+            return rey_fail(r->scene->ctx, REY_ERROR_ARGUMENT, "the adjoint image is not finite at pixel %d, %d", (int)x, (int)y);
         }
     }
     r->job.adjoint = r->adjoint;
@@ -387,6 +385,7 @@ static rey_result sum_shards(Render *r) {
         }
         r->gradients[i] = sum;
     }
+    rey_dropped_gradient(r, r->gradients);
     return rey_motion_gradient(r, r->gradients);
 }
 
@@ -403,6 +402,7 @@ static rey_result prepare_tangent(Render *r, const float *tangent) {
         }
     }
     r->job.tangent = r->tangent;
+    rey_dropped_tangent(r, r->tangent);
     return rey_motion_tangent(r, r->tangent);
 }
 

@@ -28,6 +28,8 @@ typedef struct Sink {
     bool any_volumes;
     bool any_normals, any_attributes, any_places;
     bool any_motion, any_camera; // surfaces or the sensor move; the sensor does
+    bool any_sky;      // the density of the environment is asked for, which depends on
+    int32_t sky_at;    // the logarithm of the sum of its table: kept here (emitter/envmap.h)
     Vec2 *at;          // gathers the adjoint of the barycentrics at which attributes are read; null = not asked for
     bool watch_turned; // see PathJob
     int32_t faces;     // FACES_ bits

@@ -183,8 +183,11 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
         BsdfSurface ds = {f_set(0), f_set(0), f_set(0), v3_zero()};
         call.dsurface = &ds;
         sink.derivative = f_set(0);
+        Float dpdf;
+        GATHER(dpdf, a[AT(lane)].dpdf);
         bsdf_adj(&call, wi, wo, gather_lobe(q, first, n), spec_zero_unless(m, gather_df(a, first, n)), &sink, m, &dwi,
                  &dwo, &duv);
+        bsdf_pdf_adj(&call, wi, wo, f_zero_unless(m, dpdf), &sink, m, &dwi, &dwo, &duv);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             Adjoint *to = a + first + lane;
             put3(to->dwi, dwi, lane);

@@ -49,6 +49,7 @@ typedef struct Draw {
 // Adjoint of one query: df in; the others out.
 typedef struct Adjoint {
     double df[3];
+    double dpdf;        // in: of the density, whose floor is 0 then
     double turn[3], u1; // delta lobes: adjoint of the sampled direction, in; u1 samples the lobe
     double dwi[3], dwo[3], duv[2], dsurface[3];
     double forward; // along `tangent`

@@ -20,18 +20,18 @@ static void follow(const KindCase *c, Query *q, double u1) {
     }
 }
 
-// df . f at one query, and turn . wo of delta lobes.
+// df . f at one query, turn . wo of delta lobes, and dpdf times the density.
 static double objective(const KindCase *c, const Query *query, const Adjoint *a) {
-    double f[1][3], sum = 0;
+    double f[1][3], pdf, sum = 0;
     Query q = *query;
     if (turns(&q)) {
         follow(c, &q, a->u1);
     }
-    exact->eval(c, 1, &q, f, NULL);
+    exact->eval(c, 1, &q, f, &pdf);
     for (int k = 0; k < 3; k++) {
         sum += a->df[k] * f[0][k] + a->turn[k] * q.wo[k];
     }
-    return sum;
+    return a->dpdf != 0 ? sum + a->dpdf * pdf : sum;
 }
 
 // Difference quotient of fourth order; side -1 or 1 stays on that side of x.
@@ -140,9 +140,14 @@ static bool find_u1(const KindCase *c, const Query *q, Adjoint *a) {
     return false;
 }
 
-static int check_query(KindCase *c, Random *r, double *largest) {
+// Of the value, or of the density in the smooth lobe.
+static int check_query(KindCase *c, Random *r, bool density, double *largest) {
     Query q = random_query(c, r);
     Adjoint a = {.df = {between(r, -1, 1), between(r, -1, 1), between(r, -1, 1)}};
+    if (density) {
+        a = (Adjoint){.dpdf = between(r, -1, 1)};
+        q.lobe = LOBE_SMOOTH;
+    }
     bool mirrored = turns(&q) && find_u1(c, &q, &a);
     for (int k = 0; k < 3 && mirrored; k++) {
         a.turn[k] = between(r, -1, 1);
@@ -150,7 +155,8 @@ static int check_query(KindCase *c, Random *r, double *largest) {
     double gradient[CASE_THETA] = {0}, tangent[CASE_THETA], f[1][3], pdf, along = 0, size = 0;
     exact->adj(c, 1, &q, &a, gradient, NULL);
     bool any = false;
-    double rounding = rounding_noise(c, &q, &a, r);
+    // Densities may be as good as 0, or be no function at all of what lies inside.
+    double rounding = fmax(rounding_noise(c, &q, &a, r), density ? 1e-17 : 0);
     int failures = 0;
     for (int i = 0; i < c->theta_count; i++) {
         if (!matches(c, &q, &a, c->theta + i, gradient[i], c->low[i], c->high[i], rounding)) {
@@ -179,12 +185,12 @@ static int check_query(KindCase *c, Random *r, double *largest) {
     }
     Adjoint forward = a;
     exact->adj(c, 1, &q, &forward, NULL, tangent);
-    if (fabs(forward.forward - along) > 1e-12 * size) {
+    if (fabs(forward.forward - along) > 1e-12 * size + (density ? 1e-15 : 0)) {
         print_error("forward %.12g, reverse %.12g: ", forward.forward, along);
         failures++;
     }
     exact->eval(c, 1, &q, f, &pdf);
-    if (any && pdf <= 0) {
+    if (any && !density && pdf <= 0) {
         print_error("a derivative without density: ");
         failures++;
     }
@@ -204,14 +210,16 @@ static void test_every_kind(void **state) {
             continue;
         }
         Random r = case_random(kind * 1000 + 1);
-        double largest[MAX_SLOTS] = {0};
+        double largest[MAX_SLOTS] = {0}, of_density[MAX_SLOTS] = {0};
         int here = 0;
         for (int n = 0; n < CASES && here < 5; n++) {
             KindCase c;
             case_make(&c, &r, kind, n % case_variants(kind), n % 2 == 1);
-            c.floor = 0.05;
             for (int i = 0; i < QUERIES && here < 5; i++) {
-                here += check_query(&c, &r, largest);
+                c.floor = 0.05;
+                here += check_query(&c, &r, false, largest);
+                c.floor = 0;
+                here += check_query(&c, &r, true, of_density);
             }
         }
         for (int i = 0; i < k->param_count; i++) {
