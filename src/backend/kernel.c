@@ -178,6 +178,12 @@ size_t KNAME(rey_kernel_workspace_bytes)(int32_t mode) {
     return workspace_layout(&ws, NULL, mode);
 }
 
+// Whether a derivative is asked for of nothing but materials and what lights send out, none of which asks where it is.
+KFN bool materials_stand(const PathJob *job) {
+    bool moves = job->any_motion || job->any_places || job->any_normals || job->glides || job->watch_turned || job->watch_smooth;
+    return !moves && job->scene->attributes_count == 0 && job->scene->volumes_count == 0;
+}
+
 // The groups' offsets lie behind the workspace proper; job->workspace_bytes has room for them.
 void KNAME(rey_kernel_run)(PathJob *job) {
     Tracer t = {.job = job, .scene = job->scene, .deciding = job->scene, .sensor = job->scene->sensors + job->sensor};
@@ -188,6 +194,9 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     t.derivative = mode_records(job->mode);
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
     t.shadows_later = t.derivative && t.scene->through && (job->mode == MODE_REPLAY || passing_is_live(&t));
+    const bool plain = t.derivative && job->mode != MODE_REPLAY && !t.scene->through && !t.scene->has_media && !t.scene->drops;
+    t.spares = plain && !job->live_lights;
+    t.local = plain && materials_stand(job);
     int64_t total = (int64_t)job->width * job->height * job->spp;
     t.most = t.ws.chunk;
     for (int64_t first = 0, count; first < total && (!job->go_on || job->go_on(job->user)); first += count) {

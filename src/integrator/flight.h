@@ -194,7 +194,7 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
     collision_shadow_ray(v->hit.p, s.d, s.distance, &ray);
     append_shadows(t, &ray, l, v->slot, record, v->medium, m);
     if (record >= 0) {
-        record_light(t, record, light, &s, f_zero_unless(m, weight), f);
+        record_light(t, record, light, &s, s.d, spec_set(f_zero_unless(m, weight)), f);
     }
 }
 
@@ -213,7 +213,7 @@ static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c,
     play_roulette(t, key, bounce, &w);
     append_paths(t, v, v->hit.p, v->hit.p, &w, v->medium, next_count);
     if (record >= 0) {
-        record_onward(t, record, &w);
+        record_onward(t, record, true, w.d, &w);
     }
     return next_count + m_count(w.m);
 }

@@ -24,7 +24,8 @@ KFN Float picture_survival(const SceneView *scene, Spec beta, int32_t bounce) {
 // derivative by P. Returns the lanes that passed. *throughput: what the picture's is, before the vertex and behind it.
 KFN Mask kept_choice(const Tracer *t, const SceneView *moved, const RecordBatch *batch, Int slot, Spec *throughput,
                      Float *keep, Float *slope) {
-    SurfaceSweep s = surface_load(t, batch, slot, spec_zero());
+    SurfaceSweep s;
+    surface_load(t, batch, slot, spec_zero(), &s);
     surface_parameterise(t, &s);
     const Vec3 on = v3_neg(s.wi);
     const Int null = i_set(LOBE_NULL);

@@ -195,7 +195,7 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     w.m = m;
     w.d = frame_to_world(&at->si.sh, w.sample.wo);
     if (record >= 0) {
-        record_onward(t, record, &w);
+        record_onward(t, record, true, w.d, &w);
     }
     if (t->lobes) {
         i_scatter(t->lobes, at->v.slot, w.sample.lobe, at->v.m);

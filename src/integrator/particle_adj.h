@@ -51,7 +51,7 @@ static void exchange_adj(const Tracer *t, const SurfaceSweep *s, const Exchange 
 
 // The vertices of a batch; s->call points into s.
 static void landing_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, SurfaceSweep *s) {
-    *s = surface_load(t, batch, slot, suffix);
+    surface_load(t, batch, slot, suffix, s);
     s->call.uv.hit = &s->hit;
     if (t->scene->bsdfs[s->group->bsdf].surface) {
         find_surface(t->scene, s->group, &s->hit, &s->surface, &s->dp_dv);

@@ -19,6 +19,12 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
     if (scene->hide_emitters) {
         v.m = v.m & m_gt(v.pdf, f_set(PDF_VIEWED));
     }
+    if (t->spares) {
+        vertex_spare(t, -1, &v);
+        if (!m_any(v.wanted)) {
+            return;
+        }
+    }
     Vec2 uv = environment_uv(scene, e, v.d);
     Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, v.d, uv) * e->weight));
     Spec l = spec_scale(emitter_eval(scene, e, texcoord(uv, NULL), f_set(1)), mis);
@@ -67,7 +73,7 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     Spec f = bsdf_eval_pdf(call, wi, wo, smooth, &scatter_pdf);
     Float pdf = s.pdf * choice;
     Float other_pdf = picture_pdf(call, wi, wo, smooth, scatter_pdf), own_pdf = pdf;
-    Mask drawn = v->m;
+    Mask drawn = v->wanted;
     if (scene->split) {
         own_pdf = pdf * split.light_pdf;
         other_pdf = scatter_pdf * split.scatter_pdf;
@@ -87,8 +93,9 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     Ray ray;
     shadow_ray(si, s.d, s.distance, &ray);
     append_shadows(t, &ray, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
-    if (record >= 0) {
-        record_light(t, record, light, &s, f_zero_unless(m, weight), f);
+    if (record >= 0 && v->live) {
+        Spec brings = spec_zero_unless(m, t->spares ? spec_scale(radiance, weight) : spec_set(weight));
+        record_light(t, record, light, &s, v->local ? wo : s.d, brings, f);
         if (scene->drops) {
             f_store(t->ws.records.light_pdf + record, f_zero_unless(~light_is_delta(scene, light), own_pdf));
         }
@@ -137,7 +144,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);
     }
     if (record >= 0) {
-        record_onward(t, record, &w);
+        record_onward(t, record, v->live, v->local ? w.sample.wo : w.d, &w);
     }
     return next_count + m_count(w.m);
 }
@@ -154,6 +161,20 @@ static NOINLINE void find_surface(const SceneView *scene, const Group *group, co
     *dp_dv = si.dp_dv;
 }
 
+// The latest batch of vertices, with texture coordinates uv and seen along wi.
+KFN void record_surface(Tracer *t, int32_t record, const Vertex *v, Vec2 uv, Vec3 wi, Float mis, Spec emission) {
+    RecordBatch *batch = t->ws.batches + t->batch_count - 1;
+    Vertex seen = *v;
+    batch->first_vertex = batch->bounce == 0;
+    batch->local = v->local;
+    if (v->local) {
+        seen.d = v3_neg(wi);
+        seen.hit.u = uv.x;
+        seen.hit.v = uv.y;
+    }
+    record_vertex(t, record, &seen, mis, emission);
+}
+
 // Emission, light sampling and scattering of lanes that share a group.
 static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, const int32_t *order, int32_t count,
                              int32_t bounce, int32_t next_count) {
@@ -164,10 +185,14 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         si.uv.x = si.uv.x + real_gather(t->nudge[0], v.slot);
         si.uv.y = si.uv.y + real_gather(t->nudge[1], v.slot);
     }
+    if (t->spares) {
+        vertex_spare(t, group_id, &v);
+    }
+    const bool wanted = m_any(v.wanted);
     Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
     Float mis = f_set(0);
     Spec emission = spec_zero();
-    if (group->emitter >= 0) {
+    if (group->emitter >= 0 && wanted) {
         const EmitterRecord *e = scene->emitters + group->emitter;
         Mask lit = v.m & m_gt(wi.z, f_set(0));
         mis = f_zero_unless(lit, emission_weight(t, e, &v, &si));
@@ -180,13 +205,13 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         }
     }
     int32_t record = -1;
-    if (t->derivative) {
+    if (t->derivative && wanted) {
         record = record_claim(t, VERTEX_SURFACE, group_id, count, bounce);
         if (record < 0) {
             return next_count;
         }
-        record_vertex(t, record, &v, mis, emission);
-        t->ws.batches[t->batch_count - 1].first_vertex = bounce == 0;
+        v.local = t->local && !scene->bsdfs[group->bsdf].surface;
+        record_surface(t, record, &v, si.uv, wi, mis, emission);
     }
     if (scene->max_depth >= 0 && bounce + 1 >= scene->max_depth && !scene->through) {
         if (record >= 0) {
@@ -202,7 +227,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         find_surface(scene, group, &v.hit, &surface, &dp_dv);
         call.surface = &surface;
     }
-    if (scene->emitters_count > 0 && scene->bsdfs[group->bsdf].spreads) {
+    if (wanted && scene->emitters_count > 0 && scene->bsdfs[group->bsdf].spreads) {
         connect_lights(t, group, &v, &si, &call, wi, &key, bounce, record);
     }
     return scatter_paths(t, group, &v, &si, &call, wi, &key, bounce, record, next_count);

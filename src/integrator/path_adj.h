@@ -16,13 +16,16 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
     int32_t at = batch->first;
     Mask m = m_first_n(batch->count);
     Int slot = i_select(m, i_load(r->slot + at), i_set(0));
+    spec_scatter(t->ws.suffix, slot, spec_load(r->local, at), m);
+    if (!t->job->live_lights) {
+        return;
+    }
     Vec3 d = record_v3(r->dx, r->dy, r->dz, at);
     Spec beta = spec_load(r->beta, at);
     Float mis = f_load(r->mis + at);
     Vec2 uv = environment_uv(t->scene, e, d);
     const bool moves = sink->any_places || sink->any_motion || t->job->glides;
-    spec_scatter(t->ws.suffix, slot, spec_load(r->local, at), m);
-    for (int c = 0; c < drives(t) && t->job->live_lights; c++) {
+    for (int c = 0; c < drives(t); c++) {
         // L = w_e Le
         Spec dl = spec_scale(spec_mul(slot_adjoint(t, slot, c), beta), mis);
         LightMove move = light_move_zero();
@@ -166,6 +169,8 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, 
         surface_passage_find(t, batch, s, p);
         s->connected = p->open;
         s->light_value = p->light_value;
+    } else if (t->spares) {
+        s->light_value = spec_set(f_set(1)); // the recorded weight holds it
     } else if ((live & LIVE_SCATTERING) || t->scene->drops) {
         s->light_value = lights_eval(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance);
     }
@@ -247,7 +252,7 @@ static void path_backward(Tracer *t, int32_t count) {
         Spec suffix = spec_gather(t->ws.suffix, slot);
         const bool surface = surface_is_live(t, batch, live_passing);
         if (surface) {
-            s = surface_load(t, batch, slot, suffix);
+            surface_load(t, batch, slot, suffix, &s);
         }
         p.found = false;
         if (t->shadows_later && batch->tag != VERTEX_FLIGHT) {

@@ -16,7 +16,8 @@ static Spec replay_escape(Tracer *t, const RecordBatch *batch) {
 
 // Radiance leaving a batch of vertices, given what arrives there.
 static Spec replay_surface(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
-    SurfaceSweep s = surface_load(t, batch, slot, suffix);
+    SurfaceSweep s;
+    surface_load(t, batch, slot, suffix, &s);
     Spec l = spec_zero();
     surface_parameterise(t, &s);
     if (s.emitter) {

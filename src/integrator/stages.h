@@ -48,6 +48,8 @@ typedef struct Tracer {
     Fork *fork;              // or null
     int32_t *lobes;          // per slot, of the last vertex of a particle; or null
     bool placed;             // the paths' first vertices are known
+    bool spares;             // lights are not selected: what vertices bring is found out from the first selected one on
+    bool local;              // of surfaces nothing is recorded but what materials ask for
     bool shadows_later;      // shadow rays are traced by the sweep, which must know what they pass
     real *nudge[2];          // per slot, what is added to the uv of those; or null
     bool overflow;           // the chunk's vertices did not fit the records
@@ -107,6 +109,7 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     i_store(p->depth + i, i_set(0));
     spec_store(t->ws.radiance, i, spec_zero());
     spec_store(t->ws.suffix, i, spec_zero());
+    f_store(t->ws.reached + i, f_set(0));
 }
 
 // Which pixels and samples `count` paths from `first` on are.

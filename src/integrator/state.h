@@ -37,8 +37,8 @@ enum {
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(corner) S(met)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)
 
-// Of a camera sample: where it lies on the film, and its alpha.
-#define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage)
+// Of a camera sample: where it lies on the film, its alpha, and whether it has met what a derivative is asked for (vertex.h).
+#define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage) F(reached)
 
 #define BORDER_FLOATS(F) F(border_total) F(border_worth) F(border_x) F(border_y) F(border_z) F(border_dx) F(border_dy) F(border_dz)
 
@@ -66,6 +66,7 @@ typedef struct RecordBatch {
     int32_t bounce;
     bool ends;         // the paths end here: their depth is reached
     bool first_vertex; // these are what the camera sees
+    bool local;        // directions are recorded in the shading frame, and as u and v texture coordinates: all that materials need
 } RecordBatch;
 
 // A vector per slot, for each channel that forward mode drives.

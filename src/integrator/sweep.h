@@ -54,53 +54,61 @@ KFN Mask chain_lanes(const Tracer *t, Int lobe, Mask slides) {
     return lobe_turns(lobe) | (mi_eq(lobe & 3, i_set(LOBE_NULL)) & (slides | m_set(!t->scene->through)));
 }
 
-KFN SurfaceSweep surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix) {
+KFN Hit surface_hit(const Records *r, int32_t at) {
+    return (Hit){i_load(r->shape + at), i_load(r->prim + at), f_load(r->u + at), f_load(r->v + at),
+                 record_v3(r->px, r->py, r->pz, at), i_load(r->instance + at)};
+}
+
+KFN void surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, SurfaceSweep *s) {
     const Records *r = &t->ws.records;
     int32_t at = batch->first;
-    SurfaceSweep s;
-    s.at = at;
-    s.first = batch->first_vertex;
-    s.m = m_first_n(batch->count);
-    s.slot = slot;
-    s.suffix = suffix;
-    s.attached = suffix;
-    s.group = t->scene->groups + batch->group;
-    s.corner = NULL;
-    s.hit.shape = i_load(r->shape + at);
-    s.hit.prim = i_load(r->prim + at);
-    s.hit.instance = i_load(r->instance + at);
-    s.hit.u = f_load(r->u + at);
-    s.hit.v = f_load(r->v + at);
-    s.hit.p = record_v3(r->px, r->py, r->pz, at);
-    s.d = record_v3(r->dx, r->dy, r->dz, at);
-    s.beta = spec_load(r->beta, at);
-    s.mis = f_load(r->mis + at);
-    s.light_weight = spec_load(r->light_weight, at);
-    s.f_light = spec_load(r->light_f, at);
-    s.scatter_weight = f_load(r->sw + at);
-    s.lit = s.m & m_gt(s.mis, f_set(0));
-    s.connected = s.m & m_gt(spec_max(s.light_weight), f_set(0));
-    s.kept = t->scene->drops ? f_load(r->keep + at) : f_set(1);
-    s.scattered = s.m & m_gt(s.scatter_weight, f_set(0));
-    s.light = i_load(r->light + at);
-    s.light_prim = i_load(r->lprim + at);
-    s.lobe = i_load(r->lobe + at);
-    s.light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
-    s.light_distance = f_load(r->ldist + at);
+    s->at = at;
+    s->first = batch->first_vertex;
+    s->m = m_first_n(batch->count);
+    s->slot = slot;
+    s->suffix = suffix;
+    s->attached = suffix;
+    s->group = t->scene->groups + batch->group;
+    s->corner = NULL;
+    s->hit = batch->local ? (Hit){.u = f_load(r->u + at), .v = f_load(r->v + at)} : surface_hit(r, at);
+    s->d = record_v3(r->dx, r->dy, r->dz, at);
+    s->beta = spec_load(r->beta, at);
+    s->mis = f_load(r->mis + at);
+    s->light_weight = spec_load(r->light_weight, at);
+    s->scatter_weight = f_load(r->sw + at);
+    s->lit = s->m & m_gt(s->mis, f_set(0));
+    s->connected = s->m & m_gt(spec_max(s->light_weight), f_set(0));
+    s->kept = t->scene->drops ? f_load(r->keep + at) : f_set(1);
+    s->scattered = s->m & m_gt(s->scatter_weight, f_set(0));
+    s->lobe = i_load(r->lobe + at);
+    if (!t->spares) {
+        s->f_light = spec_load(r->light_f, at);
+        s->light = i_load(r->light + at);
+        s->light_prim = i_load(r->lprim + at);
+        s->light_uv = (Vec2){f_load(r->lu + at), f_load(r->lv + at)};
+        s->light_distance = f_load(r->ldist + at);
+    }
     // Lanes without a light sample or a continuation get directions that do no harm.
-    Vec3 back = v3_neg(s.d);
-    s.light_d = v3_select(s.connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
-    s.wo_d = v3_select(s.scattered, record_v3(r->wox, r->woy, r->woz, at), back);
-    s.lobe = i_select(s.scattered, s.lobe, i_set(LOBE_SMOOTH));
-    s.slides = s.m & mi_eq(i_load(r->slides + at), i_set(1));
-    s.chained = chain_lanes(t, s.lobe, s.slides);
-    s.si = shape_interaction(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit);
-    s.wi = frame_to_local(&s.si.sh, back);
-    s.wl = frame_to_local(&s.si.sh, s.light_d);
-    s.wo = frame_to_local(&s.si.sh, s.wo_d);
-    s.call = (BsdfCall){t->scene, s.group->bsdf, texcoord(s.si.uv, NULL), t->floor, NULL, NULL};
-    s.emitter = s.group->emitter >= 0 ? t->scene->emitters + s.group->emitter : NULL;
-    return s;
+    Vec3 back = v3_neg(s->d);
+    s->light_d = v3_select(s->connected, record_v3(r->ldx, r->ldy, r->ldz, at), back);
+    s->wo_d = v3_select(s->scattered, record_v3(r->wox, r->woy, r->woz, at), back);
+    s->lobe = i_select(s->scattered, s->lobe, i_set(LOBE_SMOOTH));
+    if (batch->local) {
+        s->slides = s->chained = m_set(false);
+        s->si = (Interaction){.uv = {s->hit.u, s->hit.v}};
+        s->wi = back;
+        s->wl = s->light_d;
+        s->wo = s->wo_d;
+    } else {
+        s->slides = s->m & mi_eq(i_load(r->slides + at), i_set(1));
+        s->chained = chain_lanes(t, s->lobe, s->slides);
+        s->si = shape_interaction(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit);
+        s->wi = frame_to_local(&s->si.sh, back);
+        s->wl = frame_to_local(&s->si.sh, s->light_d);
+        s->wo = frame_to_local(&s->si.sh, s->wo_d);
+    }
+    s->call = (BsdfCall){t->scene, s->group->bsdf, texcoord(s->si.uv, NULL), t->floor, NULL, NULL};
+    s->emitter = s->group->emitter >= 0 ? t->scene->emitters + s->group->emitter : NULL;
 }
 
 // What the scattering function of a batch asks of the surface; s must stay where it is.

@@ -17,6 +17,9 @@ typedef struct Vertex {
     Float pdf;
     Int depth;       // path segments behind it; the bounce, unless scene->through
     Int medium;      // that the ray came through
+    Mask wanted;     // lanes of which what they bring is asked for
+    bool live;       // and their derivatives are
+    bool local;      // see RecordBatch
 } Vertex;
 
 // Entries of per-path arrays. near (uniform): they lie close to each other, from `first` on.
@@ -56,7 +59,21 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int
     v.pdf = entries_f(p->pdf, e);
     v.depth = t->scene->through ? entries_i(p->depth, e) : i_set(bounce);
     v.medium = t->scene->has_media ? entries_i(p->medium, e) : i_set(-1);
+    v.wanted = v.m;
+    v.live = true;
+    v.local = false;
     return v;
+}
+
+// Where nothing but scattering is selected, a derivative asks for what leaves a vertex only if the path has met the selection, at
+// this vertex or before: what else the path brings has no part in it. group: of surfaces, -1 = beyond them.
+KFN void vertex_spare(Tracer *t, int32_t group, Vertex *v) {
+    v->live = group >= 0 && (t->job->live[group] & LIVE_SCATTERING);
+    if (v->live) {
+        f_scatter(t->ws.reached, v->slot, f_set(1), v->m);
+    } else {
+        v->wanted = v->m & m_gt(real_gather(t->ws.reached, v->slot), f_set(0));
+    }
 }
 
 // Adds radiance to the slots' sums. Slots are distinct within a batch.
@@ -75,34 +92,40 @@ KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count, i
         return -1;
     }
     int32_t first = t->record_count;
-    t->ws.batches[t->batch_count++] = (RecordBatch){tag, group, first, count, bounce, false, false};
+    t->ws.batches[t->batch_count++] = (RecordBatch){.tag = tag, .group = group, .first = first, .count = count, .bounce = bounce};
     t->record_count += LANES;
     return first;
 }
 
 KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec emission) {
     Records *r = &t->ws.records;
-    i_store(r->shape + at, v->hit.shape);
-    i_store(r->prim + at, v->hit.prim);
-    i_store(r->instance + at, v->hit.instance);
     i_store(r->slot + at, v->slot);
-    i_store(r->medium + at, v->medium);
-    i_store(r->depth + at, v->depth);
-    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
+    spec_store(r->light_weight, at, spec_zero());
+    spec_store(r->local, at, emission);
+    spec_store(r->weight, at, spec_zero());
+    if (!v->live) {
+        return;
+    }
     f_store(r->u + at, v->hit.u);
     f_store(r->v + at, v->hit.v);
-    f_store(r->px + at, v->hit.p.x);
-    f_store(r->py + at, v->hit.p.y);
-    f_store(r->pz + at, v->hit.p.z);
     f_store(r->dx + at, v->d.x);
     f_store(r->dy + at, v->d.y);
     f_store(r->dz + at, v->d.z);
     f_store(r->mis + at, mis);
     spec_store(r->beta, at, v->beta);
-    spec_store(r->light_weight, at, spec_zero());
-    spec_store(r->local, at, emission);
-    spec_store(r->weight, at, spec_zero());
     f_store(r->sw + at, f_set(0));
+    if (v->local) {
+        return;
+    }
+    i_store(r->shape + at, v->hit.shape);
+    i_store(r->prim + at, v->hit.prim);
+    i_store(r->instance + at, v->hit.instance);
+    i_store(r->medium + at, v->medium);
+    i_store(r->depth + at, v->depth);
+    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
+    f_store(r->px + at, v->hit.p.x);
+    f_store(r->py + at, v->hit.p.y);
+    f_store(r->pz + at, v->hit.p.z);
 }
 
 KFN Float power_heuristic(Float a, Float b) { return a * a * f_safe_rcp(a * a + b * b); }
@@ -151,18 +174,22 @@ KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t rec
     t->shadow_count += m_count(m);
 }
 
-// The light sample of a vertex; its weight is multiplied by the transmittance once that is known.
-KFN void record_light(Tracer *t, int32_t record, Int light, const LightSample *s, Float weight, Spec f) {
+// The light sample of a vertex, along d; its weight is multiplied by the transmittance once that is known. Where lights stand
+// (Tracer.spares), it is multiplied by what arrives as well, and nothing else is asked for.
+KFN void record_light(Tracer *t, int32_t record, Int light, const LightSample *s, Vec3 d, Spec weight, Spec f) {
     Records *r = &t->ws.records;
+    f_store(r->ldx + record, d.x);
+    f_store(r->ldy + record, d.y);
+    f_store(r->ldz + record, d.z);
+    spec_store(r->light_weight, record, weight);
+    if (t->spares) {
+        return;
+    }
     i_store(r->light + record, light);
     i_store(r->lprim + record, s->prim);
-    f_store(r->ldx + record, s->d.x);
-    f_store(r->ldy + record, s->d.y);
-    f_store(r->ldz + record, s->d.z);
     f_store(r->lu + record, s->uv.x);
     f_store(r->lv + record, s->uv.y);
     f_store(r->ldist + record, s->distance);
-    spec_store(r->light_weight, record, spec_set(weight));
     spec_store(r->light_f, record, f);
 }
 
@@ -186,6 +213,7 @@ KFN void onward_weigh(const Tracer *t, const Vertex *v, Onward *w) {
         // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
         Float before = real_gather(t->ws.paths[t->current].roulette, v->at);
         w->roulette = before * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
+        w->m = v->live ? w->m : w->m & m_gt(spec_max(weight), f_set(0));
     } else {
         w->m = w->m & m_gt(w->roulette, f_set(0));
     }
@@ -238,12 +266,16 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
     }
 }
 
-KFN void record_onward(Tracer *t, int32_t record, const Onward *w) {
+// d: where they go.
+KFN void record_onward(Tracer *t, int32_t record, bool live, Vec3 d, const Onward *w) {
     Records *r = &t->ws.records;
-    f_store(r->wox + record, w->d.x);
-    f_store(r->woy + record, w->d.y);
-    f_store(r->woz + record, w->d.z);
-    f_store(r->sw + record, f_zero_unless(w->m, w->rcp));
     spec_store(r->weight, record, spec_zero_unless(w->m, spec_scale(w->f, w->rcp)));
+    if (!live) {
+        return;
+    }
+    f_store(r->wox + record, d.x);
+    f_store(r->woy + record, d.y);
+    f_store(r->woz + record, d.z);
+    f_store(r->sw + record, f_zero_unless(w->m, w->rcp));
     i_store(r->lobe + record, w->sample.lobe);
 }
