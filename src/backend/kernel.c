@@ -3,6 +3,7 @@
 #include "integrator/film.h"
 #include "integrator/path_adj.h"
 #include "integrator/path_replay.h"
+#include "math/colour.h"
 
 // Adds one sample of n channels to the film of the tile.
 KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const double *l, int32_t n, double *film) {
@@ -36,13 +37,6 @@ KFN void film_add(Tracer *t, const FilterTable *filter, int32_t slot, const doub
             }
         }
     }
-}
-
-// CIE XYZ of linear sRGB (white D65).
-static void rgb_to_xyz(const double *rgb, double *out) {
-    out[0] = 0.412453 * rgb[0] + 0.357580 * rgb[1] + 0.180423 * rgb[2];
-    out[1] = 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
-    out[2] = 0.019334 * rgb[0] + 0.119193 * rgb[1] + 0.950227 * rgb[2];
 }
 
 // Adds alpha of a sample, and its weight.
@@ -82,8 +76,7 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
             film_add_coverage(t, filter, i);
         }
         if (job->powers) {
-            double xyz[SPEC_N];
-            rgb_to_xyz(l, xyz);
+            double xyz[SPEC_N] = {rey_xyz_of(l, 0), rey_xyz_of(l, 1), rey_xyz_of(l, 2)};
             film_add_powers(t, filter, i, job->powers_of_xyz ? xyz : l, SPEC_N);
         }
     }

@@ -8,6 +8,7 @@
 
 #include "emitter/distribution.h"
 #include "emitter/light.h"
+#include "math/colour.h"
 
 #define ENVMAP_PARAMS(P)                                                                                               \
     P(IMAGE, data, 0, 0, INFINITY, "radiance by direction, rows from the +y pole", "W/(m^2 sr)")                       \
@@ -22,14 +23,9 @@ enum { ENVMAP_FLOOR = 12, ENVMAP_SCALE = 13, ENVMAP_SINES = 14 };
 
 // ---- host --------------------------------------------------------------------------------------------------------
 
-static const double envmap_weights[3] = {0.212671, 0.715160, 0.072169}; // of luminance
-
 static inline double envmap_luminance(const float *texel) {
-    double y = 0;
-    for (int c = 0; c < 3; c++) {
-        y += envmap_weights[c] * (double)texel[c];
-    }
-    return y;
+    const double rgb[3] = {(double)texel[0], (double)texel[1], (double)texel[2]};
+    return rey_xyz_of(rgb, 1);
 }
 
 // Of the latitude in the middle of a row of cells.
@@ -111,7 +107,7 @@ static inline double envmap_log_sum_slope(const SceneView *view, const EmitterRe
     const double above = y > 0 ? envmap_row_sine(y - 1, rows) : 0, below = y < rows ? envmap_row_sine(y, rows) : 0;
     // A texel is a corner of two cells of either row.
     bool counts = envmap_luminance(view->theta + t->theta + t->channels * texel) >= 0;
-    return counts ? 0.5 * (above + below) * envmap_weights[number % t->channels] / sum : 0;
+    return counts ? 0.5 * (above + below) * rey_xyz_rows[1][number % t->channels] / sum : 0;
 }
 
 static inline int64_t envmap_size(const TextureNode *textures, const EmitterRecord *e) {

@@ -158,11 +158,7 @@ static rey_result read_views(Job *job, const YamlNode *node, void *target) {
 
 static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
     static const Field fields[] = {
-        {.key = "type",
-         .type = FIELD_CHOICE,
-         .offset = offsetof(Job, loss),
-         .names = rey_loss_name_list,
-         .required = true},
+        {.key = "type", .type = FIELD_CHOICE, .offset = offsetof(Job, loss), .names = rey_loss_name_list},
         {.key = "epsilon", .type = FIELD_REAL, .offset = offsetof(Job, loss_epsilon), .low = 1e-12, .high = 1e6},
         {0},
     };

@@ -3,6 +3,7 @@
 
 #include "io/file.h"
 #include "io/number.h"
+#include "math/colour.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,7 +12,7 @@
 enum { SAMPLES = 1000 };
 
 double rey_luminance(const double rgb[3]) {
-    return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
+    return rey_xyz_of(rgb, 1);
 }
 
 // Linear between the pairs, 0 outside. *at is where the last look-up ended; wavelengths must not decrease between

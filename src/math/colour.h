@@ -3,6 +3,14 @@
 
 #include "base/platform.h"
 
+// A component of the CIE XYZ colour of linear sRGB, white D65; component 1 is the luminance.
+static const double rey_xyz_rows[3][3] = {
+    {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
+static inline double rey_xyz_of(const double rgb[3], int component) {
+    const double *row = rey_xyz_rows[component];
+    return row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2];
+}
+
 // CIE 1931 2 degree colour matching functions at a wavelength, linear between 5 nm steps, 0 outside 360..830.
 void rey_cie1931(double wavelength, double xyz[3]);
 // Relative power of CIE illuminant D65 (100 at 560 nm), 0 outside 360..830 nm. Times REY_D65_SCALE it has Y = 1.

@@ -1,4 +1,5 @@
 // film_format.c: pictures as a film delivers them: grey, RGB or XYZ, with alpha or without.
+#include "math/colour.h"
 #include "render/render_parts.h"
 
 #include <string.h>
@@ -44,11 +45,9 @@ int rey_film_component(const rey_scene *scene, int sensor) {
     return s ? s->component_format : -1;
 }
 
-// CIE XYZ of linear sRGB, white D65; the second row is the luminance.
-static float xyz_of(const float *rgb, int row) {
-    static const float rows[3][3] = {
-        {0.412453f, 0.357580f, 0.180423f}, {0.212671f, 0.715160f, 0.072169f}, {0.019334f, 0.119193f, 0.950227f}};
-    return rows[row][0] * rgb[0] + rows[row][1] * rgb[1] + rows[row][2] * rgb[2];
+static float xyz_of(const float *colour, int component) {
+    const double rgb[3] = {(double)colour[0], (double)colour[1], (double)colour[2]};
+    return (float)rey_xyz_of(rgb, component);
 }
 
 double rey_film_alpha(const double sums[2]) { return sums[1] > 0 ? fmin(fmax(sums[0] / sums[1], 0), 1) : 0; }

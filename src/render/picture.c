@@ -1,5 +1,6 @@
 // picture.c: pictures, in colour and with more channels. Quantities of the first surface take a pass of their own.
 #include "base/parallel.h"
+#include "math/colour.h"
 #include "math/rng.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
@@ -78,18 +79,10 @@ static int32_t aov_channels(const Integrator *integrator) {
     return n;
 }
 
-// CIE XYZ of linear sRGB, white D65.
-static const double xyz_rows[3][3] = {
-    {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
-
 // What the integrator `depth` finds is not a colour, but stands for one: grey.
 static double xyz_of_grey(int32_t component) {
-    return xyz_rows[component][0] + xyz_rows[component][1] + xyz_rows[component][2];
-}
-
-static double xyz_of(const double *rgb, int32_t component) {
-    const double *row = xyz_rows[component];
-    return row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2];
+    const double white[3] = {1, 1, 1};
+    return rey_xyz_of(white, component);
 }
 
 // ---- which passes a picture takes --------------------------------------------------------------------------------------
@@ -210,7 +203,7 @@ static double channel_value(const Channel *channel, const Pass *pass, bool is_de
     case CHANNEL_XYZ:
         return is_depth ? values[0] * pow(xyz_of_grey(channel->component), channel->power)
                : power  ? values[channel->component]
-                        : xyz_of(values, channel->component);
+                        : rey_xyz_of(values, channel->component);
     default:
         return values[is_depth ? 0 : channel->component];
     }
