@@ -295,7 +295,7 @@ static void watch_smooth_normals(Render *r) {
 }
 
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
-    return !has_chains(view) && boundary_sees(sensor) && !view->has_media;
+    return !has_chains(view) && boundary_sees(sensor) && !view->has_media && !view->drops;
 }
 
 rey_result rey_boundaries_begin(Render *r) {

@@ -31,7 +31,7 @@ const char *rey_dropped_gap(const SceneView *view, const Param *p, int terms) {
     if (!view->drops) {
         return NULL;
     }
-    // Of vertex normals only the jumps are not known where they turn away (terms.c).
+    // Of vertex normals only the jumps are not known where they turn away, for which paths look out (boundary.c).
     int motion = p->normals >= 0 ? REY_TERM_SPECULAR : REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR;
     bool moves = (terms & motion) || p->emitter >= 0, gap = false; // a sky that turns changes the density of its light
     for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {

@@ -31,8 +31,6 @@ static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int 
                                  "the edges that are seen in or through it are not found because of %s", object, obstacle);
     } else if (p->to_uv >= 0 && bit != REY_TERM_TERMINATOR && gap_of_lines(scene)) {
         snprintf(reason, REASON, "%s, and %s", p->why, gap_of_lines(scene));
-    } else if (p->normals >= 0 && scene->view.drops) {
-        snprintf(reason, REASON, "%s, and with hide_emitters 'path' drops light there that other surfaces let pass", p->why);
     } else if (bit == REY_TERM_TERMINATOR) {
         snprintf(reason, REASON, "the picture jumps where the normals of maps turn away from the viewer");
     } else if ((p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) && !rey_motion_known(scene, sensor, p)) {
@@ -51,7 +49,7 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
     }
     if (p->normals >= 0) {
-        return scene->view.drops ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
+        return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
     if (p->to_uv >= 0) {
         return gap_of_lines(scene) ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;

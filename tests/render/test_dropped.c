@@ -224,7 +224,11 @@ static void test_densities(void **state) {
                    "map.normalmap.value", 0, 0.02f, 0.005);
 }
 
-// What thin glass lets pass and what moves is refused.
+#define HILL(angle)                                                                                                    \
+    "</shape><shape type='obj' id='hill'><string name='filename' value='" RENDER_DIR "/hill.obj'/><transform name='to_world'>"  \
+    "<rotate y='1' angle='" angle "'/><translate z='2.5'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf>"
+
+// What thin glass lets pass and what moves is refused, and vertex normals where they turn away from the camera.
 static void test_refusals(void **state) {
 #define METAL "<bsdf type='roughconductor' id='metal'><float name='alpha' value='0.3'/></bsdf>"
     static const struct {
@@ -235,6 +239,8 @@ static void test_refusals(void **state) {
                 {SKY, "<bsdf type='mask'>" METAL "</bsdf>", "metal.specular_reflectance.value", REY_OK},
                 {BULB, "<bsdf type='mask'>" METAL "</bsdf>", "metal.alpha.value", REY_OK},
                 {SKY, METAL, "metal.alpha.value", REY_OK},
+                {SKY, NET("0.5") HILL("180"), "hill.normals", REY_OK},
+                {SKY, NET("0.5") HILL("268"), "hill.normals", REY_ERROR_INCOMPLETE},
                 {SKY, NET("0.5"), "wall.to_world", REY_ERROR_INCOMPLETE},
                 {SKY, "<bsdf type='mask' id='net'><float name='opacity' value='0.5'/><bsdf type='thindielectric'/></bsdf>",
                  "net.opacity.value", REY_ERROR_INCOMPLETE},
@@ -246,14 +252,15 @@ static void test_refusals(void **state) {
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         Wall wall = wall_open("path", rows[i].lights, rows[i].function);
         float image[NUMBERS] = {0};
-        double gradient[16];
+        double gradient[64];
         rey_render_def def = rey_default_render_def();
-        def.spp = 4;
+        def.spp = 16;
         int param = rey_param_find(wall.scene, rows[i].param);
         const rey_selection selection = {&param, 1};
         assert_true(param >= 0);
         assert_int_equal(rey_vjp(wall.scene, &def, selection, image, gradient, NULL, NULL), rows[i].expected);
-        assert_true(rows[i].expected == REY_OK || strstr(rey_error(wall.ctx), "hide_emitters"));
+        const char *words = strstr(rows[i].param, "normals") ? "shading normals" : "hide_emitters";
+        assert_true(rows[i].expected == REY_OK || strstr(rey_error(wall.ctx), words));
         wall_close(wall);
     }
 }
