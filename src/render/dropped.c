@@ -65,6 +65,7 @@ void rey_dropped_add_sky(Render *r, int64_t *size) {
 
 // How many numbers the selected picture of the environment has, 0 where the sum is not asked for; where they begin.
 static int64_t sky_numbers(const Render *r, int64_t *first) {
+    *first = 0;
     if (!r->job.any_sky) {
         return 0;
     }
