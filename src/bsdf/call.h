@@ -35,6 +35,13 @@ static NOINLINE void bsdf_pdf_adj(const BsdfCall *call, Vec3 wi, Vec3 wo, Float 
 // a share of 0 or 1 out of its range.
 KFN Mask share_inside(Float share) { return m_ge(share, f_set(-1e-5f)) & m_le(share, f_set(1 + 1e-5f)); }
 
+// The same call as pictures make it.
+KFN BsdfCall bsdf_picture(const BsdfCall *call) {
+    BsdfCall c = *call;
+    c.floor = 0;
+    return c;
+}
+
 KFN BsdfCall bsdf_child(const BsdfCall *call, int child) {
     BsdfCall c = *call;
     c.node = call->scene->bsdfs[call->node].child[child];

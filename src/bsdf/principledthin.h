@@ -258,7 +258,7 @@ KFN void principledthin_pdf_adj(const PrincipledThin *p, Vec3 wi, Vec3 wo, Float
     principledthin_choice(p, lobes);
     dpdf = f_zero_unless(t.counts, dpdf);
     // pdf = clear facets / (4 c) + diffuse |wo.z| / pi, c = (wo.x, wo.y, |wo.z|) . m
-    Vec3 mirrored = v3_sub(t.h, t.wi), dup = v3_zero();
+    Vec3 mirrored = v3_sub(t.h, t.wi);
     Float clear = f_select(t.reflects, lobes[THIN_REFLECTION], lobes[THIN_TRANSMISSION]);
     Float diffuse = f_select(t.reflects, lobes[THIN_MATTE], lobes[THIN_THROUGH]);
     Float rcp = f_safe_rcp(v3_dot(mirrored, t.m)), k = 0.25f * f_zero_unless(t.visible, dpdf) * rcp;
@@ -268,9 +268,8 @@ KFN void principledthin_pdf_adj(const PrincipledThin *p, Vec3 wi, Vec3 wo, Float
     dp->roughness = dp->roughness + dr * t.scale;
     back.eta = f_zero_unless(~t.reflects, 0.65f * dr * p->roughness);
     Float dc = -k * clear * facets * rcp;
-    v3_acc(&dup, v3_scale(t.m, dc));
     v3_acc(&back.m, v3_scale(mirrored, dc));
-    v3_acc(&back.wo, v3(dup.x, dup.y, f_sign(t.wo.z) * (dup.z + dpdf * diffuse * INV_PI)));
+    v3_acc(&back.wo, v3(t.m.x * dc, t.m.y * dc, f_sign(t.wo.z) * (t.m.z * dc + dpdf * diffuse * INV_PI)));
     Float dclear = k * facets, ddiffuse = dpdf * f_abs(t.wo.z) * INV_PI;
     dlobes[THIN_REFLECTION] = f_zero_unless(t.reflects, dclear);
     dlobes[THIN_TRANSMISSION] = f_zero_unless(~t.reflects, dclear);

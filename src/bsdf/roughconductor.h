@@ -49,7 +49,7 @@ KFN void roughconductor_adj(const RoughConductor *p, Vec3 wi, Vec3 wo, Int lobe,
                             Vec3 *dwo) {
     Mask counts = roughconductor_counts(wi, wo, lobe);
     Microfacet mf = roughconductor_facets(p);
-    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
+    Vec3 m = v3_normalize(v3_add(wi, wo)), dm = v3_zero();
     Float d = microfacet_D(&mf, m), gi = smith_G1(&mf, wi, m), go = smith_G1(&mf, wo, m);
     Float rcp = f_safe_rcp(4.0f * wi.z), shape = d * gi * go * rcp, cosine = v3_dot(wi, m);
     Spec fresnel = fresnel_conductor(cosine, p->eta, p->k);
@@ -70,26 +70,15 @@ KFN void roughconductor_adj(const RoughConductor *p, Vec3 wi, Vec3 wo, Int lobe,
     // cosine = wi . m, m = normalize(wi + wo)
     v3_acc(dwi, v3_scale(m, dcosine));
     v3_acc(&dm, v3_scale(wi, dcosine));
-    v3_normalize_adj(h, dm, &dh);
-    v3_acc(dwi, dh);
-    v3_acc(dwo, dh);
+    half_vector_adj(wi, wo, dm, dwi, dwo);
 }
 
 KFN void roughconductor_pdf_adj(const RoughConductor *p, Vec3 wi, Vec3 wo, Float dpdf, RoughConductor *dp, Vec3 *dwi,
                                 Vec3 *dwo) {
     Microfacet mf = roughconductor_facets(p);
-    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
-    Float rcp = f_safe_rcp(v3_dot(wo, m)), du = f_set(0), dv = f_set(0);
-    dpdf = f_zero_unless(roughconductor_counts(wi, wo, i_set(LOBE_SMOOTH)), 0.25f * dpdf * rcp);
-    // pdf = facets / (4 wo . m)
-    Float dcosine = -dpdf * microfacet_pdf(&mf, wi, m) * rcp;
-    microfacet_pdf_adj(&mf, wi, m, dpdf, &du, &dv, dwi, &dm);
+    Float du = f_set(0), dv = f_set(0);
+    dpdf = f_zero_unless(roughconductor_counts(wi, wo, i_set(LOBE_SMOOTH)), dpdf);
+    microfacet_mirrored_pdf_adj(&mf, wi, wo, dpdf, &du, &dv, dwi, dwo);
     microfacet_alpha_adj(p->alpha_u, du, &dp->alpha_u);
     microfacet_alpha_adj(p->alpha_v, dv, &dp->alpha_v);
-    v3_acc(dwo, v3_scale(m, dcosine));
-    v3_acc(&dm, v3_scale(wo, dcosine));
-    // m = normalize(wi + wo)
-    v3_normalize_adj(h, dm, &dh);
-    v3_acc(dwi, dh);
-    v3_acc(dwo, dh);
 }

@@ -97,7 +97,7 @@ KFN void roughplastic_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Int lobe, Spe
                           Vec3 *dwo) {
     df = spec_zero_unless(roughplastic_counts(wi, wo, lobe), df);
     Microfacet mf = roughplastic_facets(p);
-    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
+    Vec3 m = v3_normalize(v3_add(wi, wo)), dm = v3_zero();
     Float cosine = v3_dot(wi, m), dcosine = f_set(0), cos_t, eta_it, eta_ti;
     Float f = fresnel_dielectric(cosine, p->eta, &cos_t, &eta_it, &eta_ti);
     Float d = microfacet_D(&mf, m), gi = smith_G1(&mf, wi, m), go = smith_G1(&mf, wo, m);
@@ -113,9 +113,7 @@ KFN void roughplastic_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Int lobe, Spe
     microfacet_alpha_adj(p->alpha, du + dv, &dp->alpha);
     v3_acc(dwi, v3_scale(m, dcosine));
     v3_acc(&dm, v3_scale(wi, dcosine));
-    v3_normalize_adj(h, dm, &dh);
-    v3_acc(dwi, dh);
-    v3_acc(dwo, dh);
+    half_vector_adj(wi, wo, dm, dwi, dwo);
     // through = T(wi.z) T(wo.z) wo.z / (pi eta^2)
     Float rcp_eta = 1.0f / p->eta, rest = rcp_eta * rcp_eta * INV_PI, dfdr = f_set(0);
     Float ti = roughplastic_transmittance(p, wi.z), to = roughplastic_transmittance(p, wo.z);
@@ -133,23 +131,17 @@ KFN void roughplastic_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Int lobe, Spe
 
 KFN void roughplastic_pdf_adj(const RoughPlastic *p, Vec3 wi, Vec3 wo, Float dpdf, RoughPlastic *dp, Vec3 *dwi, Vec3 *dwo) {
     Microfacet mf = roughplastic_facets(p);
-    Vec3 h = v3_add(wi, wo), m = v3_normalize(h), dm = v3_zero(), dh = v3_zero();
-    Float q = roughplastic_probability(p, wi), rcp = f_safe_rcp(4.0f * v3_dot(wo, m)), facets = microfacet_pdf(&mf, wi, m);
+    Vec3 m = v3_normalize(v3_add(wi, wo));
+    Float q = roughplastic_probability(p, wi), coat = microfacet_pdf(&mf, wi, m) * f_safe_rcp(4.0f * v3_dot(wo, m));
+    Float du = f_set(0), dv = f_set(0), da = f_set(0), db = f_set(0);
     dpdf = f_zero_unless(roughplastic_counts(wi, wo, i_set(LOBE_SMOOTH)), dpdf);
-    // pdf = q coat + (1 - q) wo.z / pi, coat = facets / (4 wo . m)
-    Float du = f_set(0), dv = f_set(0), dcosine = -4.0f * dpdf * q * facets * rcp * rcp;
+    // pdf = q coat + (1 - q) wo.z / pi
     dwo->z = dwo->z + dpdf * (1.0f - q) * INV_PI;
-    microfacet_pdf_adj(&mf, wi, m, dpdf * q * rcp, &du, &dv, dwi, &dm);
+    microfacet_mirrored_pdf_adj(&mf, wi, wo, dpdf * q, &du, &dv, dwi, dwo);
     microfacet_alpha_adj(p->alpha, du + dv, &dp->alpha);
-    v3_acc(dwo, v3_scale(m, dcosine));
-    v3_acc(&dm, v3_scale(wo, dcosine));
-    v3_normalize_adj(h, dm, &dh);
-    v3_acc(dwi, dh);
-    v3_acc(dwo, dh);
     // q the share of a = (1 - T) ks beside b = T kd
-    Float t = roughplastic_transmittance(p, wi.z), da = f_set(0), db = f_set(0);
-    Float ks = spec_mean(p->specular_reflectance), kd = spec_mean(p->diffuse_reflectance);
-    lobe_probability_adj((1.0f - t) * ks, t * kd, dpdf * (facets * rcp - wo.z * INV_PI), &da, &db);
+    Float t = roughplastic_transmittance(p, wi.z), ks = spec_mean(p->specular_reflectance), kd = spec_mean(p->diffuse_reflectance);
+    lobe_probability_adj((1.0f - t) * ks, t * kd, dpdf * (coat - wo.z * INV_PI), &da, &db);
     spec_acc(&dp->specular_reflectance, spec_set(da * (1.0f - t) * (1.0f / SPEC_N)));
     spec_acc(&dp->diffuse_reflectance, spec_set(db * t * (1.0f / SPEC_N)));
     roughplastic_transmittance_adj(p, wi.z, db * kd - da * ks, dp, &dwi->z);

@@ -104,7 +104,8 @@ static inline double envmap_log_sum_slope(const SceneView *view, const EmitterRe
     const int64_t rows = t->height - 1, texel = number / t->channels, y = texel / t->width;
     const double scale = (double)view->tables[e->table + ENVMAP_SCALE];
     const double sum = (double)(rows * t->width) / (scale * (1 + ENVMAP_UNIFORM));
-    const double above = y > 0 ? envmap_row_sine(y - 1, rows) : 0, below = y < rows ? envmap_row_sine(y, rows) : 0;
+    const float *sines = view->tables + e->table + ENVMAP_SINES;
+    const double above = y > 0 ? (double)sines[y - 1] : 0, below = y < rows ? (double)sines[y] : 0;
     // A texel is a corner of two cells of either row.
     bool counts = envmap_luminance(view->theta + t->theta + t->channels * texel) >= 0;
     return counts ? 0.5 * (above + below) * rey_xyz_rows[1][number % t->channels] / sum : 0;

@@ -127,13 +127,6 @@ KFN Mask kept_lights(const Tracer *t, const SurfaceSweep *s, Float *a) {
     return s->connected & m_gt(*a, f_set(0)) & ~m_eq(s->kept, f_set(1));
 }
 
-// The density of scattering along the light samples, as pictures draw it.
-KFN Float kept_scattering(const BsdfCall *call, const SurfaceSweep *s) {
-    BsdfCall picture = *call;
-    picture.floor = 0;
-    return bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH));
-}
-
 // Adjoint of keeping what the paths of a batch had met so far, for one delta.
 KFN void kept_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall *call, Spec delta, VertexAdj *d, Sink *sink) {
     const Records *r = &t->ws.records;
@@ -157,10 +150,9 @@ KFN void kept_weights_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall
     }
     // f Le (D - 1) w / a
     Float dw = f_zero_unless(lights, spec_dot(spec_mul(weight, s->f_light), s->light_value) * (s->kept - 1.0f));
-    KeptWeight w = kept_weight(a, kept_scattering(call, s));
+    BsdfCall picture = bsdf_picture(call);
+    KeptWeight w = kept_weight(a, bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH)));
     if (live & LIVE_SCATTERING) {
-        BsdfCall picture = *call;
-        picture.floor = 0;
         Vec3 dwl = v3_zero();
         bsdf_pdf_adj(&picture, s->wi, s->wl, dw * w.by_scattering, sink, lights, &d->wi, &dwl, vertex_uv_adj(s, d, sink));
         // wl = to_local(d), and d stays
@@ -187,7 +179,9 @@ KFN Spec kept_replay(const Tracer *t, const SurfaceSweep *s, Spec weight) {
                       f_safe_rcp(environment_pdf(t->deciding, then, s->light_d, s->light_uv));
         now = f_select(sky, a * ratio, a);
     }
-    Float moved = kept_weight(now, kept_scattering(&s->call, s)).value * now * f_safe_rcp(a);
+    BsdfCall picture = bsdf_picture(&s->call);
+    Float density = bsdf_pdf(&picture, s->wi, s->wl, i_set(LOBE_SMOOTH));
+    Float moved = kept_weight(now, density).value * now * f_safe_rcp(a);
     Float tilt = f_zero_unless(lights, (s->kept - 1.0f) * (moved - spec_max(weight)));
     return spec_add(spec_scale(weight, s->kept), spec_set(tilt));
 }

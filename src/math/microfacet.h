@@ -210,6 +210,25 @@ KFN void microfacet_pdf_adj(const Microfacet *mf, Vec3 wi, Vec3 m, Float dpdf, F
     v3_acc(dm, v3_scale(wi, k * d));
 }
 
+// Adjoint of the half vector normalize(wi + wo).
+KFN void half_vector_adj(Vec3 wi, Vec3 wo, Vec3 dm, Vec3 *dwi, Vec3 *dwo) {
+    Vec3 dh = v3_zero();
+    v3_normalize_adj(v3_add(wi, wo), dm, &dh);
+    v3_acc(dwi, dh);
+    v3_acc(dwo, dh);
+}
+
+// Adjoint of microfacet_pdf(wi, m) / (4 wo . m), m the half vector: of the density of mirrored directions wo.
+KFN void microfacet_mirrored_pdf_adj(const Microfacet *mf, Vec3 wi, Vec3 wo, Float dpdf, Float *dalpha_u, Float *dalpha_v,
+                                     Vec3 *dwi, Vec3 *dwo) {
+    Vec3 m = v3_normalize(v3_add(wi, wo)), dm = v3_zero();
+    Float rcp = f_safe_rcp(v3_dot(wo, m)), k = 0.25f * dpdf * rcp, dcosine = -k * microfacet_pdf(mf, wi, m) * rcp;
+    microfacet_pdf_adj(mf, wi, m, k, dalpha_u, dalpha_v, dwi, &dm);
+    v3_acc(dwo, v3_scale(m, dcosine));
+    v3_acc(&dm, v3_scale(wo, dcosine));
+    half_vector_adj(wi, wo, dm, dwi, dwo);
+}
+
 // All normals, with density D m.z [walter2007 eq. 28, 29, 35, 36].
 KFN Vec3 microfacet_sample_all(const Microfacet *mf, Float u1, Float u2) {
     Float sine, cosine;

@@ -114,30 +114,7 @@ KFN real *upstream_row(const Segments *q, int32_t slot, int32_t bounce) {
 
 // ---- motion ------------------------------------------------------------------------------------------------------
 
-// Where rays along d meet surfaces, with the adjoint `worth` of what they find: returns that of the rays' positions.
-static Vec3 rays_find_adj(const Tracer *t, const Hit *hit, Vec3 d, const SurfaceAdj *worth, Sink *sink, Mask m) {
-    const SceneView *scene = t->scene;
-    Vec3 drag = v3_zero();
-    for (Mask left = m; m_any(left);) {
-        int32_t id;
-        Hit h;
-        Mask mine = take_group(scene, hit, &left, &id, &h);
-        const Group *group = scene->groups + id;
-        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
-        Slide slide[2];
-        SurfaceAdj a = *worth;
-        shape_slide(scene, group->shape_kind, group->shape_flags, &h, &si, slide);
-        Vec3 position = slide_adj(slide, d, &a);
-        a.p = v3_sub(a.p, position);
-        if (t->job->live[id] & LIVE_MOTION) {
-            shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, &a, sink, mine);
-        }
-        drag = v3_select(mine, position, drag);
-    }
-    return drag;
-}
-
-// Of the positions of what they find.
+// Where rays along d meet surfaces, with the adjoint of those points: returns that of the rays' positions.
 static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink *sink, Mask m) {
     SurfaceAdj worth = surface_adj_zero();
     worth.p = dp;
