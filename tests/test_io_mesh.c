@@ -149,6 +149,28 @@ static void check_all_ply(const rey_mesh *mesh) {
     }
 }
 
+// Positions that differ by rounding are one, also on both sides of a cell's border; others stay apart, however many there are.
+static void test_seams_are_welded(void **state) {
+    rey_context *ctx = *state;
+    enum { RING = 40, COUNT = 3 * RING + 1 };
+    rey_mesh mesh = {.vertex_count = COUNT};
+    mesh.positions = rey_alloc_array(ctx, 3 * COUNT, sizeof *mesh.positions);
+    assert_non_null(mesh.positions);
+    for (int i = 0; i < COUNT; i++) {
+        float *p = mesh.positions + 3 * i;
+        double angle = 6.283185307179586 * (i % RING) / RING, off = i < RING ? 0 : i < 2 * RING ? 1.5e-7 : 3e-6;
+        p[0] = (float)(0.85 * cos(angle) + off);
+        p[1] = (float)(0.85 * sin(angle) - off);
+        p[2] = (float)off;
+    }
+    mesh.positions[3 * (COUNT - 1)] = 3e9f; // a stray vertex changes nothing
+    assert_ok(ctx, rey_mesh_weld(ctx, &mesh));
+    for (uint32_t i = 0; i < COUNT; i++) {
+        assert_int_equal(mesh.position_index[i], i < 2 * RING ? i % RING : i);
+    }
+    rey_mesh_free(ctx, &mesh);
+}
+
 static void test_ply_encodings_agree(void **state) {
     rey_context *ctx = *state;
     static const char *const paths[] = {MESHES "all_ascii.ply", MESHES "all_little.ply", MESHES "all_big.ply"};
@@ -449,6 +471,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_obj_corners_become_vertices),
         cmocka_unit_test(test_obj_forward_and_missing_normals),
+cmocka_unit_test(test_seams_are_welded),
         cmocka_unit_test(test_ply_encodings_agree),
         cmocka_unit_test(test_serialized_versions_agree),
         cmocka_unit_test(test_round_trip),

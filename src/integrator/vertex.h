@@ -17,6 +17,7 @@ typedef struct Vertex {
     Float pdf;
     Int depth;       // path segments behind it; the bounce, unless scene->through
     Int medium;      // that the ray came through
+    Mask flies;      // lanes whose ray begins at a collision
     Mask wanted;     // lanes of which what they bring is asked for
     bool live;       // and their derivatives are
     bool local;      // see RecordBatch
@@ -59,6 +60,7 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int
     v.pdf = entries_f(p->pdf, e);
     v.depth = t->scene->through ? entries_i(p->depth, e) : i_set(bounce);
     v.medium = t->scene->has_media ? entries_i(p->medium, e) : i_set(-1);
+    v.flies = t->scene->has_media ? mi_eq(entries_i(p->flies, e), i_set(1)) : m_set(false);
     v.wanted = v.m;
     v.live = true;
     v.local = false;
@@ -68,6 +70,9 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int
 // Where nothing but scattering is selected, a derivative asks for what leaves a vertex only if the path has met the selection, at
 // this vertex or before: what else the path brings has no part in it. group: of surfaces, -1 = beyond them.
 KFN void vertex_spare(Tracer *t, int32_t group, Vertex *v) {
+    if (!t->spares) {
+        return;
+    }
     v->live = group >= 0 && (t->job->live[group] & LIVE_SCATTERING);
     if (v->live) {
         f_scatter(t->ws.reached, v->slot, f_set(1), v->m);
@@ -122,7 +127,7 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec e
     i_store(r->instance + at, v->hit.instance);
     i_store(r->medium + at, v->medium);
     i_store(r->depth + at, v->depth);
-    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)), i_set(1), i_set(0)));
+    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)) | v->flies, i_set(1), i_set(0)));
     f_store(r->px + at, v->hit.p.x);
     f_store(r->py + at, v->hit.p.y);
     f_store(r->pz + at, v->hit.p.z);
@@ -201,6 +206,7 @@ typedef struct Onward {
     Float pdf, rcp, eta2, roulette;          // density; 1 / (density x survival)
     Int depth;
     Mask m, passed;                          // lanes that go on; that went through a surface undeviated
+    bool collides;                           // from collisions
 } Onward;
 
 // Throughput and roulette of sampled directions, by value, density and 1 / density.
@@ -262,6 +268,8 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
     i_compress(next->slot + at, v->slot, w->m);
     if (t->scene->has_media) {
         i_compress(next->medium + at, medium, w->m);
+        Mask flies = w->collides ? m_set(true) : w->passed & v->flies;
+        i_compress(next->flies + at, i_select(flies, i_set(1), i_set(0)), w->m);
         f_compress(next->skip + at, v3_dot(v3_sub(o, p), w->d), w->m);
     }
 }

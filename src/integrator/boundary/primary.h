@@ -68,21 +68,34 @@ KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real side) {
     return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
 }
 
+// Lanes of edges of meshes with vertex normals.
+static Mask primary_is_smooth(const Tracer *t, const PrimarySample *s) {
+    const EdgePoint *e = &s->edge;
+    Int smooth = SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS;
+    return mi_lt(i_set(0), smooth) & ~(e->round | e->mark | e->meeting | m_gt(v3_dot(e->normal, e->normal), f_set(0)));
+}
+
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
 static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     const Ray rays[2] = {primary_ray(t, s, -1).ray, primary_ray(t, s, 1).ray};
-    Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~s->edge.mark), mark = m & s->edge.mark;
-    if (m_any(mark)) {
-        // Paths beside it start on its surface, also where the outline is nearer than their step.
+    // Paths beside marks, where normals turn away and between triangles with vertex normals start on their surfaces (primary_look),
+    // also where these are narrower than the paths' step.
+    Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
+    Mask inner = primary_is_smooth(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
+    Mask own = m & (s->edge.mark | turns | inner);
+    Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~own);
+    if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
-        Hit hit = trace_closest(t->scene, &ray, mark, false);
+        Hit hit = trace_closest(t->scene, &ray, own, false);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
-        Mask own = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
+        t->job->rays += m_count(own);
+        own = own & mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
         if (t->scene->hide_emitters) {
-            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(mark & own, hit.shape, i_set(0)), emitter), i_set(0));
+            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(own, hit.shape, i_set(0)), emitter), i_set(0));
         }
-        visible = visible | (mark & own & m_le(f_abs(found - reach), 2e-5f * reach));
-        t->job->rays += m_count(mark);
+        // Triangles that are seen from their edge are met farther from the point than others.
+        Mask same = (turns | inner) & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other));
+        visible = visible | (own & (same | m_le(f_abs(found - reach), 2e-5f * reach)));
     }
     return visible;
 }
@@ -147,6 +160,40 @@ static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t h
     }
 }
 
+// Of meshes with vertex normals, the first vertices of paths k... on one side of their edges (-1, 1: that of n) lie on the edge, in
+// the triangle that is seen there, along the view of it. The band that is dark because its normals turn away may be narrower than
+// the paths' step, as may be the triangle; what lies on the band's other side is for the curve that ends it (facet.h).
+static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k, real side, Mask m) {
+    const SceneView *scene = t->scene;
+    const EdgePoint *e = &s->edge;
+    Workspace *ws = &t->ws;
+    Paths *p = &ws->paths[0];
+    Hit met = {i_load(ws->hit_shape + k), i_load(ws->hit_prim + k), f_load(ws->hit_u + k), f_load(ws->hit_v + k),
+               record_v3(ws->hit_x, ws->hit_y, ws->hit_z, k), i_load(ws->hit_instance + k)};
+    // Of the triangles on this side, the one that rises nearer to the viewer.
+    Float rise[2], slope[2];
+    for (int i = 0; i < 2; i++) {
+        rise[i] = side * edge_rise(e, e->side[i], s->n);
+        slope[i] = v3_dot(e->side[i], s->seen.d) * f_safe_rcp(rise[i]);
+    }
+    Mask second = m_gt(rise[1], f_set(0)) & mi_lt(i_set(-1), e->other), first = m_gt(rise[0], f_set(0));
+    second = second & (~first | m_lt(slope[1], slope[0]));
+    m = m & (first | second) & ~mi_eq(e->other, i_set(EDGE_ANY));
+    if (!m_any(m)) {
+        return;
+    }
+    Vec3 n, d = v3_select(m, s->seen.d, record_v3(p->dx, p->dy, p->dz, k));
+    Hit hit = point_hit(scene, i_select(m, e->hit.shape, i_set(-1)), i_select(m, i_select(second, e->other, e->hit.prim), i_set(0)),
+                        e->hit.instance, e->p, &n);
+    hit.u = f_clamp(hit.u, f_set(0), f_set(1));
+    hit.v = f_clamp(hit.v, f_set(0), f_set(1));
+    met = hit_select(m, &hit, &met);
+    hit_store(t, k, &met);
+    f_store(p->dx + k, d.x);
+    f_store(p->dy + k, d.y);
+    f_store(p->dz + k, d.z);
+}
+
 // Finds the first vertices of those paths. Beside the outline of a round surface its normal turns with the root of the distance,
 // which no step would resolve: there the vertex is the point that is all but on the outline. Beside marks it is on their surface.
 static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Segments *q, int32_t count, int32_t half) {
@@ -156,6 +203,10 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
         Mask above = m_gt(edge_first_rise(&s.edge, s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
         Mask turns = m & m_gt(v3_dot(s.edge.normal, s.edge.normal), f_set(0));
+        Mask own = m & primary_is_smooth(t, &s);
+        for (int side = 0; side < 2 && m_any(own); side++) {
+            primary_touch(t, &s, side * half + k, side ? 1 : -1, own);
+        }
         for (int side = 0; side < 2 && m_any(round | s.edge.mark | turns); side++) {
             int32_t at = side * half + k;
             Mask inside = round & (side ? above : ~above);
