@@ -4,7 +4,7 @@ PREFIX ?= /usr/local
 CONFORMANCE ?=
 JOBS ?= $(shell nproc)
 PACKAGES = gcc g++ make cmake pkg-config libembree-dev libexpat1-dev libopenexr-dev libpng-dev libjpeg62-turbo-dev \
-           zlib1g-dev libyaml-dev libsuitesparse-dev libcmocka-dev python3
+           zlib1g-dev libyaml-dev libsuitesparse-dev libblosc-dev libcmocka-dev python3
 
 .PHONY: all setup demo test test-slow conformance bench bench-large bench-peer check fuzz sanitize tsan install clean
 
@@ -36,7 +36,7 @@ conformance: all
 bench: all
 	@python3 bench/bench.py --reynolds $(BUILD)/bin/reynolds
 
-# A few minutes and 3 GB: meshes, pictures and forests of the largest kind.
+# A few minutes and 8 GB: meshes, pictures, forests and fog of the largest kind.
 bench-large: all
 	@python3 bench/large.py --reynolds $(BUILD)/bin/reynolds
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Large scenes: seconds to load and to render, and the most memory held, each in a process of its own: five million
-triangles (PLY and OBJ), a sky (EXR) and a texture (PNG) of 16k x 8k pixels, a forest of 100,000 instances, and two
-mirrors that face each other, to depth 64. The files take 3 GB.
+triangles (PLY and OBJ), a sky (EXR) and a texture (PNG) of 16k x 8k pixels, a forest of 100,000 instances, two
+mirrors that face each other, to depth 64, and fog of 1024^3 voxels (VOL and NanoVDB). The files take 8 GB.
 
 usage: large.py [--reynolds BINARY] [--folder DIR] [--divide N] [SCENE...]"""
 import argparse
@@ -12,6 +12,7 @@ import struct
 import subprocess
 import zlib
 
+import grids
 import scenes
 
 MIRRORS = "".join(
@@ -72,6 +73,14 @@ def mesh(kind):
     return ('<shape type="%s"><string name="filename" value="blob.%s"/></shape><emitter type="constant"/>' % (kind, kind))
 
 
+def fog(file):
+    """Fog of a file's density in the unit cube."""
+    return ('<emitter type="constant"/><shape type="cube"><transform name="to_world"><translate x="1" y="1" z="1"/>'
+            '<scale value="0.5"/></transform><bsdf type="null"/><medium name="interior" type="heterogeneous" id="fog">'
+            '<volume name="sigma_t" type="gridvolume"><string name="filename" value="%s"/></volume>'
+            '<float name="scale" value="30"/><float name="albedo" value="0.95"/></medium></shape>' % file)
+
+
 def make(folder, divide):
     """Writes the scenes, every number in them divided by `divide`; returns {name: path}."""
     os.makedirs(folder, exist_ok=True)
@@ -80,6 +89,9 @@ def make(folder, divide):
     write_once(os.path.join(folder, "blob.obj"), write_obj, os.path.join(folder, "blob.ply"))
     write_once(os.path.join(folder, "sky16k.exr"), write_sky, width, width // 2)
     write_once(os.path.join(folder, "texture16k.png"), write_texture, width, width // 2)
+    voxels = max(1, round(128 / divide ** (1 / 3))) * 8
+    write_once(os.path.join(folder, "fog.vol"), grids.write_vol, voxels)
+    write_once(os.path.join(folder, "fog.nvdb"), grids.write_nvdb, voxels)
     scenes.write_tree(os.path.join(folder, "tree.obj"))
     write_sky(os.path.join(folder, "sky.exr"), 64, 32)
     view = {"origin": "0, 1, -4", "target": "0, 0, 0", "up": "0, 1, 0", "near": 0.01, "depth": 8, "size": 256,
@@ -91,12 +103,13 @@ def make(folder, divide):
         "texture": (view, '<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string '
                     'name="filename" value="texture16k.png"/></texture></bsdf></shape><emitter type="constant"/>'),
         "forest": (dict(view, origin="0, -60, 12", up="0, 0, 1"), scenes.forest(100000 // divide)),
+        "fog_vol": (dict(view, integrator="volpath", origin="-1.5, 1.4, 2.5", target="0.5, 0.5, 0.5"), fog("fog.vol")),
+        "fog_nvdb": (dict(view, integrator="volpath", origin="-1.5, 1.4, 2.5", target="0.5, 0.5, 0.5"), fog("fog.nvdb")),
         "corridor": (dict(view, origin="-0.6, 0.2, -0.9", target="0.3, 0, 1", depth=64), CORRIDOR),
     }
     for name, (head, body) in bodies.items():
         with open(os.path.join(folder, name + ".xml"), "w") as f:
-            text = (scenes.HEAD % head).replace('name="rr_depth" value="5"', 'name="rr_depth" value="%d"' % head["depth"])
-            f.write(text + body + "\n</scene>\n")
+            f.write(scenes.HEAD % dict(head, rr_depth=head["depth"]) + body + "\n</scene>\n")
     return {name: os.path.join(folder, name + ".xml") for name in bodies}
 
 

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 
 #include <OpenEXR/openexr.h>
+#include <blosc.h>
 #include <embree3/rtcore.h>
 #include <expat.h>
 #include <math.h>
@@ -35,7 +36,7 @@ static const char scene_text[] =
     "  <emitter type=\"constant\"/>\n"
     "</scene>\n";
 
-enum { TEST_PIXELS = 64, TEST_WIDTHS = 3, LIBRARIES = 8 };
+enum { TEST_PIXELS = 64, TEST_WIDTHS = 3, LIBRARIES = 9 };
 
 #if defined(__clang__) || !defined(__GNUC__)
 static const char compiler[] = __VERSION__; // holds clang's name
@@ -108,6 +109,7 @@ static void find_libraries(Library list[LIBRARIES]) {
     cholmod_version(cholmod);
     snprintf(text, sizeof text, "%d.%d.%d", cholmod[0], cholmod[1], cholmod[2]);
     library_version(&list[7], "cholmod", text);
+    library_version(&list[8], "blosc", blosc_get_version_string());
 }
 
 // Renders the scene and its derivative; the sentence on what was found goes to test->verdict.

@@ -3,6 +3,7 @@
 #include "io/file.h"
 #include "io/grid.h"
 
+#include <blosc.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -43,7 +44,8 @@ static void test_types(void **state) {
     static const struct {
         const char *name;
         float tolerance;
-    } cases[] = {{"float", 1e-6f}, {"fp4", 0.026f}, {"fp8", 1.6e-3f}, {"fpn", 1e-2f}};
+    } cases[] = {{"float", 1e-6f}, {"double", 1e-6f}, {"blosc", 1e-6f}, {"fp4", 0.026f},
+                 {"fp8", 1.6e-3f},  {"fp16", 6e-6f},  {"fpn", 1e-2f}};
     static const float box[6] = {-1.75f, 61.75f, 4.25f, 7.25f, 69.25f, 7.75f}; // half a unit a voxel, moved by (1, 2, 3)
     for (int i = 0; i < COUNT_OF(cases); i++) {
         char path[1024];
@@ -123,6 +125,93 @@ static void test_plain(void **state) {
     free(plain);
 }
 
+static void store_size(unsigned char *at, size_t value) {
+    for (int i = 0; i < 8; i++) {
+        at[i] = (unsigned char)(value >> (8 * i));
+    }
+}
+
+// The file with its grid in three Blosc chunks, of which the second is made as asked; begins[i]: where the size of chunk i stands.
+static unsigned char *make_chunks(rey_context *ctx, const char *codec, int shuffle, size_t begins[4]) {
+    enum { HEAD = RECORDS + 8, CHUNKS = 3 };
+    size_t size, at = HEAD;
+    unsigned char *plain = make_plain(ctx, &size), *packed = malloc(size + CHUNKS * (8 + BLOSC_MAX_OVERHEAD));
+    assert_non_null(packed);
+    memcpy(packed, plain, HEAD);
+    packed[14] = 2;
+    const size_t from[CHUNKS + 1] = {HEAD, HEAD + 1000, HEAD + (size - HEAD) / 2, size};
+    for (int i = 0; i < CHUNKS; i++) {
+        size_t length = from[i + 1] - from[i], room = length + BLOSC_MAX_OVERHEAD;
+        int got = blosc_compress_ctx(i == 0 ? 0 : 9, i == 1 ? shuffle : 1, sizeof(float), length, plain + from[i], packed + at + 8,
+                                     room, i == 1 ? codec : BLOSC_LZ4_COMPNAME, 1 << 18, 1);
+        assert_true(got > 0);
+        begins[i] = at;
+        store_size(packed + at, (size_t)got);
+        at += 8 + (size_t)got;
+    }
+    begins[CHUNKS] = at;
+    free(plain);
+    return packed;
+}
+
+static void test_chunks(void **state) {
+    static const char *const codecs[] = {BLOSC_LZ4_COMPNAME, BLOSC_BLOSCLZ_COMPNAME, BLOSC_ZLIB_COMPNAME, BLOSC_ZSTD_COMPNAME};
+    for (int i = 0; i < COUNT_OF(codecs); i++) {
+        float values[NX * NY * NZ] = {0};
+        size_t begins[4];
+        unsigned char *packed = make_chunks(*state, codecs[i], i % 3, begins);
+        assert_int_equal(read_bytes(*state, packed, begins[3], values), REY_OK);
+        check_block(values, 1e-6f);
+        free(packed);
+    }
+}
+
+// Cut anywhere, or with bytes of a chunk's size, of its header or of its data changed.
+static void test_damaged_chunks(void **state) {
+    static const struct {
+        int chunk;
+        size_t at;      // from where its size stands
+        uint32_t value; // four bytes
+        const char *message;
+    } cases[] = {{0, 0, 0, "v: the compressed grid is damaged after 0 of "},
+                 {1, 0, 7, "v: the compressed grid is damaged after 1000 of "},
+                 {1, 4, 1, "v: the file ends inside its compressed grid of "},
+                 {1, 8, 0xffffffff, "v: the compressed grid is damaged after 1000 of "},  // version and flags
+                 {1, 12, 0, "v: the compressed grid is damaged after 1000 of "},          // bytes in it
+                 {1, 12, 0x7fffff00, "v: the compressed grid is damaged after 1000 of "},
+                 {2, 12, 16, "v: the compressed grid is damaged after "},                 // fewer than there are
+                 {1, 16, 0x7fffffff, "v: the compressed grid is damaged after 1000 of "}, // bytes in a block
+                 {1, 20, 1, "v: the compressed grid is damaged after 1000 of "},          // compressed bytes
+                 {1, 24, 0x7fffffff, "v: the compressed grid is damaged after 1000 of "}}; // where its first block begins
+    float values[NX * NY * NZ];
+    size_t begins[4];
+    unsigned char *packed = make_chunks(*state, BLOSC_LZ4_COMPNAME, 1, begins);
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        unsigned char before[4], *at = packed + begins[cases[i].chunk] + cases[i].at;
+        memcpy(before, at, 4);
+        for (int k = 0; k < 4; k++) {
+            at[k] = (unsigned char)(cases[i].value >> (8 * k));
+        }
+        rey_result result = read_bytes(*state, packed, begins[3], values);
+        if (result == REY_OK || strncmp(rey_error(*state), cases[i].message, strlen(cases[i].message)) != 0) {
+            fail_msg("case %d: %s, expected %s", i, result ? rey_error(*state) : "read", cases[i].message);
+        }
+        memcpy(at, before, 4);
+    }
+    for (size_t part = RECORDS + 8; part < begins[3]; part += 97) { // no longer than what is read, for the sanitizer
+        unsigned char *cut = malloc(part);
+        assert_non_null(cut);
+        memcpy(cut, packed, part);
+        assert_int_not_equal(read_bytes(*state, cut, part, values), REY_OK);
+        assert_non_null(strstr(rey_error(*state), "v: the file ends inside its compressed grid of "));
+        free(cut);
+    }
+    packed[16 + 7] = 1; // a grid of 2^56 bytes and more
+    assert_int_equal(read_bytes(*state, packed, begins[3], values), REY_ERROR_FORMAT);
+    assert_non_null(strstr(rey_error(*state), "v: the file ends inside its compressed grid of "));
+    free(packed);
+}
+
 static void test_refused(void **state) {
     enum { GRID = RECORDS + 8, TREE = GRID + 672, ROOT = TREE + 64 };
     static const struct {
@@ -132,11 +221,11 @@ static void test_refused(void **state) {
     } cases[] = {{0, 0, "v: not a NanoVDB file"},
                  {8, 33u << 21, "v: version 33 with 1 grids, expected version 32"},
                  {12, 0, "v: version 32 with 0 grids"},
-                 {12, 0x20001, "v: the grid is compressed with Blosc"},
-                 {12, 0x70001, "v: the grid is compressed in an unknown way"},
+                 {12, 0x20001, "v: the file ends inside its compressed grid"},
+                 {12, 0x70001, "v: the grid is compressed in way 7, expected none (0), zip (1) or Blosc (2)"},
                  {16 + 136, UINT32_MAX, "v: the file ends inside the records"},
                  {GRID, 0, "v: the file ends inside its grid"},
-                 {GRID + 636, 2, "v: the voxels are of type 2, expected float"},
+                 {GRID + 636, 4, "v: the voxels are of type 4, expected float"},
                  {TREE + 24, UINT32_MAX, "v: the file ends inside its grid"},
                  {ROOT, 13, "v: the box of the grid has 0 voxels along axis 0"},
                  {ROOT + 20, 1048577, "v: 283115250 voxels in a grid of"},
@@ -165,6 +254,7 @@ static void test_refused(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_types), cmocka_unit_test(test_vectors),
-                                       cmocka_unit_test(test_plain), cmocka_unit_test(test_refused)};
+                                       cmocka_unit_test(test_plain), cmocka_unit_test(test_chunks),
+                                       cmocka_unit_test(test_damaged_chunks), cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, open_context, close_context);
 }

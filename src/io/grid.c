@@ -62,6 +62,10 @@ static rey_result read_nvdb_header(rey_context *ctx, size_t size, rey_grid *out)
     if (result == REY_OK) {
         result = rey_nvdb_open(ctx, out->path, out->bytes, size, &out->nvdb);
     }
+    if (out->nvdb.own) { // what was compressed is not needed twice
+        rey_free(ctx, out->bytes);
+        out->bytes = NULL;
+    }
     if (result != REY_OK) {
         return result;
     }

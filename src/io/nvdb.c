@@ -1,17 +1,29 @@
 // nvdb.c: NanoVDB files. Offsets are those of the format's version 32; each is checked against the size before it is read.
 #include "io/nvdb.h"
 
+#include <blosc.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <zlib.h>
 
-enum { FILE_HEADER = 16, GRID_RECORD = 176, CODEC_NONE = 0, CODEC_ZIP = 1 };
+enum { FILE_HEADER = 16, GRID_RECORD = 176, CODEC_NONE = 0, CODEC_ZIP = 1, CODEC_BLOSC = 2 };
 enum { GRID_SIZE = 672, GRID_MATRIX = 296 + 88, GRID_OFFSET = 296 + 232, GRID_TYPE = 636 };
-enum { TYPE_FLOAT = 1, TYPE_VEC3F = 6, TYPE_FP4 = 13, TYPE_FP8, TYPE_FP16, TYPE_FPN };
-enum { ROOT_TILES = 24, ROOT_BACKGROUND = 28, TILE_SIZE = 32, TILE_CHILD = 8, TILE_VALUE = 20 };
-enum { LEAF_MINIMUM = 80, LEAF_QUANTUM = 84, LEAF_TABLE = 96, LEAF_TABLE3 = 128 };
-enum { MOST_RATIO = 1032, MOST_VOXELS_PER_BYTE = 256 }; // of zlib; of trees whose large nodes are constant
+enum { TYPE_FLOAT = 1, TYPE_DOUBLE, TYPE_VEC3F = 6, TYPE_FP4 = 13, TYPE_FP8, TYPE_FP16, TYPE_FPN };
+enum { ROOT_TILES = 24, TILE_SIZE = 32, TILE_CHILD = 8, LEAF_MINIMUM = 80, LEAF_QUANTUM = 84 };
+enum { MOST_RATIO = 1032, MOST_VOXELS_PER_BYTE = 256 }; // of zlib, more than of LZ4; of trees whose large nodes are constant
+
+// What depends on the size of a value: the root's own size and where its background begins, a tile's value, what an inner
+// node holds for one child, and where a leaf's voxels begin.
+typedef struct Layout {
+    uint32_t root, background, tile_value, entry, leaf_table;
+} Layout;
+
+static Layout layout_of(uint32_t type) {
+    return type == TYPE_VEC3F    ? (Layout){96, 28, 20, 16, 128}
+           : type == TYPE_DOUBLE ? (Layout){96, 32, 24, 8, 128}
+                                 : (Layout){64, 28, 20, 8, 96};
+}
 
 // Inner nodes, from below.
 static const struct {
@@ -49,21 +61,40 @@ bool rey_nvdb_known(const unsigned char *bytes, size_t size) { return size >= 8 
 
 // ---- header ------------------------------------------------------------------------------------------------------
 
-static rey_result uncompress_grid(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
+// A block of compressed bytes, as large as its first eight say; returns how many bytes become of it, 0 where it is damaged.
+static size_t uncompress_block(int codec, const unsigned char *bytes, size_t size, unsigned char *to, size_t room) {
+    if (codec == CODEC_ZIP) { // the whole grid
+        uLongf length = (uLongf)room;
+        return uncompress(to, &length, bytes, (uLong)size) == Z_OK && length == room ? room : 0;
+    }
+    size_t length; // of a Blosc chunk, the next GiB of the grid
+    bool valid = blosc_cbuffer_validate(bytes, size, &length) == 0 && length > 0 && length <= room;
+    return valid && blosc_decompress_ctx(bytes, to, length, 1) == (int)length ? length : 0;
+}
+
+static rey_result uncompress_grid(rey_context *ctx, const char *name, int codec, const unsigned char *bytes, size_t size,
                                   uint64_t grid_size, rey_nvdb *out) {
-    uint64_t packed = size >= 8 ? load(bytes, 8) : 0;
-    if (size < 8 || packed > size - 8 || grid_size / MOST_RATIO > packed || grid_size > SIZE_MAX / 2) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside its compressed grid of %llu bytes", name,
-                        (unsigned long long)grid_size);
+    if (grid_size / MOST_RATIO <= size && grid_size <= SIZE_MAX / 2) { // else the file is too small for it in any case
+        out->own = rey_alloc(ctx, (size_t)grid_size);
+        if (!out->own) {
+            return REY_ERROR_MEMORY;
+        }
     }
-    out->own = rey_alloc(ctx, (size_t)grid_size);
-    if (!out->own) {
-        return REY_ERROR_MEMORY;
-    }
-    uLongf length = (uLongf)grid_size;
-    if (uncompress(out->own, &length, bytes + 8, (uLong)packed) != Z_OK || length != grid_size) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the compressed grid is damaged", name);
-    }
+    size_t at = 0, done = 0;
+    do {
+        uint64_t packed = size - at >= 8 ? load(bytes + at, 8) : 0;
+        if (!out->own || size - at < 8 || packed > size - at - 8) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside its compressed grid of %llu bytes", name,
+                            (unsigned long long)grid_size);
+        }
+        size_t got = uncompress_block(codec, bytes + at + 8, (size_t)packed, out->own + done, (size_t)grid_size - done);
+        if (got == 0) {
+            return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the compressed grid is damaged after %zu of %llu bytes", name, done,
+                            (unsigned long long)grid_size);
+        }
+        done += got;
+        at += 8 + (size_t)packed;
+    } while (done < grid_size);
     return REY_OK;
 }
 
@@ -78,9 +109,9 @@ static rey_result find_grid(rey_context *ctx, const char *name, const unsigned c
         return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: version %d with %d grids, expected version 32 with at least one", name,
                         (int)major, (int)grids);
     }
-    if (codec != CODEC_NONE && codec != CODEC_ZIP) {
-        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the grid is compressed %s, expected no compression or zip", name,
-                        codec == 2 ? "with Blosc" : "in an unknown way");
+    if (codec > CODEC_BLOSC) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the grid is compressed in way %d, expected none (0), zip (1) or "
+                                                    "Blosc (2)", name, (int)codec);
     }
     uint64_t whole = load(bytes + FILE_HEADER, 8);
     for (uint64_t i = 0; i < grids && at <= size; i++) { // records and names
@@ -91,8 +122,8 @@ static rey_result find_grid(rey_context *ctx, const char *name, const unsigned c
     }
     *grid = bytes + at;
     *grid_size = size - (size_t)at;
-    if (codec == CODEC_ZIP) {
-        rey_result result = uncompress_grid(ctx, name, bytes + at, size - (size_t)at, whole, out);
+    if (codec != CODEC_NONE) {
+        rey_result result = uncompress_grid(ctx, name, (int)codec, bytes + at, size - (size_t)at, whole, out);
         *grid = out->own;
         *grid_size = (size_t)whole;
         return result;
@@ -122,9 +153,9 @@ static rey_result read_tree(rey_context *ctx, const char *name, const unsigned c
     if (size < GRID_SIZE + 64 || memcmp(grid, "NanoVDB", 7) != 0 || root > size - GRID_SIZE || size - GRID_SIZE - root < 96) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside its grid", name);
     }
-    if (type != TYPE_FLOAT && type != TYPE_VEC3F && !(type >= TYPE_FP4 && type <= TYPE_FPN)) {
-        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the voxels are of type %d, expected float (1), three floats (6) or "
-                                                    "packed floats (13 to 16)", name, (int)type);
+    if (type != TYPE_FLOAT && type != TYPE_DOUBLE && type != TYPE_VEC3F && !(type >= TYPE_FP4 && type <= TYPE_FPN)) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the voxels are of type %d, expected float (1), double (2), three "
+                                                    "floats (6) or packed floats (13 to 16)", name, (int)type);
     }
     out->tree = grid + GRID_SIZE + root; // the root; nodes are found from there
     out->size = size - GRID_SIZE - (size_t)root;
@@ -169,6 +200,7 @@ rey_result rey_nvdb_open(rey_context *ctx, const char *name, const unsigned char
 
 typedef struct Walk {
     const rey_nvdb *nvdb;
+    Layout layout;
     float *values;
     uint64_t filled;      // voxels that have a value; nodes that overlap are an error
     bool outside, strange; // an offset leads out of the grid, or there and back again; a value is not finite
@@ -185,6 +217,11 @@ static const unsigned char *bytes_at(Walk *w, uint64_t at, size_t count) {
 }
 
 static uint32_t word_at(Walk *w, uint64_t at) { return (uint32_t)load(bytes_at(w, at, 4), 4); }
+
+// Number n of those that begin at an offset.
+static float number_at(Walk *w, uint64_t at, uint64_t n) {
+    return w->nvdb->type == TYPE_DOUBLE ? (float)load_double(bytes_at(w, at + 8 * n, 8)) : as_float(word_at(w, at + 4 * n));
+}
 
 static void put(Walk *w, int64_t voxel, int channel, float value) {
     w->strange = w->strange || !isfinite(value);
@@ -212,15 +249,12 @@ static bool claim(Walk *w, const int64_t low[3], const int64_t high[3]) {
     return !w->outside;
 }
 
-static void fill(Walk *w, const int64_t origin[3], int64_t side, uint64_t value_at) {
+// One value from low to high.
+static void fill_box(Walk *w, const int64_t low[3], const int64_t high[3], uint64_t value_at) {
     const rey_nvdb *v = w->nvdb;
-    int64_t low[3], high[3];
     float value[3];
     for (int c = 0; c < v->channels; c++) {
-        value[c] = as_float(word_at(w, value_at + 4 * (uint64_t)c));
-    }
-    if (!clip(v, origin, side, low, high) || !claim(w, low, high)) {
-        return;
+        value[c] = number_at(w, value_at, (uint64_t)c);
     }
     for (int64_t z = low[2]; z < high[2]; z++) {
         for (int64_t y = low[1]; y < high[1]; y++) {
@@ -230,6 +264,13 @@ static void fill(Walk *w, const int64_t origin[3], int64_t side, uint64_t value_
                 }
             }
         }
+    }
+}
+
+static void fill(Walk *w, const int64_t origin[3], int64_t side, uint64_t value_at) {
+    int64_t low[3], high[3];
+    if (clip(w->nvdb, origin, side, low, high) && claim(w, low, high)) {
+        fill_box(w, low, high, value_at);
     }
 }
 
@@ -244,11 +285,11 @@ static uint32_t leaf_bits(Walk *w, uint64_t at) {
 static float leaf_value(Walk *w, uint64_t at, uint32_t bits, uint32_t n, int channel) {
     uint32_t channels = (uint32_t)w->nvdb->channels;
     if (bits == 0) {
-        uint64_t table = at + (channels == 3 ? LEAF_TABLE3 : LEAF_TABLE);
-        return as_float(word_at(w, table + 4 * (uint64_t)(n * channels + (uint32_t)channel)));
+        return number_at(w, at + w->layout.leaf_table, n * channels + (uint32_t)channel);
     }
     float minimum = as_float(word_at(w, at + LEAF_MINIMUM)), quantum = as_float(word_at(w, at + LEAF_QUANTUM));
-    uint32_t code = word_at(w, at + LEAF_TABLE + 4 * (uint64_t)(n * bits / 32)) >> (n * bits % 32) & ((1u << bits) - 1);
+    uint32_t word = word_at(w, at + w->layout.leaf_table + 4 * (uint64_t)(n * bits / 32));
+    uint32_t code = word >> (n * bits % 32) & ((1u << bits) - 1);
     return minimum + quantum * (float)code;
 }
 
@@ -273,7 +314,6 @@ static void read_leaf(Walk *w, uint64_t at, const int64_t origin[3]) {
 
 static void read_node(Walk *w, uint64_t at, int level, const int64_t origin[3]) {
     const int bits = levels[level].bits, side = levels[level].side;
-    const uint64_t stride = w->nvdb->channels == 3 ? 16 : 8;
     int64_t low[3], high[3];
     for (int32_t n = 0; n < 1 << (3 * bits) && !w->outside; n++) {
         const int32_t mask = (1 << bits) - 1;
@@ -282,7 +322,7 @@ static void read_node(Walk *w, uint64_t at, int level, const int64_t origin[3]) 
         if (!clip(w->nvdb, corner, side, low, high)) {
             continue;
         }
-        uint64_t entry = at + levels[level].table + stride * (uint64_t)n;
+        uint64_t entry = at + levels[level].table + w->layout.entry * (uint64_t)n;
         bool inner = word_at(w, at + levels[level].child_mask + 4 * (uint64_t)(n / 32)) >> (n % 32) & 1;
         uint64_t child = at + load(bytes_at(w, entry, 8), 8); // wraps round where it leads backwards
         if (!inner) {
@@ -300,17 +340,12 @@ static int64_t key_corner(uint64_t key, int shift) { return (int64_t)(int32_t)((
 
 rey_result rey_nvdb_read(rey_context *ctx, const char *name, const rey_nvdb *nvdb, float *values) {
     enum { UPPER_SIDE = 4096 };
-    Walk w = {.nvdb = nvdb, .values = values};
-    const uint64_t root_size = nvdb->channels == 3 ? 96 : 64;
-    uint64_t tiles = word_at(&w, ROOT_TILES), all = (uint64_t)nvdb->nx * (uint64_t)nvdb->ny * (uint64_t)nvdb->nz;
+    Walk w = {.nvdb = nvdb, .layout = layout_of(nvdb->type), .values = values};
+    uint64_t tiles = word_at(&w, ROOT_TILES);
     w.outside = w.outside || tiles > nvdb->size / TILE_SIZE;
-    for (uint64_t i = 0; i < all; i++) {
-        for (int c = 0; c < nvdb->channels; c++) {
-            put(&w, (int64_t)i, c, as_float(word_at(&w, ROOT_BACKGROUND + 4 * (uint64_t)c)));
-        }
-    }
+    fill_box(&w, (int64_t[3]){0}, (int64_t[3]){nvdb->nx, nvdb->ny, nvdb->nz}, w.layout.background);
     for (uint64_t i = 0; i < tiles && !w.outside; i++) {
-        uint64_t tile = root_size + TILE_SIZE * i, key = load(bytes_at(&w, tile, 8), 8);
+        uint64_t tile = w.layout.root + TILE_SIZE * i, key = load(bytes_at(&w, tile, 8), 8);
         uint64_t child = load(bytes_at(&w, tile + TILE_CHILD, 8), 8);
         const int64_t origin[3] = {key_corner(key, 42), key_corner(key, 21), key_corner(key, 0)};
         int64_t low[3], high[3];
@@ -320,7 +355,7 @@ rey_result rey_nvdb_read(rey_context *ctx, const char *name, const rey_nvdb *nvd
         if (child) {
             read_node(&w, child, COUNT_OF(levels) - 1, origin);
         } else {
-            fill(&w, origin, UPPER_SIDE, tile + TILE_VALUE);
+            fill(&w, origin, UPPER_SIDE, tile + w.layout.tile_value);
         }
     }
     return w.outside   ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a node of the grid lies outside of the file, or over another", name)

@@ -1,6 +1,6 @@
-// nvdb.h: NanoVDB files of major version 32: the first grid as a dense one over the box of its active voxels. A file is a
-// header, a record per grid, and a tree for each of them: root, upper nodes of 32^3 lower ones, these of 16^3 leaves, and
-// these of 8^3 voxels [museth2021].
+// nvdb.h: NanoVDB files of major version 32, plain, zipped or in Blosc chunks: the first grid as a dense one over the box of
+// its active voxels. A file is a header, a record per grid, and a tree for each of them: root, upper nodes of 32^3 lower ones,
+// these of 16^3 leaves, and these of 8^3 voxels [museth2021].
 #pragma once
 
 #include "base/context.h"

@@ -65,8 +65,8 @@ static float largest_square(const SceneView *view, int32_t flakes) {
     return largest;
 }
 
-void rey_medium_update(const SceneView *view, const VolumeNode *v, const MediumNode *m) {
-    float scale = view->theta[m->scale] * 1.00001f;
+void rey_medium_update(const SceneView *view, const VolumeNode *v, const MediumNode *m, float room) {
+    float scale = view->theta[m->scale] * 1.00001f * room;
     if (m->flakes >= 0) {
         scale *= sqrtf(largest_square(view, m->flakes));
     }

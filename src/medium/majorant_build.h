@@ -9,5 +9,6 @@ enum { MOST_SUPERVOXELS = 16 };
 
 // Supervoxels of a medium: fills in nx, ny and nz; returns the numbers in `tables` that it needs.
 int32_t rey_medium_table_size(const VolumeNode *sigma_t, MediumNode *medium);
-// Brings the bounds up to date. In step with the rounding of lookups they are a little larger than the values.
-void rey_medium_update(const SceneView *view, const VolumeNode *sigma_t, const MediumNode *medium);
+// Brings the bounds up to date, `room` times (1 at least) as large as the values. In step with the rounding of lookups they are
+// a little larger still.
+void rey_medium_update(const SceneView *view, const VolumeNode *sigma_t, const MediumNode *medium, float room);
