@@ -117,6 +117,20 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
     }
 }
 
+// What the recorded paths bring in the scene that is asked for, or its derivative there. Shadow rays that the sweep has to look at
+// anyway are left to it.
+static void sweep_moved(Tracer *t, int32_t count) {
+    const bool later = t->shadows_later;
+    t->shadows_later = later && t->job->mode == MODE_REVERSE && passing_is_live(t);
+    t->scene = t->job->moved; // t->deciding stays
+    path_replay(t);
+    if (t->job->mode == MODE_REVERSE) {
+        path_backward(t, count);
+    }
+    t->scene = t->job->scene;
+    t->shadows_later = later;
+}
+
 // Runs samples [first, first + count). A chunk whose vertices do not fit the records is run again in halves: samples
 // are pure functions of their numbers, so that nothing depends on it.
 static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32_t count, int32_t *begin) {
@@ -147,7 +161,7 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
             corner_stage(t, begin);
         }
         if (t->scene->drops) {
-            kept_stage(t, t->job->mode == MODE_REPLAY ? t->job->moved : t->scene, count);
+            kept_stage(t, t->job->moved ? t->job->moved : t->scene, count);
         }
         if (t->job->mode == MODE_REVERSE) {
             film_splat_adj(t, filter, count);
@@ -155,8 +169,8 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         for (int c = 0; c < SPEC_N; c++) {
             memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
         }
-        if (t->job->mode == MODE_REPLAY) {
-            path_replay(t);
+        if (t->job->moved) {
+            sweep_moved(t, count);
         } else {
             path_backward(t, count);
         }
@@ -186,8 +200,8 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     filter_tabulate(t.sensor, &filter);
     t.derivative = mode_records(job->mode);
     t.floor = t.derivative ? DERIVATIVE_FLOOR : 0;
-    t.shadows_later = t.derivative && t.scene->through && (job->mode == MODE_REPLAY || passing_is_live(&t));
-    const bool plain = t.derivative && job->mode != MODE_REPLAY && !t.scene->through && !t.scene->has_media && !t.scene->drops;
+    t.shadows_later = t.derivative && t.scene->through && (job->moved || passing_is_live(&t));
+    const bool plain = t.derivative && !job->moved && !t.scene->through && !t.scene->has_media && !t.scene->drops;
     t.spares = plain && !job->live_lights;
     t.local = plain && materials_stand(job);
     int64_t total = (int64_t)job->width * job->height * job->spp;

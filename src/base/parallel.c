@@ -107,22 +107,33 @@ double rey_thread_seconds(void) {
     return clock_seconds(CLOCK_THREAD_CPUTIME_ID);
 }
 
-// getrusage also counts what the parent held before it started this program, so Linux's own figure comes first.
-int64_t rey_peak_rss(void) {
-    FILE *status = fopen("/proc/self/status", "r");
+// What a file of lines "NAME:  NUMBER kB" says [bytes], 0 where it does not.
+static int64_t system_figure(const char *path, const char *name) {
+    FILE *file = fopen(path, "r");
     char line[128];
     long long kilobytes = 0;
-    while (status && !kilobytes && fgets(line, sizeof line, status)) {
-        if (strncmp(line, "VmHWM:", 6) == 0) {
-            kilobytes = strtoll(line + 6, NULL, 10);
+    while (file && !kilobytes && fgets(line, sizeof line, file)) {
+        if (strncmp(line, name, strlen(name)) == 0) {
+            kilobytes = strtoll(line + strlen(name), NULL, 10);
         }
     }
-    if (status) {
-        fclose(status);
+    if (file) {
+        fclose(file);
     }
+    return (int64_t)kilobytes * 1024;
+}
+
+// getrusage also counts what the parent held before it started this program, so Linux's own figure comes first.
+int64_t rey_peak_rss(void) {
+    int64_t bytes = system_figure("/proc/self/status", "VmHWM:");
     struct rusage usage;
-    if (kilobytes) {
-        return (int64_t)kilobytes * 1024;
+    if (bytes) {
+        return bytes;
     }
     return getrusage(RUSAGE_SELF, &usage) == 0 ? (int64_t)usage.ru_maxrss * 1024 : 0;
+}
+
+int64_t rey_memory_left(void) {
+    int64_t bytes = system_figure("/proc/meminfo", "MemAvailable:");
+    return bytes ? bytes : INT64_MAX;
 }

@@ -15,3 +15,4 @@ int rey_widest_lanes(void);      // 16 with AVX-512, 8 with AVX2 and FMA, else 1
 double rey_seconds(void);        // monotonic wall clock [s]
 double rey_thread_seconds(void); // CPU time of the calling thread [s]
 int64_t rey_peak_rss(void);      // peak resident memory of the process [bytes]
+int64_t rey_memory_left(void);   // memory that may still be used [bytes]; INT64_MAX where the system does not say

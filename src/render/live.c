@@ -99,7 +99,7 @@ void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
         job->live_extinctions |= (live[view->groups_count + i] & LIVE_EXTINCTION) != 0;
         job->live_borders |= (live[view->groups_count + i] & LIVE_BORDER) != 0;
     }
-    job->live_borders |= job->any_borders || job->glides;
+    job->live_borders |= job->any_borders || job->glides || job->rides;
     job->live = live;
     job->live_lights |= job->any_motion || job->glides;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
