@@ -27,6 +27,7 @@ typedef struct Work {
     float *original, *moved; // values of the direction's parameters
     uint32_t first_set;      // of the sample sets
     Reasons reasons;         // of what was refused so far
+    bool refused_named;      // something that was asked for by name was
     rey_stats stats;
 } Work;
 
@@ -277,15 +278,16 @@ static bool is_named(const Options *o, const char *spec) {
     return named;
 }
 
-// A parameter that was not asked for by name is listed where it cannot be checked, and the others are.
-static rey_result check_or_refuse(Work *w, Check *check) {
+// What cannot be checked is listed, and the others are checked; alone: there are none.
+static rey_result check_or_refuse(Work *w, Check *check, bool alone) {
     const Options *o = w->session.options;
     rey_result result = cli_direction_check_terms(w->session.ctx, w->session.scene, &check->direction, o->terms);
     bool lacking = result != REY_OK;
     result = lacking ? result : check_direction(w, check);
-    if (is_named(o, check->spec) || (!lacking && result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
+    if ((is_named(o, check->spec) && alone) || (!lacking && result != REY_ERROR_INCOMPLETE && result != REY_ERROR_PARAM)) {
         return result;
     }
+    w->refused_named |= is_named(o, check->spec);
     check->verdict = VERDICT_REFUSED;
     check->refusal = rey_strdup(w->session.ctx, rey_error(w->session.ctx));
     return check->refusal ? REY_OK : REY_ERROR_MEMORY;
@@ -381,7 +383,7 @@ static rey_result check_all(Work *w, Check *checks, int count) {
     rey_result result = work_prepare(w, largest);
     int tests = 0;
     for (int i = 0; i < count && !result; i++) {
-        result = check_or_refuse(w, &checks[i]);
+        result = check_or_refuse(w, &checks[i], count == 1);
         tests += checks[i].result.tests;
         if (!result && count > 1) {
             int most = count * w->blocks.nx * w->blocks.ny * CHECK_SERIES;
@@ -423,7 +425,7 @@ static int report_checks(const Options *options, Work *w, Check *checks, int cou
         result = check_print_table(w->session.ctx, checks, count, threshold);
     }
     int status = result ? cli_report_failure(options, w->session.ctx, result) : cli_finish_output();
-    return status ? status : wrong ? EXIT_FAILED : EXIT_OK;
+    return status ? status : wrong || w->refused_named ? EXIT_FAILED : EXIT_OK;
 }
 
 static int run_checks(const Options *options, Work *w) {

@@ -9,6 +9,7 @@
 
 #include "base/context.h"
 #include "scene/absent.h"
+#include "scene/names.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -372,7 +373,7 @@ bool cli_direction_fits(const rey_param_info *info, const char *spec) {
     Geometry geometry = geometry_of(info);
     const char *op = spec + cli_direction_name_length(spec);
     if (!*op || !info->terms) {
-        return info->terms == REY_TERM_INTERIOR;
+        return info->terms == REY_TERM_INTERIOR && !rey_name_is_pose(info->name);
     }
     if (!strncmp(op, ":local_translate=", 17)) {
         return geometry == GEOMETRY_TRANSFORM;

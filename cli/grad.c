@@ -22,6 +22,7 @@ enum { SETS = 16, PATH_BYTES = 4096, SHOWN_VALUES = 16 }; // gradients up to thi
 typedef struct Summary {
     double sum, standard_error, rms; // of the sum
     double values[SHOWN_VALUES];
+    double set_sums[SETS]; // of each sample set
 } Summary;
 
 typedef struct Grad {
@@ -30,6 +31,7 @@ typedef struct Grad {
     rey_stats stats;
     double value, standard_error;
     Summary *summaries; // reverse: one per parameter of the direction
+    double set_values[SETS]; // reverse: along the direction
     TermRequest request;
     double shares[SETS][TERM_COUNT]; // of each set's value
     int needed, used; // term bits
@@ -301,28 +303,35 @@ static rey_result write_gradient(const Grad *g, const double *gradient) {
     return write_summary(g);
 }
 
-// Each parameter's gradient in a few numbers; sets: the gradients of the sample sets, `size` numbers each.
-static rey_result summarize_gradients(Grad *g, const double *gradient, const double *sets, int64_t size) {
+// What is kept of a sample set's gradient, which is as large as the selection.
+static void book_set(void *user, int set, const double *gradient) {
+    Grad *g = user;
     const Direction *d = &g->direction;
-    g->summaries = rey_alloc_array(g->session.ctx, (size_t)d->count, sizeof *g->summaries);
-    for (int k = 0; k < d->count && g->summaries; k++) {
+    g->set_values[set] = dot(gradient, d->tangent, d->offsets[d->count]);
+    for (int k = 0; k < d->count; k++) {
+        for (int64_t i = d->offsets[k]; i < d->offsets[k + 1]; i++) {
+            g->summaries[k].set_sums[set] += gradient[i];
+        }
+    }
+}
+
+// Each parameter's gradient in a few numbers.
+static void summarize_gradients(Grad *g, const double *gradient) {
+    const Direction *d = &g->direction;
+    for (int k = 0; k < d->count; k++) {
         Summary *s = &g->summaries[k];
         int64_t count = d->offsets[k + 1] - d->offsets[k];
-        double sums[SETS] = {0}, squares = 0;
+        double squares = 0;
         for (int64_t i = 0; i < count; i++) {
             double x = gradient[d->offsets[k] + i];
-            for (int set = 0; set < SETS; set++) {
-                sums[set] += sets[set * size + d->offsets[k] + i];
-            }
             squares += x * x / (double)count;
             if (i < SHOWN_VALUES) {
                 s->values[i] = x;
             }
         }
-        summarize(sums, 1, &s->sum, &s->standard_error);
+        summarize(s->set_sums, 1, &s->sum, &s->standard_error);
         s->rms = sqrt(squares);
     }
-    return g->summaries ? REY_OK : REY_ERROR_MEMORY;
 }
 
 static rey_result reverse(Grad *g) {
@@ -330,30 +339,27 @@ static rey_result reverse(Grad *g) {
     int64_t size = g->direction.offsets[g->direction.count];
     float *adjoint = NULL;
     double *gradient = rey_alloc_array(s->ctx, (size_t)size, sizeof *gradient);
-    double *set_gradients = rey_alloc_array(s->ctx, (size_t)size, SETS * sizeof *set_gradients);
-    rey_result result = gradient && set_gradients ? check_gradient_paths(g) : REY_ERROR_MEMORY;
+    g->summaries = rey_alloc_array(s->ctx, (size_t)g->direction.count, sizeof *g->summaries);
+    g->request.set_done = book_set;
+    g->request.user = g;
+    rey_result result = gradient && g->summaries ? check_gradient_paths(g) : REY_ERROR_MEMORY;
     if (!result) {
         result = read_adjoint(s, &adjoint);
     }
     if (!result) {
         result = rey_vjp_terms(s->scene, &s->def, g->request, cli_direction_selection(&g->direction), adjoint, gradient,
-                               set_gradients, &g->stats);
+                               NULL, &g->stats);
         cli_progress_end(&s->progress);
     }
     if (!result) {
-        double sets[SETS];
-        for (int i = 0; i < SETS; i++) {
-            sets[i] = dot(set_gradients + i * size, g->direction.tangent, size);
-        }
-        summarize(sets, 1, &g->value, &g->standard_error);
-        result = summarize_gradients(g, gradient, set_gradients, size);
+        summarize(g->set_values, 1, &g->value, &g->standard_error);
+        summarize_gradients(g, gradient);
     }
     if (!result && s->options->output) {
         result = write_gradient(g, gradient);
     }
     rey_free(s->ctx, adjoint);
     rey_free(s->ctx, gradient);
-    rey_free(s->ctx, set_gradients);
     return result;
 }
 

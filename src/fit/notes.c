@@ -2,6 +2,7 @@
 #include "fit/fit.h"
 
 #include "render/used.h"
+#include "scene/names.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -14,8 +15,8 @@ static void note(const Fit *fit, const Unknown *p, const char *what) {
 
 // Whether an unknown is a pose whose entries move one by one.
 static bool is_free_pose(const Fit *fit, const Unknown *p) {
-    const char *name = p->param < 0 ? "" : ARRAY_AT(fit->scene->params, Param, p->param).name, *dot = strrchr(name, '.');
-    return dot && !strcmp(dot, ".to_world") && p->parameterisation == PARAMETERISATION_IDENTITY;
+    const char *name = p->param < 0 ? "" : ARRAY_AT(fit->scene->params, Param, p->param).name;
+    return rey_name_is_pose(name) && p->parameterisation == PARAMETERISATION_IDENTITY;
 }
 
 // What no view that is fitted depends on stays where it starts.

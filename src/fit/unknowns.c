@@ -4,6 +4,7 @@
 #include "fit/rigid.h"
 #include "io/image.h"
 #include "scene/absent.h"
+#include "scene/names.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -390,7 +391,7 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
         if (result || !rey_name_matches(p->name, info.name)) {
             continue;
         }
-        if (info.terms == REY_TERM_INTERIOR) {
+        if (info.terms == REY_TERM_INTERIOR && !rey_name_is_pose(info.name)) {
             result = add_unknown(job, scene, i, p, index, owners, u);
         } else if (passed_count++ < SHOWN_NAMES) {
             size_t used = strlen(passed);
@@ -405,6 +406,7 @@ static rey_result allocate(const Job *job, Unknowns *u) {
     u->params = rey_alloc_array(u->ctx, u->items.count, sizeof *u->params);
     u->start = rey_alloc_array(u->ctx, n, sizeof *u->start);
     u->value = rey_alloc_array(u->ctx, n, sizeof *u->value);
+    u->reference = rey_alloc_array(u->ctx, n, sizeof *u->reference);
     u->variable = rey_alloc_array(u->ctx, n, sizeof *u->variable);
     u->first = rey_alloc_array(u->ctx, n, sizeof *u->first);
     u->second = rey_alloc_array(u->ctx, n, sizeof *u->second);
@@ -414,8 +416,8 @@ static rey_result allocate(const Job *job, Unknowns *u) {
         u->lbfgs_count = rey_lbfgs_numbers(u->count, job->optimizer.memory);
     }
     u->lbfgs = rey_alloc_array(u->ctx, (size_t)u->lbfgs_count, sizeof *u->lbfgs);
-    bool had = u->params && u->start && u->value && u->variable && u->first && u->second && u->average &&
-               u->gradient && u->lbfgs;
+    bool had = u->params && u->start && u->value && u->reference && u->variable && u->first && u->second &&
+               u->average && u->gradient && u->lbfgs;
     return had ? REY_OK : REY_ERROR_MEMORY;
 }
 
@@ -450,8 +452,8 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *
 
 void rey_unknowns_free(Unknowns *u) {
     if (u->ctx) {
-        void *blocks[] = {u->params, u->start, u->value, u->variable, u->first, u->second, u->average, u->gradient,
-                          u->lbfgs};
+        void *blocks[] = {u->params, u->start, u->value, u->reference, u->variable, u->first, u->second, u->average,
+                          u->gradient, u->lbfgs};
         for (int i = 0; i < COUNT_OF(blocks); i++) {
             rey_free(u->ctx, blocks[i]);
         }

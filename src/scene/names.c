@@ -120,3 +120,8 @@ bool rey_name_matches(const char *pattern, const char *name) {
     }
     return !*pattern;
 }
+
+bool rey_name_is_pose(const char *name) {
+    const char *dot = strrchr(name, '.');
+    return dot && strcmp(dot, ".to_world") == 0;
+}

@@ -24,3 +24,5 @@ void rey_names_free(rey_context *ctx, Names *names);
 
 // Whether a name fits a pattern, in which * stands for any text.
 bool rey_name_matches(const char *pattern, const char *name);
+// Whether a parameter of this name is a pose, which patterns pass over even where it moves nothing but an environment.
+bool rey_name_is_pose(const char *name);

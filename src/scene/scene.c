@@ -20,6 +20,7 @@ rey_result rey_scene_new(rey_context *ctx, rey_scene **out) {
     scene->view.emitter_cdf = -1;
     scene->view.max_depth = -1;
     scene->view.rr_depth = 5;
+    scene->headroom = 1;
     *out = scene;
     return REY_OK;
 }

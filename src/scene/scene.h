@@ -285,6 +285,7 @@ struct rey_scene {
     // Derived data to rebuild before the next kernel runs.
     uint8_t *dirty_instances, *dirty_shapes, *dirty_bsdfs, *dirty_emitters, *dirty_volumes, *dirty_media, *dirty_phases;
     bool dirty;
+    float headroom;           // bounds of extinctions are so many times as large as they need be, for other ones that replay
     char *integrator;         // name of the first
     void *document;           // io's source document, owned; freed through document_free
     void (*document_free)(void *document);
