@@ -151,7 +151,7 @@ KFN bool box_is_live(const Tracer *t, int32_t medium) {
 // Whether the surfaces of a batch are borders that move.
 KFN bool border_is_live(const Tracer *t, const RecordBatch *batch) {
     bool moves = t->job->any_borders && (t->job->live[batch->group] & LIVE_MOTION);
-    return batch->tag == VERTEX_SURFACE && (moves || t->job->glides);
+    return batch->tag == VERTEX_SURFACE && (moves || t->job->glides || t->job->rides);
 }
 
 // Offers points of the records from `at` on to the paths' reservoirs, each with the medium that it is in.
@@ -226,7 +226,8 @@ static NOINLINE BorderSurface border_surface(const Tracer *t, const RecordBatch 
 
 static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     BorderSurface s = border_surface(t, batch);
-    for (int side = 0; side < 2; side++) {
+    const int sides = t->job->rides ? 1 : 2; // behind surfaces that scatter, other rays begin
+    for (int side = 0; side < sides; side++) {
         for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
             int32_t id = i_lane(s.medium[side], m_first(left));
             mine = left & mi_eq(s.medium[side], i_set(id));

@@ -56,8 +56,16 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
     const bool moves = sink->any_places || g;
     if (t->job->live_lights && m_any(s->connected)) {
         Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
+        Vec2 at = {f_set(0), f_set(0)};
+        sink->at = t->job->rides ? &at : NULL; // shadow rays that ride slide over their lights
         lights_adj(scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
                    spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), moves ? &move : NULL, sink);
+        sink->at = NULL;
+        if (t->job->rides) {
+            Connection to = {s->hit.p, s->light_d, s->light_distance, s->light, s->light_prim, s->connected};
+            glide_add(g, s->hit.p, connection_end_adj(t, &to, &move, at, true, sink), s->connected);
+            move.uv = (Vec2){f_set(0), f_set(0)};
+        }
     }
     if (moves && m_any(s->connected)) {
         phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
@@ -86,7 +94,7 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
 static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
                             Passage *p, Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
-    const bool glides = t->job->glides;
+    const bool glides = t->job->glides || t->job->rides;
     if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing && !glides) {
         return;
     }
@@ -104,8 +112,8 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
             dt = spec_scale(dt, s.light_phase);
-            Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, s.hit.p, s.light, s.connected,
-                                             s.light_d, s.light_distance, sink);
+            Connection to = {s.hit.p, s.light_d, s.light_distance, s.light, s.light_prim, s.connected};
+            Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, &to, true, sink);
             g.position = v3_add(g.position, dp);
         }
         forward_flush(t, sink, slot, c, s.m);
@@ -113,7 +121,9 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
             glide_store(t, &g, c, slot, finite);
         }
     }
-    if (glides) {
+    if (t->job->rides) {
+        ride_collision(t, slot, s.m);
+    } else if (glides) {
         glide_refer(t, slot, s.hit.p, finite);
     }
 }

@@ -202,7 +202,7 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
 static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c, const SampleKey *key, int32_t bounce, Mask m,
                                  int32_t record, int32_t next_count) {
     const Paths *p = &t->ws.paths[t->current];
-    Onward w = {.m = m, .passed = m_set(false), .depth = v->depth + 1, .eta2 = real_gather(p->eta2, v->at)};
+    Onward w = {.m = m, .passed = m_set(false), .collides = true, .depth = v->depth + 1, .eta2 = real_gather(p->eta2, v->at)};
     w.d = phase_sample(&c->call, c->wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                        rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
     w.sample.lobe = i_set(LOBE_SMOOTH);

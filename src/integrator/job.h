@@ -7,6 +7,11 @@
 // MODE_REPLAY: the picture of another scene along the paths of this one (path_replay.h).
 enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV, MODE_REPLAY };
 
+// The weight of a vertex is its throughput in the scene that is asked for over that in the recording one. Sums of the
+// recording throughput, of the other one, of its square over the former, of both together, and of both where the weight
+// lies between 1 / within and within.
+enum { WEIGHT_THEN, WEIGHT_NOW, WEIGHT_SQUARE, WEIGHT_ALL, WEIGHT_WITHIN, WEIGHTS };
+
 // Modes that record every vertex.
 static inline bool mode_records(int32_t mode) {
     return mode == MODE_REVERSE || mode == MODE_FORWARD || mode == MODE_REPLAY;
@@ -18,7 +23,7 @@ enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8, LIVE
 
 typedef struct PathJob {
     const SceneView *scene;
-    const SceneView *moved;       // MODE_REPLAY: the scene with other parameters
+    const SceneView *moved;       // MODE_REPLAY, MODE_REVERSE: the scene with other parameters, along the paths of `scene`; or null
     int32_t sensor, mode;
     int32_t x, y, width, height;  // tile in full-film pixels; may reach beyond the film with sample_border
     int32_t spp;
@@ -31,6 +36,8 @@ typedef struct PathJob {
     int32_t power;                // 2, 4, ...
     bool powers_of_xyz;
     double *coverage;             // the same of alpha and of 1, two numbers per pixel; may be null
+    double *weights;              // MODE_REPLAY: WEIGHT_ sums over the vertices, added to; may be null
+    double within;                // of those: what weights are counted
     int32_t border;               // pixels by which filters reach over the tile's edge
     // Derivatives: adjoint of the film's sums, for the delivered picture (crop window), and the compact vectors.
     const float *adjoint;
@@ -43,6 +50,7 @@ typedef struct PathJob {
     int32_t sky_at;
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
+    bool rides;                   // surfaces move in media, and collisions with them (ride.h)
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none

@@ -172,7 +172,7 @@ KFN Spec particle_value(const Landing *at, const BsdfSample *s, Float *factor) {
 static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, int32_t record, int32_t next_count) {
     const Paths *p = &t->ws.paths[t->current];
     SampleKey key = slot_key(t, at->v.slot);
-    Onward w;
+    Onward w = {.collides = false};
     w.sample = bsdf_sample(&at->call, at->wl, rng_1d(&key, dimension(bounce + 1, PURPOSE_LOBE)),
                            rng_2d(&key, dimension(bounce + 1, PURPOSE_DIRECTION)));
     w.eta2 = real_gather(p->eta2, at->v.at) * f_safe_rcp(w.sample.eta * w.sample.eta);

@@ -19,11 +19,9 @@ static void escape_batch(Tracer *t, const int32_t *order, int32_t count, int32_t
     if (scene->hide_emitters) {
         v.m = v.m & m_gt(v.pdf, f_set(PDF_VIEWED));
     }
-    if (t->spares) {
-        vertex_spare(t, -1, &v);
-        if (!m_any(v.wanted)) {
-            return;
-        }
+    vertex_spare(t, -1, &v);
+    if (t->spares && !m_any(v.wanted)) {
+        return;
     }
     Vec2 uv = environment_uv(scene, e, v.d);
     Float mis = f_zero_unless(v.m, scattered_weight(t, &v, environment_pdf(scene, e, v.d, uv) * e->weight));
@@ -47,8 +45,7 @@ KFN Float emission_weight(const Tracer *t, const EmitterRecord *e, const Vertex 
 // The density with which pictures draw directions: where paths are dropped, pictures depend on the weights of MIS (kept.h),
 // and derivatives weigh as pictures do. pdf: the density of the call.
 KFN Float picture_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Float pdf) {
-    BsdfCall picture = *call;
-    picture.floor = 0;
+    BsdfCall picture = bsdf_picture(call);
     return call->scene->drops && call->floor > 0 ? bsdf_pdf(&picture, wi, wo, lobe) : pdf;
 }
 
@@ -114,7 +111,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         scatter_key.sample = split.scatter_sample;
         key = &scatter_key;
     }
-    Onward w;
+    Onward w = {.collides = false};
     w.sample = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                            rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
     w.f = bsdf_eval_pdf(call, wi, w.sample.wo, w.sample.lobe, &w.pdf);
@@ -185,9 +182,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         si.uv.x = si.uv.x + real_gather(t->nudge[0], v.slot);
         si.uv.y = si.uv.y + real_gather(t->nudge[1], v.slot);
     }
-    if (t->spares) {
-        vertex_spare(t, group_id, &v);
-    }
+    vertex_spare(t, group_id, &v);
     const bool wanted = m_any(v.wanted);
     Vec3 wi = frame_to_local(&si.sh, v3_neg(v.d));
     Float mis = f_set(0);

@@ -119,7 +119,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     sink->at = NULL;
     if (sink->any_motion) {
         d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
-        d.p = s->corner ? corner_move_adj(t, s, weight, sink) : d.p;
+        d.p = s->corner ? corner_move_adj(t, s, weight, sink) : s->dp;
         vertex_move_adj(t, s, &d, weight, live, channel, sink);
     } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         vertex_frame_adj(s, call.surface != NULL, &d);
@@ -187,13 +187,13 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, 
     }
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, s->slot, c));
-        surface_adj(t, s, live, delta, c, sink);
         if (live_passing) {
             // L += f Le w_l T
             Spec dt = spec_mul(spec_mul(spec_mul(delta, s->beta), unshadowed), spec_mul(s->f_light, s->light_value));
-            connection_passage_adj(t, &p->walk, transmittance, dt, s->slot, batch->bounce, s->si.p, s->light, s->connected,
-                                   s->light_d, s->light_distance, sink);
+            Connection to = {s->si.p, s->light_d, s->light_distance, s->light, s->light_prim, s->connected};
+            s->dp = connection_passage_adj(t, &p->walk, transmittance, dt, s->slot, batch->bounce, &to, false, sink);
         }
+        surface_adj(t, s, live, delta, c, sink);
         forward_flush(t, sink, s->slot, c, s->m);
     }
     if (job->any_motion) {
@@ -264,13 +264,14 @@ static void path_backward(Tracer *t, int32_t count) {
         spec_scatter(t->ws.suffix, slot, spec_zero_unless(finite, l), m);
         if (batch->tag == VERTEX_FLIGHT) {
             flight_sweep(t, batch, slot, suffix, finite, &sink);
+            ride_flight(t, batch, slot, m);
             continue;
         }
         if (batch->tag == VERTEX_MEDIUM) {
             collision_sweep(t, batch, slot, suffix, finite, live_passing, &p, &sink);
             continue;
         }
-        if (border_is_live(t, batch)) {
+        if (border_is_live(t, batch) && !job->rides) {
             border_surface_sweep(t, batch, suffix, finite, &sink);
         }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
@@ -278,6 +279,7 @@ static void path_backward(Tracer *t, int32_t count) {
             s.attached = attached;
             surface_sweep(t, batch, &s, finite, live_passing, &p, &sink);
         }
+        ride_end_sweep(t, batch, l, finite, &sink);
     }
     if (job->glides) {
         glides_end(t, count, &sink);

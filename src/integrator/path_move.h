@@ -107,6 +107,29 @@ KFN void points_move_adj(const Tracer *t, const Hit *hit, Vec3 dp, Vec3 darea, S
     surfaces_move_adj(t, hit, &d, sink, m);
 }
 
+// Where rays along d meet surfaces, with the adjoint `worth` of what they find: returns that of the rays' positions.
+static Vec3 rays_find_adj(const Tracer *t, const Hit *hit, Vec3 d, const SurfaceAdj *worth, Sink *sink, Mask m) {
+    const SceneView *scene = t->scene;
+    Vec3 drag = v3_zero();
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
+        const Group *group = scene->groups + id;
+        Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
+        Slide slide[2];
+        SurfaceAdj a = *worth;
+        shape_slide(scene, group->shape_kind, group->shape_flags, &h, &si, slide);
+        Vec3 position = slide_adj(slide, d, &a);
+        a.p = v3_sub(a.p, position);
+        if (t->job->live[id] & LIVE_MOTION) {
+            shape_move_adj(scene, group->shape_kind, group->shape_flags, &h, &si, &a, sink, mine);
+        }
+        drag = v3_select(mine, position, drag);
+    }
+    return drag;
+}
+
 // A point of a surface, such as a light sample, as a hit: of meshes with the barycentrics there.
 KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec3 p, Vec3 *n) {
     Hit hit = {shape, prim, f_set(0), f_set(0), p, instance};
@@ -122,7 +145,7 @@ KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec
         h.instance = i_select(mine, instance, i_set(0));
         if (group->shape_kind == SHAPE_MESH) {
             // dp_du and dp_dv are the edges
-            Interaction corner = mesh_interaction(scene, group->shape_flags & SHAPE_INSTANCED, &h);
+            Interaction corner = shape_interaction(scene, SHAPE_MESH, group->shape_flags & SHAPE_INSTANCED, &h);
             Vec3 q = v3_sub(p, corner.p), cross = v3_cross(corner.dp_du, corner.dp_dv);
             Float r = f_safe_rcp(v3_dot(cross, cross));
             h.u = v3_dot(v3_cross(q, corner.dp_dv), cross) * r;
@@ -162,9 +185,11 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     const Workspace *ws = &t->ws;
     const Records *r = &ws->records;
     Int next = i_gather(ws->next, s->slot);
-    Mask attached = s->scattered & mi_lt(i_set(-1), next) & mi_eq(s->lobe, i_set(LOBE_SMOOTH));
+    Mask spread = s->scattered & mi_eq(s->lobe, i_set(LOBE_SMOOTH)), attached = spread & mi_lt(i_set(-1), next);
+    // A chain that begins here, or a ray to a collision, moves with this vertex, in its fixed direction.
+    Vec3 drag = v3_select(spread, rows_gather(&ws->drag, channel, s->slot), v3_zero());
     if (!m_any(attached)) {
-        return v3_zero();
+        return drag;
     }
     next = i_max(next, i_set(0));
     Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, s->slot), n = LOAD_V3(*ws, next_nx, next_ny, next_nz, s->slot);
@@ -175,9 +200,7 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     Hit hit = {i_gather(r->shape, next), i_gather(r->prim, next), real_gather(r->u, next), real_gather(r->v, next), q,
                i_gather(r->instance, next)};
     points_move_adj(t, &hit, dr, darea, sink, attached);
-    // A chain that begins here moves with this vertex, in its fixed direction.
-    Vec3 drag = rows_gather(&ws->drag, channel, s->slot);
-    return v3_select(attached, v3_sub(drag, dr), v3_zero());
+    return v3_select(attached, v3_sub(drag, dr), drag);
 }
 
 // The sensor's part in the adjoints of the rays that it sent out.

@@ -107,6 +107,7 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     i_store(p->slot + i, slot);
     i_store(p->medium + i, i_set(t->sensor->medium));
     i_store(p->depth + i, i_set(0));
+    i_store(p->flies + i, i_set(0));
     spec_store(t->ws.radiance, i, spec_zero());
     spec_store(t->ws.suffix, i, spec_zero());
     f_store(t->ws.reached + i, f_set(0));

@@ -13,11 +13,12 @@ enum {
 };
 
 // A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot, and depth
-// where that is not the bounce (scene->through). skip: in media, how far before its origin the ray left its surface.
+// where that is not the bounce (scene->through). In media, skip: how far before its origin the ray left its surface; flies: whether
+// it begins at a collision, and not at a surface.
 #define PATH_FLOATS(F)                                                                                                 \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz) F(skip)
 #define PATH_SPECS(S) S(beta)
-#define PATH_INTS(I) I(slot) I(medium) I(depth)
+#define PATH_INTS(I) I(slot) I(medium) I(depth) I(flies)
 
 // A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom.
 #define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)
@@ -28,7 +29,7 @@ enum {
 // the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the
 // scattering function),
 // the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
-// camera, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
+// camera or a collision, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
 // radiance arriving along the sampled direction. corner: see corner.h; keep, slope, met and the density
 // of the light sample: see kept.h.
 #define RECORD_FLOATS(F)                                                                                               \

@@ -38,6 +38,7 @@ typedef struct SurfaceSweep {
     Float mis, scatter_weight, light_distance, kept;
     Vec2 light_uv;
     Vec3 d, wi, light_d, wo_d, wl, wo;
+    Vec3 dp;              // adjoint of its position, by what its shadow ray passes
     Hit hit;
     Interaction si;
     BsdfCall call;
@@ -70,6 +71,7 @@ KFN void surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec 
     s->attached = suffix;
     s->group = t->scene->groups + batch->group;
     s->corner = NULL;
+    s->dp = v3_zero();
     s->hit = batch->local ? (Hit){.u = f_load(r->u + at), .v = f_load(r->v + at)} : surface_hit(r, at);
     s->d = record_v3(r->dx, r->dy, r->dz, at);
     s->beta = spec_load(r->beta, at);

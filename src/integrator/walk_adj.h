@@ -2,7 +2,7 @@
 #pragma once
 
 #include "integrator/passage_move.h"
-#include "integrator/path_move.h"
+#include "integrator/ride.h"
 
 // Accumulates the adjoint dt of the product of what a walk's surfaces let through.
 static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *sink) {
@@ -121,13 +121,15 @@ static void passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, S
 }
 
 // Whether lights move, or collisions, and what media let through with them.
-KFN bool lights_turn(const Tracer *t) { return (t->job->any_places || t->job->glides) && t->scene->has_media; }
+KFN bool lights_turn(const Tracer *t) {
+    return (t->job->any_places || t->job->glides || t->job->rides) && t->scene->has_media;
+}
 
 // Lights at a point whose place is selected, or from which collisions move away.
 KFN Mask points_that_move(const Tracer *t, Int light) {
     const SceneView *scene = t->scene;
     light = i_max(light, i_set(0));
-    Mask moves = m_set(t->job->glides);
+    Mask moves = m_set(t->job->glides || t->job->rides);
     for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
         moves = moves | mi_lt(i_set(-1), i_gather(t->job->place_at, light * MAX_EMITTER_SLOTS + k));
     }
@@ -135,19 +137,22 @@ KFN Mask points_that_move(const Tracer *t, Int light) {
 }
 
 // passage_adj, and what the turning of the shadow rays makes of where their lights are; returns the adjoint of where they begin.
+// slides: rays to points of surfaces keep their direction, and meet those elsewhere; otherwise they keep the point.
 static Vec3 connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
-                                   Vec3 p, Int light, Mask connected, Vec3 light_d, Float light_distance, Sink *sink) {
+                                   const Connection *c, bool slides, Sink *sink) {
     bool turns = lights_turn(t);
-    Turn turn = {p, v3_zero(), v3_zero(), f_set(0), turns ? connected & points_that_move(t, light) : m_set(false)};
-    passage_adj(t, walk, transmittance, spec_zero_unless(connected, dt), slot, bounce, turns ? &turn : NULL, sink);
-    if (turns && m_any(connected)) {
-        LightMove move = light_move_zero();
-        move.d = v3_select(connected, turn.d, v3_zero());
-        move.distance = f_zero_unless(connected, turn.distance);
-        lights_move_adj(t->scene, light, connected, p, light_d, light_distance, &move, sink);
-        return v3_select(connected, v3_add(turn.shift, move.ref), v3_zero());
+    Turn turn = {c->from, v3_zero(), v3_zero(), f_set(0), turns ? c->m & points_that_move(t, c->light) : m_set(false)};
+    passage_adj(t, walk, transmittance, spec_zero_unless(c->m, dt), slot, bounce, turns ? &turn : NULL, sink);
+    if (!turns || !m_any(c->m)) {
+        return v3_zero();
     }
-    return v3_zero();
+    LightMove move = light_move_zero();
+    move.d = v3_select(c->m, turn.d, v3_zero());
+    move.distance = f_zero_unless(c->m, turn.distance);
+    lights_move_adj(t->scene, c->light, c->m, c->from, c->d, c->distance, &move, sink);
+    Vec3 dp = v3_select(c->m, v3_add(turn.shift, move.ref), v3_zero());
+    return t->job->rides ? v3_add(dp, connection_end_adj(t, c, &move, (Vec2){f_set(0), f_set(0)}, slides, sink))
+                          : dp;
 }
 
 // Whether shadow rays pass surfaces or media whose transmittance depends on the selection.

@@ -321,7 +321,8 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
     }
     *edge = *e;
     *number = (float)weight;
-    *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_MARK || e->kind == EDGE_TERMINATOR;
+    bool smooth = e->kind == EDGE_MESH && (r->scene->view.shapes[e->shape].flags & SHAPE_HAS_NORMALS);
+    *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_MARK || e->kind == EDGE_TERMINATOR || smooth;
     return REY_OK;
 }
 

@@ -101,10 +101,12 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
     if (p->geometry >= 0) {
         bool pose = p->theta == view->shapes[p->geometry].to_world;
         *moves = true;
+        job->rides = job->any_motion && view->has_media;
         return (int32_t *)(uintptr_t)(pose ? job->pose_at : job->points_at) + p->geometry;
     }
     if (p->instance >= 0) {
         *moves = true;
+        job->rides = job->any_motion && view->has_media;
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
     if (p->camera >= 0 && rey_camera_theta(r->plan.sensor, p->camera) == p->theta) {

@@ -8,14 +8,15 @@
 #include "render/motion.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
+#include "render/shards.h"
 #include "render/terms.h"
 #include "render/update.h"
 #include "scene/sink.h"
 
 #include <string.h>
 
-// Units of a derivative that have a gradient of their own: fixed, so that sums do not depend on the threads.
-enum { GRADIENT_SHARDS = 8, DEFAULT_SETS = 16 };
+enum { DEFAULT_SETS = 16 };
+enum { MOST_SELECTED = 1 << 30 }; // numbers
 
 rey_render_def rey_default_render_def(void) {
     return (rey_render_def){.size = sizeof(rey_render_def), .sets = DEFAULT_SETS};
@@ -198,7 +199,7 @@ void rey_render_film_unit(void *argument, int64_t item, int worker) {
     run_tile(r, &job, (int32_t)item, worker);
 }
 
-// A shard is every GRADIENT_SHARDS-th tile, run in order by one worker.
+// A shard is every so many-th tile, run in order by one worker.
 static void gradient_unit(void *argument, int64_t item, int worker) {
     Render *r = argument;
     PathJob job = r->job;
@@ -283,7 +284,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->turns_rays |= behind && p->geometry < 0 && p->instance < 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
-        if (at > INT32_MAX / 2) {
+        if (at > MOST_SELECTED) {
             return rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "more than 2^30 numbers are selected");
         }
     }
@@ -291,7 +292,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     rey_motion_add_normals(r, &at);
     rey_dropped_add_sky(r, &at);
     r->gradient_size = at;
-    return REY_OK;
+    return at <= INT32_MAX ? REY_OK : rey_fail(r->scene->ctx, REY_ERROR_UNSUPPORTED, "2^31 numbers or more follow the selection");
 }
 
 // Samples per pixel of one set; spp is rounded up to a multiple of the sets.
@@ -312,7 +313,7 @@ static bool selection_given(rey_selection selection) {
 static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render_def *def, TermRequest request,
                                    rey_selection selection, int32_t mode) {
     rey_result result = (request.asked ? render_plan : rey_render_begin)(r, scene, def, mode, 3);
-    r->request = request;
+    r->request = request, r->job.moved = request.moved;
     const Integrator *first = scene->integrators.count ? &ARRAY_AT(scene->integrators, Integrator, 0) : NULL;
     if (result == REY_OK && (scene->view.colour_is_depth || (first && strcmp(first->name, "aov") == 0))) { // which holds none
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the integrator '%s' has no derivatives, 'path' has%s",
@@ -376,19 +377,6 @@ static rey_result prepare_adjoint(Render *r, const float *adjoint) {
     return REY_OK;
 }
 
-// Adds the shards' gradients up in the first one.
-static rey_result sum_shards(Render *r) {
-    for (int64_t i = 0; i < r->gradient_size; i++) {
-        double sum = 0;
-        for (int32_t k = 0; k < r->shards; k++) {
-            sum += r->gradients[k * r->gradient_size + i];
-        }
-        r->gradients[i] = sum;
-    }
-    rey_dropped_gradient(r, r->gradients);
-    return rey_motion_gradient(r, r->gradients);
-}
-
 // The tangent, continued behind the selection.
 static rey_result prepare_tangent(Render *r, const float *tangent) {
     r->tangent = rey_alloc_array(r->scene->ctx, (size_t)r->gradient_size + 1, sizeof *r->tangent);
@@ -419,16 +407,17 @@ rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermReques
         result = prepare_adjoint(&r, adjoint);
     }
     if (result == REY_OK) {
-        r.shards = r.tiles < GRADIENT_SHARDS ? r.tiles : GRADIENT_SHARDS;
-        r.gradients = rey_alloc_array(scene->ctx, (size_t)(r.gradient_size + 1) * (size_t)r.shards, sizeof(double));
-        result = r.gradients ? REY_OK : REY_ERROR_MEMORY;
+        result = rey_shards_begin(&r);
+    }
+    if (result == REY_OK) {
+        memset(gradient, 0, (size_t)r.selection_size * sizeof *gradient); // which may take memory, too
+        result = rey_shards_fit(&r);
     }
     if (result == REY_OK && request.values) {
         result = prepare_tangent(&r, request.direction);
     }
     if (result == REY_OK) {
         r.total = (r.tiles + (r.particles ? r.shards : 0.0)) * def->sets;
-        memset(gradient, 0, (size_t)r.selection_size * sizeof *gradient);
         for (int set = 0; set < def->sets && !r.cancelled && result == REY_OK; set++) {
             memset(r.gradients, 0, (size_t)r.gradient_size * (size_t)r.shards * sizeof *r.gradients);
             r.job.scramble = set_scramble(&r, set, def->sets > 1);
@@ -438,12 +427,15 @@ rey_result rey_vjp_terms(rey_scene *scene, const rey_render_def *def, TermReques
             }
             rey_terms_book(&r, set, REY_TERM_INTERIOR, NULL);
             run_boundaries(&r, set, NULL);
-            result = result == REY_OK ? sum_shards(&r) : result;
+            result = result == REY_OK ? rey_shards_sum(&r) : result;
             for (int64_t i = 0; i < r.selection_size && result == REY_OK; i++) {
                 gradient[i] += r.gradients[i] / def->sets;
                 if (set_gradients) {
                     set_gradients[set * r.selection_size + i] = r.gradients[i];
                 }
+            }
+            if (request.set_done && result == REY_OK) {
+                request.set_done(request.user, set, r.gradients);
             }
         }
     }

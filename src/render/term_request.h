@@ -9,6 +9,9 @@ typedef struct TermRequest {
     int primary_spp, indirect_spp; // samples per pixel of these terms, 0 = as fits def->spp
     double (*values)[TERM_COUNT];  // null, or one row per set: what each term, in the order of its bit, adds to its value
     const float *direction;        // of rey_vjp_terms, whose value is the gradient's product with it
+    void (*set_done)(void *user, int set, const double *gradient); // null, or called with each set's gradient
+    void *user;
+    const struct SceneView *moved; // null, or the derivative is that of this scene along the paths of the other (replay.h)
     bool asked;                    // only whether there is such a derivative: edges are not looked for
 } TermRequest;
 

@@ -46,6 +46,9 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
     if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) {
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
+        if (known && scene->view.has_media && p->camera < 0 && !rey_moves_border(&scene->view, p)) {
+            return still;
+        }
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
     }
     if (p->normals >= 0) {
@@ -117,6 +120,26 @@ static const char *gap_of_cameras(const SceneView *view) {
     return NULL;
 }
 
+// What is not known of surfaces that move in scenes with media, null where all is.
+static const char *gap_of_rides(const SceneView *view) {
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        int kind = view->bsdfs[i].kind;
+        if (rey_bsdf_opens(kind) || rey_bsdf_bends(kind)) {
+            return "in scenes with participating media, what moves changes the ways through surfaces that let light pass and those "
+                   "along smooth mirrors and glass. Known are volumes, surfaces of the kind 'null', at which media end, lights, "
+                   "and, by --terms interior, what moves among surfaces that all scatter";
+        }
+    }
+    for (int64_t i = 0; i < view->media_count; i++) {
+        const MediumNode *medium = view->media + i;
+        if (medium->bounded || medium->flakes >= 0 || medium->emission >= 0) {
+            return "in media that vary, glow or are made of flakes, collisions that move with surfaces look them up elsewhere. "
+                   "Known, by --terms interior, is what moves in homogeneous media that do neither";
+        }
+    }
+    return phases_read_volumes(view) ? "collisions that move with surfaces look up volumes of phase functions elsewhere" : NULL;
+}
+
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
 static const char *gap_in_media(const SceneView *view, const Param *p) {
     const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
@@ -129,9 +152,11 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     if (p->camera >= 0) {
         return gap_of_cameras(view);
     }
-    if (p->geometry >= 0 || p->instance >= 0 || (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR))) {
-        return "in scenes with participating media, what moves changes what they let through and scatter, and moves the shadows in "
-               "them. Known are volumes, surfaces of the kind 'null', at which media end, and lights";
+    if (p->geometry >= 0 || p->instance >= 0) {
+        return gap_of_rides(view);
+    }
+    if (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR)) {
+        return "in scenes with participating media, rays that turn at smooth mirrors and glass pass the edges of what they see";
     }
     if (p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) && has_jumping_media(view)) {
         return "in participating media with filter_type=\"nearest\", light that moves passes jumps from voxel to voxel";
@@ -287,8 +312,10 @@ void rey_terms_book(Render *r, int set, int term, const double *picture) {
             sum += picture[i] / (double)n;
         }
     } else {
-        for (int64_t i = 0; i < r->shards * r->gradient_size; i++) {
-            sum += r->gradients[i] * (double)r->tangent[i % r->gradient_size];
+        for (int32_t k = 0; k < r->shards; k++) {
+            for (int64_t i = 0; i < r->gradient_size; i++) {
+                sum += r->gradients[k * r->gradient_size + i] * (double)r->tangent[i];
+            }
         }
     }
     double *values = r->request.values[set];

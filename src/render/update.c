@@ -65,7 +65,7 @@ static rey_result update_media(rey_scene *scene) {
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         if (scene->dirty_media[i]) {
-            rey_medium_update(view, view->volumes + view->media[i].sigma_t, view->media + i);
+            rey_medium_update(view, view->volumes + view->media[i].sigma_t, view->media + i, scene->headroom);
         }
     }
     memset(scene->dirty_volumes, 0, (size_t)view->volumes_count);

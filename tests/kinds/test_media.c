@@ -21,7 +21,7 @@ static void update(MediaCase *c) {
     }
     SceneView view = {.theta = theta, .tables = tables, .textures = &c->flakes, .volumes = &c->grid};
     assert_true(rey_medium_table_size(&c->sigma_t, &c->medium) <= MEDIA_TABLES);
-    rey_medium_update(&view, &c->sigma_t, &c->medium);
+    rey_medium_update(&view, &c->sigma_t, &c->medium, 1);
     for (int i = 0; i < MEDIA_TABLES; i++) {
         c->tables[i] = (double)tables[i];
     }

@@ -1,0 +1,92 @@
+// ride.h: surfaces that move in media. What is scattered from one point to the next changes with one over the cube of their
+// distance if they move differently, whose integral has no limit. So directions into media and distances to collisions are fixed,
+// as behind a camera that moves (glide.h): a collision rides along with the surface that its ray left, and so does every later
+// one, up to where the ray meets a surface. There the path slides over it; it goes on as from any surface. Segments that lead from
+// surface to surface are attached at both ends (path_move.h), with what the medium between them lets through.
+// With dx the motion of a ray's end along it, of a medium with extinction s that ends there,
+//   dL = dx T (s a S + j) - dD s L,                                                                            (border.h, 1)
+// dD = dx where the end slides, and along segments that are attached the change of their length. S is found by the path's probe.
+// Shadow rays from collisions keep their direction, and their ends slide over the lights; those from surfaces keep both ends.
+// NOT differentiated: extinctions that vary or depend on the direction, and surfaces that rays pass.
+#pragma once
+
+#include "integrator/border.h"
+#include "integrator/path_move.h"
+
+// The light sample of a vertex.
+typedef struct Connection {
+    Vec3 from, d;
+    Float distance;
+    Int light, prim;
+    Mask m;
+} Connection;
+
+// Of connections to surfaces, given the adjoint of direction, length and uv: returns that of where they begin.
+static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, const LightMove *move, Vec2 at, bool slides,
+                                        Sink *sink) {
+    const SceneView *scene = t->scene;
+    Int light = i_select(c->m, c->light, i_set(0)), shape = EMITTER_FIELD(scene, light, shape);
+    Mask attached = c->m & mi_lt(i_set(-1), shape);
+    if (!m_any(attached)) {
+        return v3_zero();
+    }
+    Vec3 n, dr = v3_scale(c->d, move->distance), end = v3_madd(c->from, c->distance, c->d);
+    Hit hit = point_hit(scene, i_select(attached, shape, i_set(-1)), i_select(attached, c->prim, i_set(0)), i_set(0), end, &n);
+    if (slides) {
+        SurfaceAdj worth = surface_adj_zero();
+        worth.p = dr;
+        worth.uv = move->uv;
+        worth.at = at;
+        return v3_select(attached, v3_sub(rays_find_adj(t, &hit, c->d, &worth, sink, attached), dr), v3_zero());
+    }
+    Vec3 across = v3_madd(move->d, -v3_dot(c->d, move->d), c->d);
+    dr = v3_madd(dr, f_safe_rcp(c->distance), across);
+    points_move_adj(t, &hit, dr, v3_zero(), sink, attached);
+    return v3_select(attached, v3_neg(dr), v3_zero());
+}
+
+// A collision has no point of a surface to which the vertex before it could be attached: it rides with that one.
+KFN void ride_collision(Tracer *t, Int slot, Mask m) {
+    i_scatter(t->ws.next, slot, i_set(-1), m);
+    spec_scatter(t->ws.attached, slot, spec_zero(), m);
+}
+
+// What leaves the end of a flight reaches its beginning with the flight's weight.
+KFN void ride_flight(Tracer *t, const RecordBatch *batch, Int slot, Mask m) {
+    if (t->job->rides) {
+        Spec attached = spec_mul(spec_gather(t->ws.attached, slot), spec_load(t->ws.records.weight, batch->first));
+        spec_scatter(t->ws.attached, slot, attached, m);
+    }
+}
+
+// The ends of rays at a batch of surface vertices, from which `radiance` leaves. Adds what that asks of the rays to their drag.
+static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec radiance, Mask finite, Sink *sink) {
+    if (!t->job->rides) {
+        return;
+    }
+    BorderSurface s = border_surface(t, batch);
+    Mask slides = mi_eq(i_load(t->ws.records.slides + batch->first), i_set(1));
+    Spec gain = spec_zero(), lost = gain;
+    for (Mask left = s.m & mi_lt(i_set(-1), s.medium[0]), mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(s.medium[0], m_first(left));
+        mine = left & mi_eq(s.medium[0], i_set(id));
+        Filling f = medium_filling(t, id, s.p[0], s.d);
+        Spec scattered = border_scattered(t, batch, 0, s.slot, mine);
+        gain = spec_select(mine, spec_add(spec_mul(f.extinction, scattered), f.emission), gain);
+        lost = spec_select(mine, spec_mul(f.extinction, radiance), lost);
+    }
+    Mask m = s.m & finite & m_finite(spec_sum(gain) + spec_sum(lost));
+    for (int c = 0; c < drives(t); c++) {
+        Spec worth = spec_mul(slot_adjoint(t, s.slot, c), s.beta);
+        Float dx = spec_dot(worth, gain), length = spec_dot(worth, lost);
+        dx = f_select(slides, dx - length, dx);
+        SurfaceAdj d = surface_adj_zero();
+        d.p = v3_scale(s.si.ng, dx * s.rcp);
+        d.p = v3_select(m, v3_madd(d.p, f_zero_unless(~slides, -length), s.d), v3_zero());
+        if (t->job->live[batch->group] & LIVE_MOTION) {
+            shape_move_adj(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit, &s.si, &d, sink, m);
+        }
+        rows_scatter(&t->ws.drag, c, s.slot, v3_sub(rows_gather(&t->ws.drag, c, s.slot), d.p), m);
+        forward_flush(t, sink, s.slot, c, m);
+    }
+}
