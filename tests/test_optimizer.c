@@ -133,6 +133,40 @@ static void test_lbfgs_follows_valley(void **unused) {
     free(noisy);
 }
 
+// Estimates that hold near a point alone, each off by an amount of its own: luck in one of them does not end the search.
+static void test_lbfgs_leaps(void **unused) {
+    UNUSED(unused);
+    const double range = 0.2;
+    double *state = calloc((size_t)rey_lbfgs_numbers(WIDE, PAIRS), sizeof *state);
+    assert_non_null(state);
+    double x[WIDE] = {-1.2, 1, -1.2, 1, -1.2, 1}, middle[WIDE], gradient[WIDE], worst = 1;
+    memcpy(middle, x, sizeof x);
+    int steps = 0, estimates = 0;
+    for (; steps < 1000 && worst > 1e-6; steps++) {
+        for (bool inside = false; !inside;) {
+            inside = true;
+            for (int k = 0; k < WIDE; k++) {
+                inside = inside && fabs(x[k] - middle[k]) < range;
+            }
+            if (!inside && rey_lbfgs_leap(state, WIDE, PAIRS, x)) {
+                memcpy(middle, x, sizeof x);
+                estimates++;
+            }
+        }
+        double value = valley(x, 0, gradient) + sin(3 * estimates);
+        rey_lbfgs_step(state, WIDE, PAIRS, value, gradient, x);
+        double best[WIDE];
+        rey_lbfgs_take_best(state, WIDE, best);
+        worst = 0;
+        for (int k = 0; k < WIDE; k++) {
+            worst = fmax(worst, fabs(best[k] - 1));
+        }
+    }
+    assert_in_range(steps, 10, 500);
+    assert_in_range(estimates, 3, steps);
+    free(state);
+}
+
 // Within bounds and with rates of their own; what is found is the best point, not the last trial.
 static void test_lbfgs_keeps_bounds(void **unused) {
     UNUSED(unused);
@@ -266,6 +300,7 @@ int main(void) {
         cmocka_unit_test(test_optimizers_find_minimum),
         cmocka_unit_test(test_average),
         cmocka_unit_test(test_lbfgs_follows_valley),
+        cmocka_unit_test(test_lbfgs_leaps),
         cmocka_unit_test(test_lbfgs_keeps_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

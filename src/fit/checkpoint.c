@@ -1,5 +1,6 @@
 // checkpoint.c: little-endian binary: magic, counts, resolved job, hashes of what it read, history, start and value as floats,
-// variables and moments, averages and the state of L-BFGS as doubles, and a 64-bit FNV-1a hash of everything before it.
+// variables, moments and averages as doubles, reference as floats, the state of L-BFGS as doubles, and a 64-bit FNV-1a hash of
+// everything before it.
 #include "fit/checkpoint.h"
 
 #include "fit/inputs.h"
@@ -8,12 +9,12 @@
 
 #include <string.h>
 
-static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '4'};
+static const char MAGIC[8] = {'R', 'E', 'Y', 'F', 'I', 'T', '0', '5'};
 
 typedef struct CheckpointHeader {
     char magic[8];
     uint64_t job_bytes, input_bytes, numbers, extra, rows, width; // extra: numbers of L-BFGS
-    uint64_t iteration, converged, meshed;
+    uint64_t iteration, converged, meshed, recorded;
     uint64_t job_hash; // of the resolved job
     double seconds;
 } CheckpointHeader;
@@ -31,7 +32,7 @@ typedef struct Part {
     void *data;
     size_t bytes;
 } Part;
-enum { PART_COUNT = 7 };
+enum { PART_COUNT = 8 };
 static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     size_t n = (size_t)u->count;
     parts[0] = (Part){u->start, n * sizeof(float)};
@@ -40,7 +41,8 @@ static void list_parts(const Unknowns *u, Part parts[PART_COUNT]) {
     parts[3] = (Part){u->first, n * sizeof(double)};
     parts[4] = (Part){u->second, n * sizeof(double)};
     parts[5] = (Part){u->average, n * sizeof(double)};
-    parts[6] = (Part){u->lbfgs, (size_t)u->lbfgs_count * sizeof(double)};
+    parts[6] = (Part){u->reference, n * sizeof(float)};
+    parts[7] = (Part){u->lbfgs, (size_t)u->lbfgs_count * sizeof(double)};
 }
 
 static void append(unsigned char *bytes, size_t *at, const void *data, size_t size) {
@@ -72,6 +74,7 @@ rey_result rey_checkpoint_write(const char *path, FitOrigin origin, const Unknow
                                .iteration = (uint64_t)state->iteration,
                                .converged = state->converged,
                                .meshed = (uint64_t)state->meshed,
+                               .recorded = (uint64_t)state->recorded,
                                .job_hash = hash_bytes(origin.flat, job_bytes),
                                .seconds = state->seconds};
     memcpy(header.magic, MAGIC, sizeof MAGIC);
@@ -94,10 +97,10 @@ rey_result rey_checkpoint_write(const char *path, FitOrigin origin, const Unknow
 static bool sizes_agree(const CheckpointHeader *h, size_t size) {
     const uint64_t most = (uint64_t)1 << 40;
     if (h->job_bytes > most || h->input_bytes > most || h->numbers > most ||
-        h->extra > most || h->meshed > most || h->rows > most || h->width > 1 << 20) {
+        h->extra > most || h->meshed > most || h->recorded > h->iteration || h->rows > most || h->width > 1 << 20) {
         return false;
     }
-    uint64_t per_number = 2 * sizeof(float) + 4 * sizeof(double);
+    uint64_t per_number = 3 * sizeof(float) + 4 * sizeof(double);
     uint64_t expected =
         sizeof *h + h->job_bytes + h->input_bytes + h->rows * h->width * sizeof(double) + h->numbers * per_number +
         h->extra * sizeof(double) + sizeof(uint64_t);
@@ -215,6 +218,7 @@ static rey_result decode(const char *path, FitOrigin origin, const unsigned char
     state->seconds = header.seconds;
     state->converged = header.converged != 0;
     state->meshed = (int)header.meshed;
+    state->recorded = (int)header.recorded;
     return REY_OK;
 }
 

@@ -14,6 +14,7 @@ typedef struct FitState {
     Array history;  // doubles, iteration x history_width
     int history_width;
     int meshed;     // 1 + the level whose scene file holds the meshes, 0 = the job's scene does
+    int recorded;   // 1 + the iteration at which the paths at work were recorded, 0 = none are (reuse.h)
     bool converged; // the stop rule has ended the fit
 } FitState;
 

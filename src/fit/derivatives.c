@@ -23,6 +23,7 @@ static rey_result check_view(Fit *fit, int view) {
     rey_render_def def = rey_default_render_def();
     def.sensor = fit->views[view].sensor;
     def.terms = fit->job.terms;
+    def.estimator = fit->job.reuse_within > 0 ? REY_ESTIMATOR_SCORE : REY_ESTIMATOR_PROBE;
     rey_selection all = {fit->unknowns.params, fit->unknowns.param_count};
     if (!all.count || rey_derivative_check(fit->scene, &def, all) == REY_OK) {
         return REY_OK;

@@ -5,6 +5,7 @@
 #include "fit/inputs.h"
 #include "fit/lbfgs.h"
 #include "fit/report.h"
+#include "fit/reuse.h"
 #include "fit/rigid.h"
 #include "io/file.h"
 
@@ -102,7 +103,7 @@ static rey_result resume(Fit *fit) {
     if (!result) {
         result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
     }
-    return result;
+    return result ? result : rey_reuse_resume(fit);
 }
 
 static rey_result allocate(Fit *fit) {
@@ -167,6 +168,9 @@ static rey_result open_fit(Fit *fit) {
         result = hash_inputs(fit);
     }
     if (!result) {
+        result = rey_reuse_open(fit);
+    }
+    if (!result) {
         result = rey_fit_check_derivatives(fit);
     }
     if (!result) {
@@ -205,6 +209,7 @@ static void close_fit(Fit *fit) {
     rey_unknowns_free(&fit->unknowns);
     rey_views_free(fit);
     rey_scene_destroy(fit->scene);
+    rey_scene_destroy(fit->sampling);
     rey_array_free(fit->ctx, &fit->state.history);
     for (int i = 0; i < COUNT_OF(blocks); i++) {
         rey_free(fit->ctx, blocks[i]);
@@ -298,7 +303,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
         result = rey_report_write(fit, out);
     }
     if (judged && !result) {
-        result = wrong ? rey_fail(fit->ctx, judged, "%s", wrong) : judged;
+        result = wrong ? rey_fail(fit->ctx, judged, "%s; what was found is written all the same", wrong) : judged;
     }
     rey_free(fit->ctx, wrong);
     return result;

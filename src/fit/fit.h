@@ -96,6 +96,9 @@ typedef struct Fit {
     char *flat;   // the resolved job
     char *inputs; // hashes of what it read (inputs.h)
     rey_scene *scene;
+    rey_scene *sampling; // whose paths are reused (reuse.h), null = none are
+    double outside, effective; // of the pictures of an iteration at worst: throughput whose weight is out of range, and effective
+                               // samples, both as shares
     Unknowns unknowns;
     FitView *views;
     int level; // at work, -1 = none yet

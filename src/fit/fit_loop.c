@@ -4,9 +4,10 @@
 // With the loss's derivative at one half pulled back through the other, (I_A - R) dI_B + (I_B - R) dI_A, no factor of
 // a product shares noise with the other, so that the gradients of the squared losses are unbiased. With gradient_spp
 // the sum of both derivatives is pulled back through a third set C, (I_A + I_B - 2 R) dI_C; docs/fit.md compares their noise.
-#include "fit/fit.h"
+#include "fit/reuse.h"
 
 #include "base/parallel.h"
+#include "render/replay.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -80,7 +81,7 @@ rey_render_def rey_fit_finishing_def(Fit *fit, const FitView *view, uint32_t set
 static rey_result render_half(Fit *fit, const FitView *view, uint32_t set, int spp, float *image) {
     rey_render_def def = view_def(fit, view, set, spp);
     rey_stats stats = {0};
-    rey_result result = rey_render(fit->scene, &def, image, &stats);
+    rey_result result = fit->sampling ? rey_reuse_render(fit, &def, image, &stats) : rey_render(fit->scene, &def, image, &stats);
     fit->nonfinite += stats.nonfinite;
     return result;
 }
@@ -91,7 +92,10 @@ static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int s
     rey_render_def def = view_def(fit, view, set, spp);
     rey_selection selection = {fit->unknowns.params, fit->unknowns.param_count};
     rey_stats stats = {0};
-    rey_result result = rey_vjp(fit->scene, &def, selection, adjoint, fit->gradient, NULL, &stats);
+    def.estimator = fit->sampling ? REY_ESTIMATOR_SCORE : REY_ESTIMATOR_PROBE;
+    rey_result result = fit->sampling
+                            ? rey_replay_vjp(fit->sampling, fit->scene, &def, selection, adjoint, fit->gradient, &stats)
+                            : rey_vjp(fit->scene, &def, selection, adjoint, fit->gradient, NULL, &stats);
     fit->nonfinite += stats.nonfinite;
     const double *from = fit->gradient;
     for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
@@ -103,17 +107,17 @@ static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int s
     return result;
 }
 
-// Adds one view's share of the gradient; *loss is its loss.
+// Adds one view's share of the gradient; *loss is its loss. Nothing where reused paths turn out to be stale.
 static rey_result add_view(Fit *fit, int index, int batch_count, double *loss) {
     const FitView *view = &fit->views[index];
-    int iteration = fit->state.iteration, spp = rey_job_spp_at(&fit->job, iteration) / 2;
+    int iteration = rey_reuse_iteration(fit), spp = rey_job_spp_at(&fit->job, fit->state.iteration) / 2;
     bool frozen = fit->job.optimizer.kind == OPTIMIZER_LBFGS; // it needs one function, noise included
     uint32_t set_a = frozen ? 0 : 2 * (uint32_t)iteration, set_b = set_a + 1;
     rey_result result = render_half(fit, view, set_a, spp, fit->a);
-    if (!result) {
+    if (!result && !rey_reuse_stale(fit)) {
         result = render_half(fit, view, set_b, spp, fit->b);
     }
-    if (result) {
+    if (result || rey_reuse_stale(fit)) {
         return result;
     }
     double exposure = rey_exposure_of(fit, index, fit->unknowns.value);
@@ -204,24 +208,23 @@ static rey_result check_finite(Fit *fit, double loss, double norm) {
                     "lower the learning rate, which is %g%s", fit->job.path, fit->state.iteration, what, number, rate, kept);
 }
 
-static rey_result iterate(Fit *fit, int *order) {
-    int count = choose_batch(fit, fit->state.iteration, order);
-    rey_result begun = begin_iteration(fit);
-    if (begun) {
-        return begun;
-    }
-    double loss = 0;
+// Gradient and loss of a batch of views; unfinished where reused paths turn out to be stale.
+static rey_result add_views(Fit *fit, const int *order, int count, double *loss) {
     memset(fit->unknowns.gradient, 0, (size_t)fit->unknowns.count * sizeof *fit->unknowns.gradient);
+    *loss = 0;
     bool show = fit->job.image_every && fit->state.iteration % fit->job.image_every == 0;
     bool frame = rey_frame_due(fit, fit->state.iteration);
     for (int k = 0; k < count; k++) {
         const FitView *view = &fit->views[order[k]];
         double part = 0;
         rey_result result = add_view(fit, order[k], count, &part);
-        for (int64_t i = 0; (show || frame) && !result && i < (int64_t)view->width * view->height * 3; i++) {
+        if (result || rey_reuse_stale(fit)) {
+            return result;
+        }
+        for (int64_t i = 0; (show || frame) && i < (int64_t)view->width * view->height * 3; i++) {
             fit->a[i] = 0.5f * (fit->a[i] + fit->b[i]);
         }
-        if (!result && show) {
+        if (show) {
             result = rey_metrics_image(fit, order[k], fit->a);
         }
         if (!result && frame) {
@@ -230,12 +233,32 @@ static rey_result iterate(Fit *fit, int *order) {
         if (result) {
             return result;
         }
-        loss += part;
+        *loss += part;
+    }
+    return REY_OK;
+}
+
+static rey_result iterate(Fit *fit, int *order) {
+    int count = choose_batch(fit, fit->state.iteration, order);
+    double loss = 0;
+    rey_result result = begin_iteration(fit);
+    if (!result) {
+        result = rey_reuse_begin(fit);
+    }
+    if (!result) {
+        result = add_views(fit, order, count, &loss);
+    }
+    while (!result && rey_reuse_stale(fit)) {
+        result = rey_reuse_renew(fit);
+        result = result ? result : add_views(fit, order, count, &loss);
+    }
+    if (result) {
+        return result;
     }
     loss += rey_unknowns_regularise(&fit->unknowns);
     rey_unknowns_hold(&fit->unknowns);
     double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration, loss);
-    rey_result result = check_finite(fit, loss, norm);
+    result = check_finite(fit, loss, norm);
     if (!result) {
         result = add_history(fit, loss, norm);
     }

@@ -256,6 +256,17 @@ static rey_result read_stop(Job *job, const YamlNode *node, void *target) {
     return rey_job_read_map(job, node, "stop", fields, job);
 }
 
+static rey_result read_reuse(Job *job, const YamlNode *node, void *target) {
+    static const Field fields[] = {
+        {.key = "within", .type = FIELD_REAL, .offset = offsetof(Job, reuse_within), .low = 1.001, .high = 1e6, .required = true},
+        {.key = "effective", .type = FIELD_REAL, .offset = offsetof(Job, reuse_effective), .high = 0.999},
+        {0},
+    };
+    UNUSED(target);
+    job->reuse_at = rey_job_place(node);
+    return rey_job_read_map(job, node, "reuse", fields, job);
+}
+
 static rey_result read_terms(Job *job, const YamlNode *node, void *target) {
     const char *text, *wrong;
     rey_result result = rey_job_read_text(job, node, &text);
@@ -289,6 +300,7 @@ static const Field job_fields[] = {
     {.key = "iterations", .type = FIELD_INTEGER, .offset = offsetof(Job, iterations), .high = 1e9},
     {.key = "spp", .type = FIELD_READER, .offset = offsetof(Job, spp), .read = read_spp},
     {.key = "gradient_spp", .type = FIELD_INTEGER, .offset = offsetof(Job, gradient_spp), .high = 65536},
+    {.key = "reuse", .type = FIELD_READER, .read = read_reuse},
     {.key = "levels", .type = FIELD_READER, .offset = offsetof(Job, levels), .read = read_levels},
     {.key = "views", .type = FIELD_READER, .offset = offsetof(Job, views), .read = read_views, .required = true},
     {.key = "views_per_iteration", .type = FIELD_INTEGER, .offset = offsetof(Job, views_per_iteration), .high = 1e9},
@@ -321,6 +333,7 @@ static rey_result set_defaults(Job *job) {
     job->folder = folder;
     job->output = "fit";
     job->iterations = 200;
+    job->reuse_effective = 0.5;
     job->spp[0].spp = 16;
     job->spp_count = 1;
     job->loss = LOSS_RELATIVE_L2;

@@ -112,6 +112,9 @@ typedef struct Job {
     int report_spp;                      // 0 = no report
     JobSpp *spp;
     int spp_count;
+    double reuse_within;    // paths serve several iterations while their weights are within this factor of 1; 0 = each has its own
+    double reuse_effective; // and while they are worth at least this share of as many fresh ones
+    JobPlace reuse_at;
     int gradient_spp; // of samples of their own that pull the loss's derivative back, 0 = the pictures' samples do
     JobLevel *levels; // none = one level of full pictures
     int level_count;

@@ -172,6 +172,10 @@ static void flat_decisive(Text *t, const Job *job) {
         line_integer(t, key, job->spp[i].spp);
     }
     line_integer(t, "gradient_spp", job->gradient_spp);
+    if (job->reuse_within > 0) {
+        line_real(t, "reuse.within", job->reuse_within);
+        line_real(t, "reuse.effective", job->reuse_effective);
+    }
     for (int i = 0; i < job->level_count; i++) {
         snprintf(key, sizeof key, "levels.%d.from", i);
         line_integer(t, key, job->levels[i].from);

@@ -2,7 +2,6 @@
 #include "fit/lbfgs.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
 
 static const double DESCENT = 1e-4, CURVATURE = 0.9; // c1 and c2 of the Wolfe conditions
@@ -10,7 +9,10 @@ static const double SLACK = 1e-3;                    // of the value: what noise
 static const double LEAST_COSINE = 1e-8;             // between s and y of a pair that is kept
 
 // The state: scalars, then vectors of n.
-enum { STARTED, PAIRS, NEXT, VALUE, SLOPE, STEP, LOW, HIGH, TRIALS, SHORTER, SCALARS };
+enum { STARTED, PAIRS, NEXT, VALUE, SLOPE, STEP, LOW, HIGH, FARTHEST, TRIALS, SHORTER, SCALARS };
+// STARTED. LEAPING: the trial's value is another estimate than the best point's. RETURNING: such a trial was no better, and the
+// best point is to be evaluated by the new estimate. HELD: it was, and no trial may leave that one's range before the point moves.
+enum { UNSTARTED, SEARCHING, LEAPING, RETURNING, HELD };
 enum { POSITION, GRADIENT, DIRECTION, VECTORS };
 
 typedef struct Lbfgs {
@@ -95,7 +97,7 @@ static void begin_line(Lbfgs *l, double *x) {
     c[STEP] = c[PAIRS] > 0 ? 1 : INFINITY;
     c[STEP] = size > 0 ? fmin(c[STEP], longest / size) : 0;
     c[LOW] = c[TRIALS] = 0;
-    c[HIGH] = INFINITY;
+    c[HIGH] = c[FARTHEST] = INFINITY;
     memcpy(x, l->position, (size_t)l->n * sizeof *x);
     add(x, c[STEP], l->direction, l->n);
 }
@@ -134,18 +136,25 @@ static void search(Lbfgs *l, double *x) {
 void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const double *gradient, double *x) {
     Lbfgs l = open_state(state, n, memory);
     double *c = l.scalar;
-    if (!(c[STARTED] > 0)) {
-        c[STARTED] = 1;
+    if (c[STARTED] == UNSTARTED || c[STARTED] == RETURNING) {
+        c[STARTED] = c[STARTED] == UNSTARTED ? SEARCHING : HELD;
         accept(&l, value, gradient, x);
         return;
     }
     double slope = dot(l.direction, gradient, n);
     bool descends = value <= c[VALUE] + DESCENT * c[STEP] * c[SLOPE] + SLACK * fabs(c[VALUE]);
-    bool longest = c[STEP] * largest(l.direction, n) > 0.999 * LBFGS_LONGEST; // as far as a step may go
+    // As far as a step may go, or nearly.
+    bool longest = c[STEP] * largest(l.direction, n) > 0.999 * LBFGS_LONGEST || 2 * c[STEP] >= c[FARTHEST];
     bool flat = fabs(slope) <= -CURVATURE * c[SLOPE] || (slope < 0 && longest);
-    bool last = ++c[TRIALS] >= LBFGS_MOST_TRIALS;
-    if (descends && (flat || last)) {
+    bool last = ++c[TRIALS] >= LBFGS_MOST_TRIALS, leaping = c[STARTED] == LEAPING;
+    if (leaping && !descends) {
+        rey_lbfgs_take_best(state, n, x);
+        c[STARTED] = RETURNING;
+        return;
+    }
+    if (descends && (flat || last || leaping)) {
         c[SHORTER] = 0;
+        c[STARTED] = SEARCHING;
         keep_pair(&l, gradient, x);
         accept(&l, value, gradient, x);
         return;
@@ -164,8 +173,20 @@ void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const do
     search(&l, x);
 }
 
+bool rey_lbfgs_leap(double *state, int64_t n, int memory, double *x) {
+    Lbfgs l = open_state(state, n, memory);
+    double *c = l.scalar;
+    if (c[STARTED] == HELD) {
+        c[HIGH] = c[FARTHEST] = c[STEP];
+        search(&l, x);
+        return false;
+    }
+    c[STARTED] = c[STARTED] == SEARCHING ? LEAPING : c[STARTED];
+    return true;
+}
+
 void rey_lbfgs_take_best(const double *state, int64_t n, double *x) {
-    if (state[STARTED] > 0) {
+    if (state[STARTED] != UNSTARTED) {
         memcpy(x, state + SCALARS + POSITION * n, (size_t)n * sizeof *x);
     }
 }

@@ -7,6 +7,7 @@
 // search fails all the same, with a forgotten memory and a shorter step along the gradient.
 #pragma once
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { LBFGS_MOST_TRIALS = 8, LBFGS_LONGEST = 10 }; // of a step: change of a variable, in units
@@ -20,5 +21,9 @@ void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const do
 void rey_lbfgs_take_best(const double *state, int64_t n, double *x);
 // The value there.
 double rey_lbfgs_best_value(const double *state);
+// The function's estimate has a range, which the trial x has left. True: x is to be evaluated by another estimate, whose range
+// is around it, which ends the line search: x is the new best point, or the next step goes back to the old one, to evaluate that
+// by the new estimate. False: that has happened, and x comes nearer to the best point instead.
+bool rey_lbfgs_leap(double *state, int64_t n, int memory, double *x);
 // Forgets everything: the function is another one from here on.
 void rey_lbfgs_forget(double *state);

@@ -104,6 +104,12 @@ rey_result rey_metrics_row(Fit *fit, const int *batch, int batch_count) {
     rey_text_number(&t, row[HISTORY_FACTOR]);
     rey_text_add(&t, ",\"spp\":%d,\"seconds\":", rey_job_spp_at(&fit->job, (int)step));
     rey_text_number(&t, floor(1000 * row[HISTORY_SECONDS]) / 1000);
+    if (fit->sampling) {
+        rey_text_add(&t, ",\"recorded\":%d,\"outside\":", fit->state.recorded - 1);
+        rey_text_number(&t, fit->outside);
+        rey_text_add(&t, ",\"effective\":");
+        rey_text_number(&t, fit->effective);
+    }
     rey_text_add(&t, ",\"views\":[");
     for (int i = 0; i < batch_count; i++) {
         rey_text_add(&t, "%s%d", i ? "," : "", batch[i]);

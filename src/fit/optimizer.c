@@ -328,6 +328,17 @@ void rey_optimizer_restart(const JobOptimizer *o, Unknowns *u) {
     }
 }
 
+bool rey_optimizer_leap(const JobOptimizer *o, Unknowns *u) {
+    if (o->kind != OPTIMIZER_LBFGS) {
+        return true;
+    }
+    scale_by_rates(o, u, u->variable, -1);
+    bool anew = rey_lbfgs_leap(u->lbfgs, u->count, o->memory, u->variable);
+    scale_by_rates(o, u, u->variable, 1);
+    follow_all(u);
+    return anew;
+}
+
 double rey_optimizer_step(const JobOptimizer *o, Unknowns *u, int iteration, double loss) {
     double factor = rey_schedule_factor(&o->schedule, iteration), norm = 0;
     for (size_t k = 0; k < u->media.count; k++) {

@@ -30,6 +30,7 @@ typedef struct Unknowns {
     int param_count;
     int64_t count;          // numbers in all
     float *start, *value;   // as the scene holds them
+    float *reference;       // where the paths at work were recorded (reuse.h)
     double *variable;       // what the optimizer moves: x, log x, or logit of x's place within the bounds
     double *first, *second; // moments; SGD uses the first as its velocity
     double *average;        // of the values over the iterations, see JobOptimizer
@@ -58,5 +59,7 @@ void rey_unknowns_hold(Unknowns *u);
 double rey_optimizer_step(const JobOptimizer *optimizer, Unknowns *u, int iteration, double loss);
 // The loss is another function from here on, or there are no more iterations: L-BFGS goes back to its best point.
 void rey_optimizer_restart(const JobOptimizer *optimizer, Unknowns *u);
+// The loss is not known at the value but by other samples (rey_lbfgs_leap). False: the value has come nearer instead.
+bool rey_optimizer_leap(const JobOptimizer *optimizer, Unknowns *u);
 // Puts the average into value, for good: called when the optimisation is over.
 void rey_unknowns_take_average(Unknowns *u);

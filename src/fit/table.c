@@ -225,6 +225,21 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
     return REY_OK;
 }
 
+// The truth has nothing to compare a row with: so many numbers, 0 = none of this name.
+static void note_uncompared(const Fit *fit, const FitRow *row, int64_t count) {
+    char words[512];
+    if (rey_param_find(fit->scene, row->name) < 0) {
+        return; // exposures are no parameters of scenes
+    }
+    if (count) {
+        snprintf(words, sizeof words, "parameter '%.300s': the truth has %lld numbers there, and not %lld: its error is not known",
+                 row->name, (long long)count, (long long)row->count);
+    } else {
+        snprintf(words, sizeof words, "parameter '%.300s': the truth has none of this name: its error is not known", row->name);
+    }
+    fit->def->note(fit->def->user, words);
+}
+
 static rey_result judge_row(Fit *fit, rey_scene *truth, FitRow *row) {
     int param = rey_param_find(truth, row->name); // none of an exposure's name
     rey_param_info info;
@@ -235,7 +250,8 @@ static rey_result judge_row(Fit *fit, rey_scene *truth, FitRow *row) {
         return judge_mesh(fit, truth, row);
     }
     if (param < 0 || rey_param_get_info(truth, param, &info) || info.count != row->count) {
-        return REY_OK; // nothing to compare with
+        note_uncompared(fit, row, param < 0 ? 0 : info.count);
+        return REY_OK;
     }
     row->truth = copy_floats(fit->ctx, rey_param_values(truth, param), row->count);
     if (!row->truth) {
