@@ -11,6 +11,9 @@
 // Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
 #define PRIMARY_STEP 2e-3f
 
+// How far from their edges vertices in narrow triangles look up textures [of the way to the middle].
+#define PRIMARY_INSET 1e-4f
+
 // Dimensions of its own random numbers; the two paths draw theirs like those of the camera.
 #define DIMENSION_EDGE 0x80000001u
 
@@ -89,13 +92,16 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         Hit hit = trace_closest(t->scene, &ray, own, false);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         t->job->rays += m_count(own);
-        own = own & mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
         if (t->scene->hide_emitters) {
-            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(own, hit.shape, i_set(0)), emitter), i_set(0));
+            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(own, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
         }
-        // Triangles that are seen from their edge are met farther from the point than others.
-        Mask same = (turns | inner) & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other));
-        visible = visible | (own & (same | m_le(f_abs(found - reach), 2e-5f * reach)));
+        Mask same = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
+        Mask here = same & m_le(f_abs(found - reach), 2e-5f * reach);
+        // Triangles that are seen from their edge are met farther from the point than others, and rays to it may slip through between
+        // two of them: what counts is that nothing lies before it.
+        Mask clear = mi_lt(hit.shape, i_set(0)) | m_gt(found, reach * (1.0f - 2e-5f));
+        clear = clear | (same & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other)));
+        visible = visible | (own & ((s->edge.mark & here) | ((turns | inner) & clear)));
     }
     return visible;
 }
@@ -160,9 +166,23 @@ static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t h
     }
 }
 
+// Shading normals at hits times their rays' directions: negative where they face the viewer.
+static Float hits_facing(const SceneView *scene, const Hit *hit, Vec3 d, Mask m) {
+    Float facing = f_set(0);
+    for (Mask left = m; m_any(left);) {
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, hit, &left, &id, &h);
+        const Group *group = scene->groups + id;
+        facing = f_select(mine, v3_dot(shape_interaction(scene, group->shape_kind, group->shape_flags, &h).sh.n, d), facing);
+    }
+    return facing;
+}
+
 // Of meshes with vertex normals, the first vertices of paths k... on one side of their edges (-1, 1: that of n) lie on the edge, in
-// the triangle that is seen there, along the view of it. The band that is dark because its normals turn away may be narrower than
-// the paths' step, as may be the triangle; what lies on the band's other side is for the curve that ends it (facet.h).
+// the triangle that is seen there, along the view of it, where the paths' step went beyond that triangle or beyond the band that is
+// dark because its normals turn away; what lies on the band's other side is for the curve that ends it (facet.h). What textures are
+// there is looked up a little inside: exactly on the edge, one that jumps along it has the same value for both sides.
 static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k, real side, Mask m) {
     const SceneView *scene = t->scene;
     const EdgePoint *e = &s->edge;
@@ -182,12 +202,17 @@ static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k,
     if (!m_any(m)) {
         return;
     }
-    Vec3 n, d = v3_select(m, s->seen.d, record_v3(p->dx, p->dy, p->dz, k));
+    Vec3 n, d = record_v3(p->dx, p->dy, p->dz, k);
     Hit hit = point_hit(scene, i_select(m, e->hit.shape, i_set(-1)), i_select(m, i_select(second, e->other, e->hit.prim), i_set(0)),
                         e->hit.instance, e->p, &n);
-    hit.u = f_clamp(hit.u, f_set(0), f_set(1));
-    hit.v = f_clamp(hit.v, f_set(0), f_set(1));
+    hit.u = f_lerp(f_clamp(hit.u, f_set(0), f_set(1)), f_set(1.0f / 3), f_set(PRIMARY_INSET));
+    hit.v = f_lerp(f_clamp(hit.v, f_set(0), f_set(1)), f_set(1.0f / 3), f_set(PRIMARY_INSET));
+    Mask inside = m & mi_eq(met.shape, hit.shape) & mi_eq(met.prim, hit.prim) & mi_eq(met.instance, hit.instance);
+    if (m_any(inside)) {
+        m = m & ~(inside & m_gt(hits_facing(scene, &met, d, inside) * hits_facing(scene, &hit, s->seen.d, inside), f_set(0)));
+    }
     met = hit_select(m, &hit, &met);
+    d = v3_select(m, s->seen.d, d);
     hit_store(t, k, &met);
     f_store(p->dx + k, d.x);
     f_store(p->dy + k, d.y);
