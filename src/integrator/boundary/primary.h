@@ -97,8 +97,8 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
         }
         Mask same = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
         Mask here = same & m_le(f_abs(found - reach), 2e-5f * reach);
-        // Triangles that are seen from their edge are met farther from the point than others, and rays to it may slip through between
-        // two of them: what counts is that nothing lies before it.
+        // Triangles that are seen from their edge are met farther from the point than others, and rays to it may slip through
+        // between two of them: what counts is that nothing lies before it.
         Mask clear = mi_lt(hit.shape, i_set(0)) | m_gt(found, reach * (1.0f - 2e-5f));
         clear = clear | (same & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other)));
         visible = visible | (own & ((s->edge.mark & here) | ((turns | inner) & clear)));
