@@ -106,8 +106,51 @@ static void test_rough_plastic(void **state) {
     check("roughplastic", 1, "alpha", 0.7);
 }
 
+// Normals that are drawn next to the critical angle have that density also when the digits of c are lost.
+static void test_digits(void **state) {
+    UNUSED(state);
+    enum { N = 4096 };
+    static const KindKernels *const widths[] = {&kind_kernels_w1, &kind_kernels_w8, &kind_kernels_w16};
+    static Draw d[N];
+    static Query q[N];
+    static double f[N][3], pdf[N];
+    const double eta = 1.5, floor = 0.05, least = floor / (8 * pi) * eta * eta / 0.01;
+    Random r = {7};
+    KindCase c;
+    case_make(&c, &r, rey_bsdf_kind_find("roughdielectric"), 0, false);
+    case_set(&c, "alpha_u", 0.1);
+    case_set(&c, "alpha_v", 0.1);
+    case_set(&c, "eta", eta);
+    c.floor = floor;
+    for (int w = 0; w < 3; w++) {
+        int counted = 0;
+        for (int i = 0; i < N; i++) {
+            double sine = 0.2 + 0.7 * uniform(&r), turn = 2 * pi * uniform(&r);
+            d[i] = (Draw){.wi = {sine * cos(turn), sine * sin(turn), -sqrt(1 - sine * sine)}, .u1 = 0.02,
+                          .u2 = {pow(10, -1.5 - 2.2 * uniform(&r)), uniform(&r)}};
+        }
+        widths[w]->sample(&c, N, d);
+        for (int i = 0; i < N; i++) {
+            q[i] = (Query){.lobe = d[i].lobe};
+            memcpy(q[i].wi, d[i].wi, sizeof q[i].wi);
+            memcpy(q[i].wo, d[i].wo, sizeof q[i].wo);
+        }
+        widths[w]->eval(&c, N, q, f, pdf);
+        for (int i = 0; i < N; i++) { // c < 0.01 and |a| = |b| where all but the least is mirrored
+            bool mirrored = d[i].wo[2] < -1e-3 && d[i].u2[0] < 0.01;
+            counted += mirrored;
+            if (mirrored && !(pdf[i] > 0.8 * least)) {
+                fail_msg("u = %g, wi = (%g, %g, %g): density %g, at least %g is expected", d[i].u2[0], d[i].wi[0], d[i].wi[1],
+                         d[i].wi[2], pdf[i], least);
+            }
+        }
+        assert_true(counted > N / 4);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_rough_dielectric), cmocka_unit_test(test_principled),
-                                       cmocka_unit_test(test_rough_plastic)};
+                                       cmocka_unit_test(test_rough_plastic),
+                                       cmocka_unit_test(test_digits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
