@@ -17,7 +17,7 @@ import scenes
 REPEATS = 3
 SPP = 16
 FOLDER = "build/bench"
-ROWS = ("primal", "equal_error", "gradients", "cold", "loading")
+ROWS = ("primal", "equal_error", "gradients", "albedos", "cold", "loading")
 parser = argparse.ArgumentParser()
 parser.add_argument("--rows", default=",".join(ROWS))
 parser.add_argument("reynolds", nargs="?", default="build/bin/reynolds")
@@ -137,10 +137,15 @@ class Pair:
         mine = statistics.median(r["seconds"] for r, _ in results) * statistics.mean(error(i, reference) for _, i in results)
         self.row("1 / (error x time)", 1 / theirs, 1 / mine)
 
-    def gradients(self):
+    def albedos(self):
+        """All albedos of the box around the mesh."""
+        if self.name == "box+70k":
+            self.gradients([c + ".reflectance.value" for c in ("white", "red", "green")], "three albedos: ")
+
+    def gradients(self, of=None, prefix=""):
         mi, dr = self.mi, self.dr
         parameters = mi.traverse(self.loaded)
-        keys = [k for k in self.scene.parameters if k in parameters]
+        keys = [k for k in of or self.scene.parameters if k in parameters]
         kind = "ptracer" if self.name == "particles" else "prbvolpath" if self.name in ("cloud", "fog") else "prb"
         integrator = mi.load_dict({"type": kind, "max_depth": self.scene.depth, "rr_depth": self.scene.rr_depth})
         for k in keys:
@@ -176,12 +181,12 @@ class Pair:
         grads = [reynolds("grad", self.scene.path, *arguments) for _ in range(REPEATS)]
         mine = statistics.median(paths / g["seconds"] for g in grads)
         picture = statistics.median(paths / self.ours(SPP, s)[0]["seconds"] for s in range(REPEATS))
-        self.row("reverse, adjoint given [Mpaths/s]", paths / best(backward), reverse)
-        self.row("picture, then reverse [Mpaths/s]", paths / best(both), 1 / (1 / picture + 1 / reverse))
+        self.row(prefix + "reverse, adjoint given [Mpaths/s]", paths / best(backward), reverse)
+        self.row(prefix + "picture, then reverse [Mpaths/s]", paths / best(both), 1 / (1 / picture + 1 / reverse))
         try:
-            self.row("forward [Mpaths/s]", paths / best(forward), mine)
+            self.row(prefix + "forward [Mpaths/s]", paths / best(forward), mine)
         except RuntimeError as failure: # its plugins that prepare tables from a parameter know no forward mode in `prb`
-            print(ROW % (self.name, "forward [Mpaths/s]", "fails", "%.2f" % mine, ""), str(failure).splitlines()[0])
+            print(ROW % (self.name, prefix + "forward [Mpaths/s]", "fails", "%.2f" % mine, ""), str(failure).splitlines()[0])
         for k in keys:
             dr.disable_grad(parameters[k])
 
