@@ -301,8 +301,10 @@ static rey_result accel_create(rey_scene *scene) {
     scene->accel_free = accel_free;
     scene->embree_device = rtcNewDevice(options);
     if (!scene->embree_device) {
-        return rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the ray tracer (Embree) could not be started, error %d",
-                        (int)rtcGetDeviceError(NULL));
+        int error = (int)rtcGetDeviceError(NULL);
+        bool memory = error == RTC_ERROR_OUT_OF_MEMORY;
+        return rey_fail(scene->ctx, memory ? REY_ERROR_MEMORY : REY_ERROR_UNSUPPORTED,
+                        "the ray tracer (Embree) could not be started, error %d%s", error, memory ? ": out of memory" : "");
     }
     scene->view.embree = rtcNewScene(scene->embree_device);
     if (!scene->view.embree) {

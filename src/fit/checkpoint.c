@@ -178,7 +178,9 @@ static rey_result read_header(rey_context *ctx, const char *path, const unsigned
     memcpy(header, bytes, sizeof *header);
     memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
     if (!sizes_agree(header, size) || hash != hash_bytes(bytes, size - sizeof hash)) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: damaged checkpoint", path);
+        return rey_fail(ctx, REY_ERROR_FORMAT,
+                        "%s: damaged checkpoint: its %zu bytes are not those that were written; --overwrite starts anew",
+                        path, size);
     }
     return REY_OK;
 }
