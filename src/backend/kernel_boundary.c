@@ -89,8 +89,8 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Tracer t = {.job = &job, .scene = job.scene, .deciding = job.scene, .sensor = job.scene->sensors + job.sensor};
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
     bool turns = boundary_is_terminator(b->kind) || boundary_is_horizon(b->kind);
-    bool segments = turns || b->kind == BOUNDARY_INDIRECT || b->kind == BOUNDARY_CHAINED;
-    Indirect in = {.t = &t, .b = b, .upstream = b->chains && segments};
+    bool segments = turns || b->kind == BOUNDARY_INDIRECT || boundary_is_paired(b->kind);
+    Indirect in = {.t = &t, .b = b, .upstream = (b->chains || b->job.rides) && segments};
     bytes += segments_layout(&in.q, (char *)job.workspace + bytes);
     int32_t *kept = (int32_t *)((char *)job.workspace + bytes), *begin = kept + CHUNK + 2 * LANES;
     FilterTable filter;

@@ -24,7 +24,8 @@ KFN Int medium_behind(const Group *group, Vec3 ng, Vec3 d, Int medium) {
 
 KFN Track track_of(const Tracer *t, int32_t medium) {
     const MediumNode *node = t->scene->media + medium;
-    return (Track){t->deciding, t->scene, node, t->scene->volumes + node->sigma_t, t->job->moved != NULL, !t->job->moved};
+    return (Track){t->deciding, t->scene, node, t->scene->volumes + node->sigma_t, t->job->moved != NULL, !t->job->moved,
+                   t->focus};
 }
 
 // What a shadow ray needs to know of media.

@@ -292,6 +292,20 @@ static void fork_store(Tracer *t, int32_t count) {
     }
 }
 
+// The same in media: which paths collide first. All that they bring is theirs.
+static void fork_air(Tracer *t) {
+    const Paths *p = &t->ws.paths[t->current];
+    for (int c = 0; c < SPEC_N; c++) {
+        memset(t->fork->base[c], 0, CHUNK * sizeof(real));
+    }
+    memset(t->fork->chained, 0, CHUNK * sizeof(int32_t));
+    for (int32_t k = 0; k < t->active; k += LANES) {
+        Mask m = m_first_n(t->active - k);
+        i_scatter(t->fork->chained, i_select(m, i_load(p->slot + k), i_set(0)), i_set(1),
+                  m & mi_lt(i_set((int32_t)t->scene->groups_count), i_load(t->ws.hit_group + k)));
+    }
+}
+
 // Runs the chunk's paths to their ends. begin: scratch of the number of groups and media, and 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
@@ -309,6 +323,9 @@ static void path_forward(Tracer *t, int32_t *begin) {
         }
         if (scene->has_media) {
             flight_stage(t, begin, bounce);
+            if (t->fork && bounce == t->first_bounce) {
+                fork_air(t);
+            }
         }
         sort_stage(t, begin, groups);
         t->shadow_count = 0;
@@ -330,7 +347,7 @@ static void path_forward(Tracer *t, int32_t *begin) {
             rung_store(t, bounce - t->first_bounce);
         }
         shadow_stage(t, bounce);
-        if (t->fork && bounce == t->first_bounce) {
+        if (t->fork && bounce == t->first_bounce && !scene->has_media) {
             fork_store(t, next_count);
         }
         t->current = 1 - t->current;

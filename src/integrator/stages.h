@@ -52,6 +52,7 @@ typedef struct Tracer {
     bool local;              // of surfaces nothing is recorded but what materials ask for
     bool shadows_later;      // shadow rays are traced by the sweep, which must know what they pass
     real *nudge[2];          // per slot, what is added to the uv of those; or null
+    const Vec3 *focus;       // where particles are to be seen from (track.h), or null
     bool overflow;           // the chunk's vertices did not fit the records
     int32_t most;            // paths of the next chunk
 } Tracer;

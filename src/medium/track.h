@@ -21,6 +21,7 @@ typedef struct Track {
     const VolumeNode *sigma_t;
     bool padded;
     bool roulette; // walks whose transmittance is small end by chance, and those that go on count more
+    const Vec3 *focus; // half of the collisions in homogeneous media are looked for near this point of the world; or null
 } Track;
 
 // Transmittances below this play roulette.
@@ -131,24 +132,83 @@ typedef struct Flight {
     Mask real;   // lanes that collided
 } Flight;
 
+KFN Float uniform_choice(Spec sigma, Spec importance, Float u) {
+    Float chosen = sigma.c[0], sum = importance.c[0];
+    for (int c = 1; c < SPEC_N; c++) {
+        chosen = f_select(m_ge(u, sum), sigma.c[c], chosen);
+        sum = sum + importance.c[c];
+    }
+    return chosen;
+}
+
+KFN Float uniform_distance(Float u, Float sigma) { return -f_log(1.0f - u) * f_safe_rcp(sigma); }
+
 // A channel is chosen by importance, and the distance by its extinction; what happens is weighed against all channels.
 static NOINLINE Flight uniform_flight(const Track *track, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                       uint32_t dimension) {
     Vec2 u = rng_2d(key, dimension);
     Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
-    Float chosen = sigma.c[0], sum = importance.c[0];
-    for (int c = 1; c < SPEC_N; c++) {
-        chosen = f_select(m_ge(u.y, sum), sigma.c[c], chosen);
-        sum = sum + importance.c[c];
-    }
+    Float chosen = uniform_choice(sigma, importance, u.y), t = uniform_distance(u.x, chosen);
     Flight flight;
-    Float t = -f_log(1.0f - u.x) * f_safe_rcp(chosen);
     flight.real = m & m_gt(chosen, f_set(0)) & m_lt(t, tmax);
     flight.t = f_select(flight.real, t, tmax);
     Spec passed = uniform_transmittance(sigma, flight.t), density = spec_select(flight.real, spec_mul(sigma, passed), passed);
     passed = uniform_transmittance(value, flight.t);
     Spec what = spec_select(flight.real, spec_mul(value, passed), passed);
     flight.weight = spec_scale(what, f_safe_rcp(spec_dot(importance, density)));
+    return flight;
+}
+
+// Distances along a ray whose density falls with the square of the distance from a point [kulla2012, section 4.1]: the angles at
+// which the point sees them are uniform.
+typedef struct Focus {
+    Float along, across; // from the ray's origin to the point
+    Float first, angle;  // that at which it sees the ray begin, and what the ray spans
+} Focus;
+
+KFN Focus focus_look(Vec3 point, Vec3 o, Vec3 d, Float tmax) {
+    Vec3 to = v3_sub(point, o);
+    Focus f = {.along = v3_dot(to, d)};
+    f.across = f_max(v3_length(v3_madd(to, -f.along, d)), f_set(1e-5f));
+    f.first = f_atan2(-f.along, f.across);
+    Mask ends = m_finite(tmax);
+    Float length = f_select(ends, tmax, f_set(1));
+    // The difference of two angles would lose its digits.
+    f.angle = f_atan2(f.across * length, f.across * f.across - f.along * (length - f.along));
+    f.angle = f_select(ends, f.angle, 0.5f * PI - f.first);
+    return f;
+}
+
+KFN Float focus_distance(const Focus *f, Float u) {
+    Float s, c;
+    f_sincos(f->first + u * f->angle, &s, &c);
+    return f->along + f->across * s * f_safe_rcp(f_max(c, f_set(1e-6f)));
+}
+
+KFN Float focus_density(const Focus *f, Float t) {
+    Float beside = t - f->along;
+    return f->across * f_safe_rcp(f->angle * (f->across * f->across + beside * beside));
+}
+
+// As uniform_flight; half as many collisions as there are anyway are looked for near the focus, and weighed by both densities.
+static NOINLINE Flight focused_flight(const Track *track, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m,
+                                      const SampleKey *key, uint32_t dimension) {
+    Vec2 u = rng_2d(key, dimension);
+    Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
+    Float chosen = uniform_choice(sigma, importance, u.y);
+    Focus focus = focus_look(*track->focus, o, d, tmax);
+    Float share = 0.5f - 0.5f * spec_dot(importance, uniform_transmittance(sigma, tmax)), rest = 1.0f - share;
+    Mask near = m_lt(u.x, share);
+    Float t = uniform_distance((u.x - share) * f_safe_rcp(rest), chosen);
+    Flight flight;
+    flight.real = m & (near | (m_gt(chosen, f_set(0)) & m_lt(t, tmax)));
+    t = f_select(near, f_max(focus_distance(&focus, u.x * f_safe_rcp(share)), f_set(0)), t);
+    flight.t = f_select(flight.real, f_min(t, tmax), tmax);
+    Spec passed = uniform_transmittance(sigma, flight.t);
+    Float collided = rest * spec_dot(importance, spec_mul(sigma, passed)) + share * focus_density(&focus, flight.t);
+    Float density = f_select(flight.real, collided, rest * spec_dot(importance, passed));
+    passed = uniform_transmittance(value, flight.t);
+    flight.weight = spec_scale(spec_select(flight.real, spec_mul(value, passed), passed), f_safe_rcp(density));
     return flight;
 }
 
@@ -181,7 +241,8 @@ static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, M
 static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                     uint32_t dimension) {
     if (track_is_uniform(t)) {
-        return uniform_flight(t, d, tmax, importance, m, key, dimension);
+        return t->focus ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
+                        : uniform_flight(t, d, tmax, importance, m, key, dimension);
     }
     SampleKey random = *key;
     random.sobol = false;

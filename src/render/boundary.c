@@ -86,8 +86,9 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
     return true;
 }
 
-// Chains may see all curves along which surfaces, and borders of light, pass through each other, also those that stand still.
-static rey_result check_meetings(rey_scene *scene) {
+// Chains, and collisions that ride along with surfaces, may see all curves along which surfaces, and borders of light, pass
+// through each other, also those that stand still.
+static rey_result check_meetings(rey_scene *scene, int term) {
     Array meetings = {0};
     rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
     if (result == REY_OK && meetings.count > 0) {
@@ -98,10 +99,29 @@ static rey_result check_meetings(rey_scene *scene) {
         }
         snprintf(text, sizeof text, "the curves along which surfaces pass through each other, as '%s' and '%s' do", names[0],
                  names[1]);
-        result = refuse(scene, REY_TERM_SPECULAR, text, NULL);
+        result = refuse(scene, term, text, NULL);
     }
     rey_array_free(scene->ctx, &meetings);
     return result;
+}
+
+// Where surfaces move in media: curves where shading normals turn away, as collisions see them.
+static rey_result check_rides(rey_scene *scene, int term) {
+    const SceneView *view = &scene->view;
+    char name[OBJECT_NAME];
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        if (view->shapes[i].kind == SHAPE_MESH && (view->shapes[i].flags & SHAPE_HAS_NORMALS)) {
+            rey_name_shape(scene, (int32_t)i, name);
+            return refuse(scene, term, "where, in participating media, normals of vertices turn away from what sees them", name);
+        }
+    }
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        if (rey_bsdf_turns(view->bsdfs[i].kind)) {
+            rey_name_bsdf(scene, (int32_t)i, name);
+            return refuse(scene, term, "where, in participating media, normals of maps turn away from what sees them", name);
+        }
+    }
+    return check_meetings(scene, term);
 }
 
 // Whether lines of textures that a selection moves over their surfaces are known.
@@ -181,7 +201,7 @@ static rey_result boundary_check(const Render *r, int term) {
                           name);
         }
     }
-    return term == REY_TERM_SPECULAR ? check_meetings(scene) : REY_OK;
+    return r->job.rides ? check_rides(scene, term) : term == REY_TERM_SPECULAR ? check_meetings(scene, term) : REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {
@@ -218,7 +238,7 @@ static int64_t sample_count(const Render *r, int32_t kind) {
     static const int64_t share[BOUNDARY_KINDS] = {[BOUNDARY_PRIMARY] = 4, [BOUNDARY_INDIRECT] = 1,
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
                                                   [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
-                                                  [BOUNDARY_LINES] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
+                                                  [BOUNDARY_LINES] = 1, [BOUNDARY_RIDING] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
                                                   [BOUNDARY_CHAINED_HORIZON] = 4};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
@@ -255,8 +275,10 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
         plan->films = rey_alloc_array(ctx, (size_t)plan->film.tile_floats * BOUNDARY_SHARDS, sizeof(double));
         result = plan->films ? REY_OK : REY_ERROR_MEMORY;
     }
-    // In media only silhouettes are known, and what else there is does not depend on lights.
-    int32_t edge_count = r->scene->view.has_media && kind != BOUNDARY_INDIRECT ? 0 : plan->job.edge_count;
+    // In media only edges are known; what else there is does not depend on lights, and is refused where surfaces move.
+    bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || (rides && kind == BOUNDARY_PRIMARY);
+    bool riding = kind == BOUNDARY_RIDING;
+    int32_t edge_count = (riding ? rides : !r->scene->view.has_media || known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
     }

@@ -396,6 +396,9 @@ static bool ends_at_normals(const SceneView *view, const ShapeRecord *shape) {
     return shape->emitter >= 0 || !rey_bsdf_refracts(view->bsdfs[shape->bsdf].kind);
 }
 
+// Collisions see lights beside what they light, which is that much darker or so.
+#define RIDING_GLOW 8
+
 // May cut the edge to what the film sees.
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
@@ -414,7 +417,8 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if ((w->kind == BOUNDARY_CUT) != (e->kind == EDGE_CUT)) {
         return 0;
     }
-    bool marks = w->kind == BOUNDARY_PRIMARY || w->kind == BOUNDARY_CHAINED;
+    factor *= w->kind == BOUNDARY_RIDING && view->shapes[e->shape].emitter >= 0 ? RIDING_GLOW : 1;
+    bool marks = w->kind == BOUNDARY_PRIMARY || boundary_is_paired(w->kind);
     if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || (e->kind == EDGE_MARK && !marks))) {
         return 0;
     }
@@ -455,10 +459,10 @@ static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan,
     return result;
 }
 
-// Whether lines of textures on a shape matter: along chains, what moves shows them also where they stand still.
+// Whether lines of textures on a shape matter: along chains and from collisions, what moves shows them also where they stand still.
 static bool seen_moving(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
-    return (r->terms & REY_TERM_SPECULAR) || moves_on_film(r, id, instance);
+    return (r->terms & REY_TERM_SPECULAR) || r->job.rides || moves_on_film(r, id, instance);
 }
 
 static rey_result find_edges(Render *r) {

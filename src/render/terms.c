@@ -46,9 +46,6 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     const int still = REY_TERM_INTERIOR | REY_TERM_TERMINATOR; // the latter is looked for on the way
     if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) {
         bool known = rey_motion_known(scene, scene->view.sensors + def->sensor, p);
-        if (known && scene->view.has_media && p->camera < 0 && !rey_moves_border(&scene->view, p)) {
-            return still;
-        }
         return known ? still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains : 0;
     }
     if (p->normals >= 0) {
@@ -127,14 +124,14 @@ static const char *gap_of_rides(const SceneView *view) {
         if (rey_bsdf_opens(kind) || rey_bsdf_bends(kind)) {
             return "in scenes with participating media, what moves changes the ways through surfaces that let light pass and those "
                    "along smooth mirrors and glass. Known are volumes, surfaces of the kind 'null', at which media end, lights, "
-                   "and, by --terms interior, what moves among surfaces that all scatter";
+                   "and what moves among surfaces that all scatter";
         }
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         const MediumNode *medium = view->media + i;
         if (medium->bounded || medium->flakes >= 0 || medium->emission >= 0) {
             return "in media that vary, glow or are made of flakes, collisions that move with surfaces look them up elsewhere. "
-                   "Known, by --terms interior, is what moves in homogeneous media that do neither";
+                   "Known is what moves in homogeneous media that do neither";
         }
     }
     return phases_read_volumes(view) ? "collisions that move with surfaces look up volumes of phase functions elsewhere" : NULL;

@@ -118,7 +118,7 @@ static void run_track(const MediaCase *c, int n, MediaRay *r) {
         }
         SampleKey key = {.pixel = u_set(0), .sample = (UInt)i_load(samples), .scramble = 7, .sobol = false};
         Mask m = m_first_n(n - first);
-        Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false, true};
+        Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false, true, NULL};
         Spec transmittance = track_transmittance(&track, o, d, tmax, m, &key, 0);
         Spec even = spec_set(f_set((real)1 / SPEC_N));
         Flight flight = track_flight(&track, o, d, tmax, even, m, &key, 1u << 20);

@@ -8,8 +8,8 @@
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
 // along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); the planes
-// at which maps cut light off (turning.h); and lines of textures that move over their surfaces (lines.h). CHAINED_TERMINATOR and
-// CHAINED_HORIZON are those of turning.h along such chains.
+// at which maps cut light off (turning.h); lines of textures that move over their surfaces (lines.h); and edges as collisions see
+// them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -22,6 +22,7 @@ enum {
     BOUNDARY_LINES,
     BOUNDARY_CHAINED_TERMINATOR,
     BOUNDARY_CHAINED_HORIZON,
+    BOUNDARY_RIDING,
     BOUNDARY_KINDS
 };
 
@@ -48,14 +49,17 @@ typedef struct BoundaryJob {
 } BoundaryJob;
 
 // Kinds of turning.h: curves on which n . w = 0, n the shading normal of what is seen along w, or the geometric normal of what
-// looks along it; and those whose segments are pieces of chains, or begin one.
+// looks along it; those whose segments keep their directions, as pieces of chains or because they begin one; and those of them
+// that compare what is seen on both sides of edges.
 static inline bool boundary_is_terminator(int32_t kind) {
     return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR;
 }
 static inline bool boundary_is_horizon(int32_t kind) { return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON; }
 static inline bool boundary_is_chained(int32_t kind) {
-    return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON;
+    return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING || kind == BOUNDARY_CHAINED_TERMINATOR ||
+           kind == BOUNDARY_CHAINED_HORIZON;
 }
+static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
 
 // Samples of one number of a `pixel` of their random numbers.
 enum { BOUNDARY_PER_SET = 1 << 24 };

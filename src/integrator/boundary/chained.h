@@ -24,22 +24,24 @@ KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, int side) {
     return (Ray){o, d, f_set(INFINITY)};
 }
 
-// Finds the near points of segments in any direction, and keeps those that meet the edge between its surfaces.
-static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+// Where rays from the edge begin, out of the way of its surfaces: beside silhouettes, and towards the viewer where there are two.
+KFN Vec3 chained_offset(const Segment *s) {
     const EdgePoint *e = &s->edge;
     Float step = (1.0f + f_max(f_max(f_abs(e->p.x), f_abs(e->p.y)), f_abs(e->p.z))) * 9e-5f;
-    // Out of the way of the edge's surfaces: beside silhouettes, and towards the viewer where there are two.
-    Vec3 o = v3_select(s->silhouette, v3_madd(e->p, step, s->n), v3_madd(e->p, -4.0f * step, s->d));
-    Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
-    t->job->rays += m_count(s->m);
-    Hit near = trace_closest(t->scene, &back, s->m, false);
-    Mask m = s->m & mi_lt(i_set(-1), near.shape);
-    if (!m_any(m)) {
-        return;
-    }
-    Float behind = f_select(m, v3_length(v3_sub(near.p, e->p)), f_set(1));
-    Ray rays[2] = {chained_ray(e->p, s->d, s->n, behind, 0), chained_ray(e->p, s->d, s->n, behind, 1)};
-    m = edge_between(t, e, s->silhouette, s->n, rays, m);
+    return v3_select(s->silhouette, v3_madd(e->p, step, s->n), v3_madd(e->p, -4.0f * step, s->d));
+}
+
+// Lanes of m from whose near points rays meet the edge between its surfaces.
+static Mask chained_between(Tracer *t, const Segment *s, Vec3 near, Mask m, Float *behind) {
+    const EdgePoint *e = &s->edge;
+    *behind = f_select(m, v3_length(v3_sub(near, e->p)), f_set(1));
+    Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, 0), chained_ray(e->p, s->d, s->n, *behind, 1)};
+    return edge_between(t, e, s->silhouette, s->n, rays, m);
+}
+
+// Stores the segments of m, in any direction.
+static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind, Int number, Segments *q, Mask m) {
+    const EdgePoint *e = &s->edge;
     int32_t at = q->count;
     v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
     v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
@@ -49,19 +51,34 @@ static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) 
     i_compress(q->lit + at, i_select(s->silhouette, i_set(0), i_set(SEGMENT_CREASE)), m);
     i_compress(q->source + at, i_set(-1), m);
     i_compress(q->number + at, number, m);
-    Hit none = near;
+    f_compress(q->along + at, f_set(0), m);
+    Hit none = *near;
     none.shape = i_set(-1);
-    KEEP_HIT(q, at, near, &near, near.p, m);
+    KEEP_HIT(q, at, near, near, near->p, m);
     KEEP_HIT(q, at, edge, &e->hit, e->p, m);
     KEEP_HIT(q, at, far, &none, e->p, m);
     q->count += m_count(m);
+}
+
+// Finds the near points of segments in any direction, and keeps those that meet the edge between its surfaces.
+static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+    Vec3 o = chained_offset(s);
+    Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
+    t->job->rays += m_count(s->m);
+    Hit near = trace_closest(t->scene, &back, s->m, false);
+    Mask m = s->m & mi_lt(i_set(-1), near.shape);
+    if (m_any(m)) {
+        Float behind;
+        m = chained_between(t, s, near.p, m, &behind);
+        chained_keep(s, o, &near, behind, number, q, m);
+    }
 }
 
 // As segments_find. No chain ends on a light at a point or of one direction.
 static void chained_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        SegmentTurn turn = segment_turn(t->scene, first + i);
+        SegmentTurn turn = segment_turn(t, b->kind, first + i);
         if (!turn.indirect) {
             return;
         }
@@ -91,6 +108,10 @@ static void chained_start(Tracer *t, const Segments *q, int32_t half) {
             Ray ray = chained_ray(p, d, n, real_gather(q->behind, at), 1 - side);
             ray.tmax = f_zero_unless(m, ray.tmax);
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
+            if (t->scene->has_media) { // what lies before the edge is on both sides the same
+                f_store(t->ws.paths[0].skip + (side * half + k), real_gather(q->behind, at) * -0.5f);
+                i_store(t->ws.paths[0].medium + (side * half + k), i_gather(q->around, at));
+            }
         }
     }
     t->active = 2 * half;

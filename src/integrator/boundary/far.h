@@ -1,9 +1,9 @@
 // far.h: what comes along boundary segments from their far sides: paths that begin there, by their number of segments.
 #pragma once
 
-#include "integrator/boundary/chained.h"
 #include "integrator/boundary/lines.h"
 #include "integrator/boundary/meeting.h"
+#include "integrator/boundary/riding.h"
 #include "integrator/film.h"
 
 typedef struct Indirect {
@@ -37,6 +37,9 @@ static void far_start(Tracer *t, const Segments *q) {
         Int slot = i_select(m, i_load(slots + k), i_set(slots[k]));
         Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
         path_begin(t, k, slot, &ray, f_set(1));
+        if (t->scene->has_media) {
+            i_store(t->ws.paths[0].medium + k, i_gather(q->around, slot));
+        }
     }
     t->active = n;
 }
@@ -53,7 +56,7 @@ static void far_paths(Indirect *in, int32_t *begin) {
         meetings_start(t, q);
     } else if (kind == BOUNDARY_LINES) {
         lines_start(t, q, far_half(q));
-    } else if (kind == BOUNDARY_CHAINED) {
+    } else if (boundary_is_paired(kind)) {
         chained_start(t, q, far_half(q));
     } else {
         far_start(t, q);
@@ -70,7 +73,7 @@ static void far_paths(Indirect *in, int32_t *begin) {
     t->rungs_kept = 0;
     t->rung_count = depth > 0 && depth <= MOST_RUNGS ? depth - 1 : 1;
     for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
-        memset(q->rungs[i], 0, (size_t)(t->placed || kind == BOUNDARY_CHAINED ? 2 * far_half(q) : q->count) * sizeof(real));
+        memset(q->rungs[i], 0, (size_t)(t->placed || boundary_is_paired(kind) ? 2 * far_half(q) : q->count) * sizeof(real));
     }
     t->job->paths += t->active;
     if (in->upstream) {

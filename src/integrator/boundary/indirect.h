@@ -3,7 +3,7 @@
 // comes, by its number of segments; a particle on the near side carries it to the sensor. In reverse mode the particle
 // gathers what the film's adjoint makes of it, at its first vertex and at the others: the first one slides over its
 // surface, because the film position is fixed.
-// Edges along chains of smooth mirrors and glass (chained.h) take the same way.
+// Edges along chains of smooth mirrors and glass (chained.h), and as collisions see them (riding.h), take the same way.
 // What the camera sees of this in mirrors and through glass: glimpse.h.
 // NOT differentiated: edges of surfaces that let light pass.
 #pragma once
@@ -58,6 +58,9 @@ KFN Mask near_reaches(const Tracer *t, const Vertex *v) {
     return depth < 0 ? v->m : v->m & mi_lt(v->depth + 1, i_set(depth));
 }
 
+// Jumps have either sign.
+KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }
+
 // Connects vertices to the sensor, as light tracing does (particle.h).
 static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Tracer *t = in->t;
@@ -73,8 +76,7 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
     Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * sight.density;
     Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
-    Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); // jumps have either sign
-    m = m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
+    m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
     if (t->scene->has_media) {
         m = near_clear(in, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
@@ -98,11 +100,16 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Collision c = collision_look(t, medium, &v.hit, v.d);
     Mask m = v.m & sight.valid & m_ge(sight.x, f_set((real)job->x)) & m_lt(sight.x, f_set((real)(job->x + job->width))) &
              m_ge(sight.y, f_set((real)job->y)) & m_lt(sight.y, f_set((real)(job->y + job->height)));
+    if (bounce == 0 && in->b->kind == BOUNDARY_RIDING) { // of any direction, only those that are looked for are seen
+        Mask sighted = mi_eq(i_gather(in->q.sighted, v.slot), i_set(1));
+        m = m & (sighted | mi_eq(i_gather(in->q.lit, v.slot), i_set(1)));
+        v.m = v.m & ~sighted;
+    }
     Vec3 d = v3_select(m, sight.d, v3_neg(v.d));
     c.backwards = true;
     Spec f = spec_scale(c.albedo, collision_phase(&c, d) * sight.density);
     Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
-    m = m & m_gt(spec_max(l), f_set(0)) & m_finite(spec_sum(l));
+    m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
     m = near_clear(in, &ray, v.medium, v.slot, bounce, m, &l);
     near_book(in, &sight, l, v.slot, bounce, m);
@@ -192,7 +199,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         }
         t->placed = false;
         if (in->upstream) {
-            upstream_arrive(t, &in->q, bounce);
+            upstream_arrive(t, &in->q, bounce, boundary_is_chained(in->b->kind));
             ways_advance(in, bounce, sink);
         }
         if (in->glimpses && in->upstream && in->b->job.mode == MODE_REVERSE) {
@@ -219,6 +226,9 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
 static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sink, int32_t *begin) {
     Tracer *t = in->t;
     Segments *q = &in->q;
+    // Collisions near the camera count one over the square of their distance.
+    const Vec3 *focus = in->pinhole->parallel ? NULL : &in->pinhole->origin;
+    t->focus = in->b->kind == BOUNDARY_INDIRECT && t->job->rides ? NULL : focus; // near points that ride are surfaces'
     if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_MEETING) {
@@ -227,6 +237,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         lines_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_CHAINED) {
         chained_find(t, in->b, first, count, q);
+    } else if (in->b->kind == BOUNDARY_RIDING) {
+        ridings_find(t, in->b, in->pinhole, first, count, q);
     } else {
         turnings_find(t, in->b, first, count, q);
     }
@@ -240,8 +252,11 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_FORWARD && !in->upstream; k += LANES) {
         moves_adj(in, k, sink);
     }
+    t->focus = NULL;
     far_paths(in, begin);
+    t->focus = focus;
     near_particles(in, begin, sink);
+    t->focus = NULL;
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_REVERSE; k += LANES) {
         moves_adj(in, k, sink);
     }

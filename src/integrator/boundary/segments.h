@@ -28,12 +28,13 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
 // what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
-// (airborne.h), and what the flight to it weighs.
+// (airborne.h), what the flight to it weighs, and whether it was looked for along a ray of the sensor's.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         F(nudge_u) F(nudge_v)                                                                                                  \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
-#define SEGMENT_INTS(I) I(number) I(lit) I(source) I(air) I(around) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
+#define SEGMENT_INTS(I)                                                                                                \
+    I(number) I(lit) I(source) I(air) I(around) I(sighted) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light) S(flown)
 
 // Near vertices of one level (upstream.h): where they lie, where the particle came from and went on, and what the motion of a
@@ -99,15 +100,20 @@ typedef struct Segment {
 // The batches of a chunk take turns: whether this one's segments end on lights, and what share of all of them it is.
 typedef struct SegmentTurn {
     bool direct, indirect; // what there is
-    bool lit;
+    bool lit, sighted;     // sighted: near points are chosen along rays of the sensor's (riding.h)
     Float share;
 } SegmentTurn;
 
-static SegmentTurn segment_turn(const SceneView *scene, int64_t number) {
-    SegmentTurn r = {scene->emitters_count > 0, scene->max_depth < 0 || scene->max_depth > 2, false, f_set(1)};
-    r.indirect = r.indirect && !scene->has_media; // there only lights move
-    r.lit = r.direct && (!r.indirect || number / SEGMENT_BLOCK % 2 == 0);
-    r.share = f_set(r.direct && r.indirect ? 2 : 1);
+static SegmentTurn segment_turn(const Tracer *t, int32_t kind, int64_t number) {
+    const SceneView *scene = t->scene;
+    const int32_t shown = kind == BOUNDARY_RIDING ? 1 : 2; // collisions see what a light's own edge shows, too
+    SegmentTurn r = {.direct = scene->emitters_count > 0, .indirect = scene->max_depth < 0 || scene->max_depth > shown};
+    r.indirect = r.indirect && (!scene->has_media || t->job->rides); // else only lights move there
+    const int32_t ways = kind == BOUNDARY_RIDING && r.indirect ? 2 : r.indirect, all = r.direct + ways;
+    const int32_t way = all > 0 ? (int32_t)(number / SEGMENT_BLOCK % all) : 0;
+    r.lit = r.direct && way == 0;
+    r.sighted = ways == 2 && way == all - 1;
+    r.share = f_set((real)all);
     return r;
 }
 
@@ -166,6 +172,20 @@ static void segment_to_anywhere(const Tracer *t, const BoundaryJob *b, const Sam
     s->distance = f_set(INFINITY);
 }
 
+// Weighs segments whose edges and directions are known. lit: they end on lights.
+static void segment_measure(const Tracer *t, const BoundaryJob *b, bool lit, Float share, Segment *s) {
+    Vec3 across = v3_cross(s->d, s->edge.tangent);
+    Float length = v3_length(across);
+    Vec3 n = v3_scale(across, f_safe_rcp(length));
+    Float into = edge_first_rise(&s->edge, n);
+    s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
+    s->weight = length * share * f_safe_rcp(s->edge.probability);
+    s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n, s->d);
+    Mask jumps = boundary_is_paired(b->kind) && !lit ? s->silhouette | s->edge.crease : s->silhouette;
+    s->m = s->m & jumps & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
+           m_gt(s->edge.probability, f_set(0));
+}
+
 // Samples a batch of segments without tracing them. lit: they end on lights.
 static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, bool lit, Float share, Mask m, Segment *s) {
     SampleKey key = slot_key(t, slot);
@@ -179,16 +199,7 @@ static NOINLINE void segment_sample(Tracer *t, const BoundaryJob *b, Int slot, b
     } else {
         segment_to_anywhere(t, b, &key, u, s);
     }
-    Vec3 across = v3_cross(s->d, s->edge.tangent);
-    Float length = v3_length(across);
-    Vec3 n = v3_scale(across, f_safe_rcp(length));
-    Float into = edge_first_rise(&s->edge, n);
-    s->n = v3_scale(n, f_select(m_gt(into, f_set(0)), f_set(-1), f_set(1)));
-    s->weight = length * share * f_safe_rcp(s->edge.probability);
-    s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n, s->d);
-    Mask jumps = b->kind == BOUNDARY_CHAINED && !lit ? s->silhouette | s->edge.crease : s->silhouette;
-    s->m = s->m & jumps & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
-           m_gt(s->edge.probability, f_set(0));
+    segment_measure(t, b, lit, share, s);
 }
 
 KFN void hit_compress(real *u, real *v, real *x, real *y, real *z, int32_t *shape, int32_t *prim, int32_t *instance,
@@ -313,32 +324,52 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     segment_keep(s, o, &near, lit, number, q, m & mi_lt(i_set(-1), near.shape));
 }
 
-// The same in media, of segments that end on lights.
-static void segment_fly(Tracer *t, Segment *s, Int number, Segments *q) {
-    Vec3 o = segment_offset(s);
+// In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through.
+static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Int number, Mask m) {
     Ray ahead = {o, s->d, s->distance * (1.0f - SHADOW_SHORT)};
-    Fog fog = {medium_around(t, o, s->d, s->m), stream_key(t, number, 0, STREAM_SHADOW)};
-    Int around = fog.medium;
+    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW)};
     Mask blocked;
-    Spec through = walk_transmittance(t, ahead, s->m, &fog, &blocked, NULL);
-    Mask m = s->m & m_gt(spec_max(through), f_set(0));
+    Spec through = walk_transmittance(t, ahead, m, &fog, &blocked, NULL);
+    s->light = spec_mul(s->light, through);
+    return m & m_gt(spec_max(through), f_set(0));
+}
+
+// Keeps where the flights of m from the edge have ended, of segments that are stored next.
+KFN void segment_keep_leg(const Leg *leg, Segments *q, Mask m) {
+    i_compress(q->air + q->count, leg->air, m);
+    i_compress(q->around + q->count, leg->around, m);
+    spec_compress(q->flown, q->count, leg->weight, m);
+}
+
+// As segment_trace in media. Where surfaces move, what collisions see of edges is another kind (riding.h).
+static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
+    const bool rides = t->job->rides;
+    Vec3 o = rides ? segment_stand(t, s, segment_offset(s)) : segment_offset(s);
+    Int around = medium_around(t, o, s->d, s->m);
+    Mask m = s->m;
+    if (lit) {
+        m = segment_shine(t, s, o, around, number, m);
+    } else {
+        Ray ahead = {o, s->d, f_set(INFINITY)};
+        s->far = trace_closest(t->scene, &ahead, m, false);
+        t->job->rays += m_count(m);
+        m = s->attached = m & mi_lt(i_set(-1), s->far.shape);
+    }
     if (!m_any(m)) {
         return;
     }
-    s->light = spec_mul(s->light, through);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, m);
-    i_compress(q->air + q->count, leg.air, leg.m);
-    i_compress(q->around + q->count, leg.around, leg.m);
-    spec_compress(q->flown, q->count, leg.weight, leg.m);
-    segment_keep(s, o, &leg.near, true, number, q, leg.m);
+    m = rides ? leg.m & mi_lt(leg.air, i_set(0)) : leg.m;
+    segment_keep_leg(&leg, q, m);
+    segment_keep(s, o, &leg.near, lit, number, q, m);
 }
 
 // Samples numbers first... of a chunk and keeps the segments among them.
 static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        SegmentTurn turn = segment_turn(t->scene, first + i);
+        SegmentTurn turn = segment_turn(t, b->kind, first + i);
         if (!turn.lit && !turn.indirect) {
             return;
         }
@@ -346,7 +377,7 @@ static void segments_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         Segment s;
         segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
         if (m_any(s.m) && t->scene->has_media) {
-            segment_fly(t, &s, i_iota() + i, q);
+            segment_fly(t, &s, turn.lit, i_iota() + i, q);
         } else if (m_any(s.m)) {
             segment_trace(t, &s, turn.lit, i_iota() + i, q);
         }

@@ -130,11 +130,15 @@ static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, sink, m);
             rate = rate + sink_taken(sink);
         }
+        upstream_ride_adj(in->t, q, bounce, k, &c, sink, m);
+        rate = rate + sink_taken(sink);
         UpstreamVertex at = upstream_load(q, bounce, k);
-        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
+        Mask air = m & mi_lt(i_set(UPSTREAM_NONE), at.met) & mi_lt(at.hit.shape, i_set(0));
+        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY)) & ~air;
         Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
         points_slide_adj(in, &at.hit, c.drag, lens, sink, ray);
-        f_store(q->up[bounce].seen + k, f_zero_unless(ray, rate + sink_taken(sink)));
+        // A collision that the sensor sees does not move.
+        f_store(q->up[bounce].seen + k, f_zero_unless(ray | air, rate + sink_taken(sink)));
         points_move_adj(in->t, &at.hit, c.drag, v3_zero(), sink, ray);
         f_store(q->up[bounce].unseen + k, f_zero_unless(ray, rate + sink_taken(sink)));
         f_store(q->rate + k, rate);
@@ -176,8 +180,9 @@ static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
     Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
     for (int32_t j = 0; j < q->levels; j++) {
         Float rcp = f_zero_unless(m_ne(worth[j], f_set(0)), 1.0f / f_select(m_ne(worth[j], f_set(0)), worth[j], f_set(1)));
+        upstream_ride_adj(in->t, q, j, k, &c, sink, m);
         UpstreamVertex at = upstream_load(q, j, k);
-        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY));
+        Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY)) & mi_lt(i_set(-1), at.hit.shape);
         if (m_any(ray)) {
             points_slide_adj(in, &at.hit, v3_scale(c.drag, f_load(q->up[j].seen + k) * rcp), lens, sink, ray);
             points_move_adj(in->t, &at.hit, v3_scale(c.drag, f_load(q->up[j].unseen + k) * rcp), v3_zero(), sink, ray);

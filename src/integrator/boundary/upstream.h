@@ -7,7 +7,9 @@
 //   drag, turn   adjoints of the position of the ray at the vertex before, and of its direction;
 //   level j      an ordinary vertex: `seen` by the sensor it slides, `unseen` it is attached, both with its own worth,
 //                or it slides along the ray of a chain that begins at level j + 1;
-//                or one that mirrors or refracts: drag and turn go on through it.
+//                or one that mirrors or refracts: drag and turn go on through it;
+//                or a collision, which rides along with the vertex that its ray comes from (ride.h), in a fixed direction: the drag
+//                goes on, and an ordinary vertex at level j - 1 slides along the ray from there to it.
 #pragma once
 
 #include "integrator/boundary/segments.h"
@@ -45,21 +47,23 @@ KFN void upstream_begin(Segments *q) {
     q->levels = 0;
 }
 
-// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end.
-static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce) {
+// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end. chained: as in
+// upstream_leave.
+static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, bool chained) {
     const Workspace *ws = &t->ws;
     const Paths *p = &ws->paths[t->current];
     for (int32_t k = 0; k < t->active; k += LANES) {
         Mask m = m_first_n(t->active - k);
         Int slot = i_select(m, i_load(p->slot + k), i_set(0)), arrived = i_gather(q->arrived, slot);
+        Mask collides = m & mi_lt(i_set((int32_t)t->scene->groups_count), i_load(ws->hit_group + k));
         m = m & (mi_eq(arrived, i_set(UPSTREAM_RAY)) | mi_eq(arrived, i_set(UPSTREAM_POINT))) &
-            mi_lt(i_set(-1), i_load(ws->hit_shape + k));
+            (collides | mi_lt(i_set(-1), i_load(ws->hit_shape + k)));
         if (bounce >= MOST_UPSTREAM) {
             i_scatter(q->arrived, slot, i_set(UPSTREAM_NONE), m);
             continue;
         }
         Upstream *u = q->up + bounce;
-        i_scatter(u->shape, slot, i_load(ws->hit_shape + k), m);
+        i_scatter(u->shape, slot, i_select(collides, i_set(-1), i_load(ws->hit_shape + k)), m);
         i_scatter(u->prim, slot, i_load(ws->hit_prim + k), m);
         i_scatter(u->instance, slot, i_load(ws->hit_instance + k), m);
         i_scatter(u->met, slot, arrived, m);
@@ -75,6 +79,10 @@ static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce) {
         f_scatter(u->seen, slot, f_set(0), m);
         f_scatter(u->unseen, slot, f_set(0), m);
         f_scatter(u->passed, slot, f_set(0), m);
+        i_scatter(q->arrived, slot, i_set(UPSTREAM_RAY), m & collides);
+        if (bounce == 0 && chained) {
+            i_scatter(q->full, slot, i_set(1), m & collides);
+        }
         q->levels = bounce + 1;
     }
 }
@@ -183,4 +191,19 @@ static void upstream_turn_adj(const Tracer *t, const Segments *q, int32_t level,
                                  v3_length(v3_sub(from, at.hit.p)), c, sink, m);
     c->drag = v3_select(m, back.drag, c->drag);
     c->turn = v3_select(m, back.turn, c->turn);
+}
+
+// The lanes of m whose level is a collision: the surface before it, if it is an ordinary vertex, slides along the ray from there.
+static void upstream_ride_adj(const Tracer *t, const Segments *q, int32_t level, int32_t k, Carried *c, Sink *sink, Mask m) {
+    if (!t->scene->has_media) {
+        return;
+    }
+    UpstreamVertex at = upstream_load(q, level, k);
+    m = m & mi_lt(i_set(UPSTREAM_NONE), at.met) & mi_lt(at.hit.shape, i_set(0));
+    Mask slides = m & mi_eq(at.met, i_set(UPSTREAM_POINT)) & m_set(level > 0);
+    if (m_any(slides)) {
+        UpstreamVertex before = upstream_load(q, level - 1, k);
+        c->drag = v3_select(slides, rays_meet_adj(t, &before.hit, v3_neg(at.d), c->drag, sink, slides), c->drag);
+    }
+    c->turn = v3_select(m, v3_zero(), c->turn);
 }

@@ -1,0 +1,134 @@
+// riding.h: edges as collisions see them where surfaces move in media. A collision rides along with the surface that its ray left
+// (ride.h), by r', and what leaves it keeps its direction, so that all of what it sees jumps where that passes an edge, as the
+// beginning of a chain does (chained.h): with e the point of the edge, n the normal of the plane of edge and ray,
+//   dI += integral dl dw |w x T| n . (e' - r') (L- - L+) W.
+// Where a surface looks past an edge, this is so for what is scattered in the air behind it, before the light meets a surface;
+// surfaces behind it are attached (indirect.h). Lights at a point are attached, too.
+// NOT differentiated: edges that are seen through surfaces.
+#pragma once
+
+#include "integrator/boundary/chained.h"
+
+// Segments that end on lights and whose near points are collisions.
+static void riding_shine(Tracer *t, Segment *s, Int number, Segments *q) {
+    Vec3 o = segment_stand(t, s, segment_offset(s));
+    Int around = medium_around(t, o, s->d, s->m);
+    Mask m = segment_shine(t, s, o, around, number, s->m);
+    if (!m_any(m)) {
+        return;
+    }
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, m);
+    m = leg.m & mi_lt(i_set(-1), leg.air);
+    // Directions stay, and the ends slide over their lights.
+    s->attached = m_set(false);
+    s->distance = f_select(mi_lt(s->source, i_set(0)), f_set(INFINITY), s->distance);
+    segment_keep_leg(&leg, q, m);
+    i_compress(q->sighted + q->count, i_set(0), m);
+    segment_keep(s, o, &leg.near, true, number, q, m);
+}
+
+// Segments in any direction. Surfaces see the same air on both sides of an edge between two faces.
+static void riding_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+    Vec3 o = chained_offset(s);
+    Int around = medium_around(t, o, s->d, s->m);
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, s->m);
+    Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air));
+    if (m_any(m)) {
+        Float behind;
+        m = chained_between(t, s, leg.near.p, m, &behind);
+        segment_keep_leg(&leg, q, m);
+        i_compress(q->sighted + q->count, i_set(0), m);
+        chained_keep(s, o, &leg.near, behind, number, q, m);
+    }
+}
+
+// Collisions that the sensor sees: on one of its rays, at an angle that is uniform as the edge sees it (track.h). Collisions at
+// random distances from the edge would seldom be seen, and some of them from very near.
+static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Float share, Mask m, Segment *s) {
+    const SceneView *scene = t->scene;
+    const PathJob *job = t->job;
+    SampleKey key = slot_key(t, slot);
+    Vec2 u = rng_2d(&key, DIMENSION_EDGE_SEGMENT), film = rng_2d(&key, DIMENSION_SEGMENT_END);
+    Vec2 lens = sensor_has_lens(t->sensor) ? rng_2d(&key, DIMENSION_LENS) : (Vec2){f_set(0.5f), f_set(0.5f)};
+    Float x = (real)job->x + film.x * (real)job->width, y = (real)job->y + film.y * (real)job->height;
+    Ray ray = sensor_ray(scene, t->sensor, x, y, lens).ray;
+    Hit hit = trace_closest(scene, &ray, m, false);
+    t->job->rays += m_count(m);
+    Mask ends = mi_lt(i_set(-1), hit.shape);
+    Float length = f_select(ends, v3_dot(v3_sub(hit.p, ray.o), ray.d), f_set(INFINITY));
+    s->edge = edge_sample(scene, b, u, v3_zero(), false);
+    Focus focus = focus_look(edge_reference(scene, &s->edge), ray.o, ray.d, length);
+    Float distance = focus_distance(&focus, rng_1d(&key, DIMENSION_SEGMENT_LIGHT));
+    Vec3 near = v3_madd(ray.o, distance, ray.d);
+    if (m_any(s->edge.round)) {
+        s->edge = edge_sample(scene, b, u, near, false);
+    }
+    Vec3 across = v3_sub(s->edge.p, near);
+    s->distance = v3_length(across);
+    s->d = v3_scale(across, f_safe_rcp(s->distance));
+    // Directions and distances of collisions as the edge sees them, over their density.
+    Sight sight = camera_look(pinhole, scene, t->sensor, near, lens);
+    Float density = sight.density * focus_density(&focus, distance) * (s->distance * s->distance);
+    s->light = spec_set((real)job->width * (real)job->height * f_safe_rcp(density));
+    s->m = m & sight.valid & m_gt(distance, f_set(0)) & m_lt(distance, length) & m_gt(density, f_set(0));
+    s->attached = m_set(false);
+    s->source = i_set(-1);
+    segment_measure(t, b, false, share, s);
+    return near;
+}
+
+// Keeps those of them that the edge sees.
+static void riding_see(Tracer *t, Segment *s, Vec3 near, Int number, Segments *q) {
+    const int32_t medium = t->sensor->medium;
+    Vec3 o = chained_offset(s), d = v3_neg(s->d);
+    Ray back = {o, d, v3_length(v3_sub(near, o))};
+    Hit met = trace_closest(t->scene, &back, s->m, false);
+    t->job->rays += m_count(s->m);
+    Mask m = s->m & mi_lt(met.shape, i_set(0));
+    if (!m_any(m)) {
+        return;
+    }
+    Track track = track_of(t, medium);
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = {.air = i_set(medium), .around = i_set(medium)};
+    leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
+    leg.weight = spec_mul(medium_extinction(t->scene, &track, near, d),
+                          track_transmittance(&track, near, s->d, s->distance, m, &key, 0));
+    m = m & m_gt(spec_max(leg.weight), f_set(0));
+    Float behind;
+    m = chained_between(t, s, near, m, &behind);
+    segment_keep_leg(&leg, q, m);
+    i_compress(q->sighted + q->count, i_set(1), m);
+    chained_keep(s, o, &leg.near, behind, number, q, m);
+}
+
+// As segments_find.
+static void ridings_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int64_t first, int32_t count, Segments *q) {
+    const Vec3 *focus = t->focus;
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        SegmentTurn turn = segment_turn(t, b->kind, first + i);
+        if (!turn.lit && !turn.indirect) {
+            break;
+        }
+        batch_numbers(t, i, first);
+        Segment s;
+        if (turn.sighted) {
+            Vec3 near = riding_sight(t, b, pinhole, i_iota() + i, turn.share, m_first_n(count - i), &s);
+            if (m_any(s.m) && t->sensor->medium >= 0) {
+                riding_see(t, &s, near, i_iota() + i, q);
+            }
+            continue;
+        }
+        t->focus = turn.lit ? focus : NULL; // what others bring from their first collisions is found from the sensor
+        segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
+        if (m_any(s.m) && turn.lit) {
+            riding_shine(t, &s, i_iota() + i, q);
+        } else if (m_any(s.m)) {
+            riding_trace(t, &s, i_iota() + i, q);
+        }
+    }
+    t->focus = focus;
+}
