@@ -311,6 +311,9 @@ static rey_result accel_create(rey_scene *scene) {
         return check_device(scene);
     }
     find_own_spheres(&scene->view);
+    // Rays look for what lies in the borders of media (trace_beside).
+    enum RTCSceneFlags flags = scene->view.has_media ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : RTC_SCENE_FLAG_NONE;
+    rtcSetSceneFlags(scene->view.embree, flags);
     // One structure over all boxes is better than a fast one where there are many instances.
     rtcSetSceneBuildQuality(scene->view.embree,
                             scene->view.instances_count ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
@@ -325,7 +328,7 @@ static rey_result accel_create(rey_scene *scene) {
             return check_device(scene);
         }
         // Rays come from far away in the units of an instance: without this they slip between its triangles.
-        rtcSetSceneFlags(scene->embree_groups[i], RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneFlags(scene->embree_groups[i], flags | RTC_SCENE_FLAG_ROBUST);
     }
     return REY_OK;
 }

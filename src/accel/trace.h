@@ -44,31 +44,24 @@ KFN Mask packet_set(RayPacket *packet, const Ray *ray, Mask m) {
     return m;
 }
 
-// Closest hits. Lanes without one have shape -1.
-KFN Hit trace_closest(const SceneView *scene, const Ray *given, Mask m, bool coherent) {
+// Where the rays of m meet what Embree knows; `sphere`: what they meet otherwise at ray->tmax, -1 = nothing.
+KFN Hit packet_closest(const SceneView *scene, const Ray *ray, Int sphere, Mask m, struct RTCIntersectContext *context) {
     RayHitPacket ALIGNED(64) packet;
-    Ray range = *given, *ray = &range;
-    Int sphere = i_set(-1);
-    if (scene->own_spheres_count) {
-        range.tmax = spheres_meet(scene, given, m, &sphere);
-    }
     m = packet_set(&packet.ray, ray, m);
+    i_store(PACKET_I(packet.ray.id), i_iota());
     i_store(PACKET_I(packet.hit.geomID), i_set(-1));
     i_store(PACKET_I(packet.hit.instID[0]), i_set(-1));
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 #if LANES == 1
     if (m) {
-        rtcIntersect1(scene->embree, &context, &packet);
+        rtcIntersect1(scene->embree, context, &packet);
     }
 #else
     int32_t ALIGNED(64) valid[LANES];
     i_store(valid, m);
 #if LANES == 16
-    rtcIntersect16(valid, scene->embree, &context, &packet);
+    rtcIntersect16(valid, scene->embree, context, &packet);
 #else
-    rtcIntersect8(valid, scene->embree, &context, &packet);
+    rtcIntersect8(valid, scene->embree, context, &packet);
 #endif
 #endif
     Hit hit;
@@ -88,6 +81,54 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *given, Mask m, bool coh
     found = mi_lt(i_set(-1), hit.shape);
     hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
     return hit;
+}
+
+// Closest hits. Lanes without one have shape -1.
+KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coherent) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    Int sphere = i_set(-1);
+    if (!scene->own_spheres_count) {
+        return packet_closest(scene, ray, sphere, m, &context);
+    }
+    Ray range = *ray;
+    range.tmax = spheres_meet(scene, ray, m, &sphere);
+    return packet_closest(scene, &range, sphere, m, &context);
+}
+
+// The surfaces that rays leave aside, lane by lane.
+typedef struct Aside {
+    struct RTCIntersectContext context; // the first, so that Embree's callback finds the rest
+    int32_t ALIGNED(64) shape[LANES];
+    int32_t ALIGNED(64) instance[LANES];
+} Aside;
+
+static void aside_filter(const struct RTCFilterFunctionNArguments *a) {
+    enum { RAY_ID = 10, HIT_SHAPE = 6, HIT_INSTANCE = 7 }; // rows of Embree's packets
+    const Aside *aside = (const Aside *)a->context;
+    const int32_t *rays = (const int32_t *)a->ray, *hits = (const int32_t *)a->hit;
+    const unsigned n = a->N;
+    for (unsigned i = 0; i < n; i++) {
+        if (a->valid[i]) {
+            int32_t lane = rays[RAY_ID * n + i];
+            bool own = hits[HIT_SHAPE * n + i] == aside->shape[lane] && hits[HIT_INSTANCE * n + i] == aside->instance[lane];
+            a->valid[i] = own ? 0 : a->valid[i];
+        }
+    }
+}
+
+// What other shapes have at the point of a hit, on the way of rays that step over it: up to `step` before it, and `behind` after.
+static NOINLINE Hit trace_beside(const SceneView *scene, const Hit *hit, Vec3 d, Float step, Float behind, Mask m) {
+    Aside aside;
+    rtcInitIntersectContext(&aside.context);
+    aside.context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    aside.context.filter = aside_filter;
+    Mask inside = mi_lt(i_set(0), SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), flags) & SHAPE_INSTANCED);
+    i_store(aside.shape, hit->shape);
+    i_store(aside.instance, i_select(inside, hit->instance + (int32_t)scene->shapes_count, i_set(-1)));
+    Ray ray = {v3_madd(hit->p, -step, d), d, step + f_min(behind, step)};
+    return packet_closest(scene, &ray, i_set(-1), m, &aside.context);
 }
 
 // Transmittance along shadow rays: 1 where nothing is in the way, 0 behind a surface. A colour and not a bit, because

@@ -22,6 +22,40 @@ KFN Int medium_behind(const Group *group, Vec3 ng, Vec3 d, Int medium) {
     return i_select(m_gt(v3_dot(ng, d), f_set(0)), i_set(group->exterior), i_set(group->interior));
 }
 
+// The medium behind borders that rays along d pass at a hit, `far` by the hit alone: of two in one place (touch.h), the ray
+// crosses first the one whose near side is the medium that it comes from.
+static NOINLINE Int medium_touching(const Tracer *t, const Hit *hit, Vec3 d, Int medium, Int far, Mask m) {
+    const SceneView *scene = t->scene;
+    Float step = interaction_step(hit->p);
+    Hit other = trace_beside(scene, hit, d, step, step, m);
+    Int groups = SHAPE_FIELD(scene, i_max(other.shape, i_set(0)), group), out = far;
+    for (Mask left = m & mi_lt(i_set(-1), other.shape), mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(groups, m_first(left));
+        const Group *group = scene->groups + id;
+        mine = left & mi_eq(groups, i_set(id));
+        if (group->interior < 0 && group->exterior < 0) {
+            continue;
+        }
+        Hit safe = other;
+        int32_t shape = i_lane(other.shape, m_first(mine));
+        safe.shape = i_select(mine, other.shape, i_set(shape));
+        safe.prim = i_select(mine, other.prim, i_set(i_lane(other.prim, m_first(mine))));
+        safe.instance = i_select(mine, other.instance, i_set(i_lane(other.instance, m_first(mine))));
+        Vec3 ng = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe).ng;
+        Int near = medium_behind(group, ng, v3_neg(d), medium), beyond = medium_behind(group, ng, d, medium);
+        // Two boxes of one medium: the ray leaves first the one that it is in.
+        Mask second = mi_eq(near, far) & ~(mi_eq(near, medium) & ~mi_eq(beyond, far));
+        out = i_select(mine & second, beyond, out);
+    }
+    return out;
+}
+
+// The medium that rays of m along d go on in behind a hit that they pass.
+KFN Int medium_passed(const Tracer *t, const Group *group, const Interaction *si, const Hit *hit, Vec3 d, Int medium, Mask m) {
+    Int far = medium_behind(group, si->ng, d, medium);
+    return t->scene->borders_touch && m_any(m) ? medium_touching(t, hit, d, medium, far, m) : far;
+}
+
 KFN Track track_of(const Tracer *t, int32_t medium) {
     const MediumNode *node = t->scene->media + medium;
     return (Track){t->deciding, t->scene, node, t->scene->volumes + node->sigma_t, t->job->moved != NULL, !t->job->moved,

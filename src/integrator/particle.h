@@ -205,7 +205,9 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     if (t->scene->has_media) {
         Mask passed = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
         o = v3_select(passed, interaction_behind(&at->si, w.d), o);
-        i_compress(next->medium + next_count, medium_behind(at->group, at->si.ng, w.d, at->v.medium), m);
+        Int medium = medium_behind(at->group, at->si.ng, w.d, at->v.medium), through = medium;
+        through = medium_passed(t, at->group, &at->si, &at->v.hit, w.d, at->v.medium, m & passed);
+        i_compress(next->medium + next_count, i_select(passed, through, medium), m);
         f_compress(next->skip + next_count, v3_dot(v3_sub(o, at->si.p), w.d), m);
         i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
     }

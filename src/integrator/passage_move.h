@@ -87,6 +87,17 @@ static NOINLINE void passed_boxes_adj(const Tracer *t, const Walk *walk, int32_t
     }
 }
 
+// Notes lights at a point that lie within medium `id`, as it seems at the ends of rays along d. Some rays slip through the edges of
+// borders: a second one, from the light to the side, says whether it is so.
+static NOINLINE void watch_light(const Tracer *t, Vec3 end, int32_t id, Vec3 d, Mask seems, Sink *sink) {
+    if (!m_any(seems) || (sink->faces & LIGHT_WITHIN)) {
+        return;
+    }
+    Frame across = frame_from_normal(d);
+    Int medium = medium_around(t, end, v3_normalize(v3_madd(across.s, f_set(0.37f), across.t)), seems);
+    sink->faces |= m_any(seems & mi_eq(medium, i_set(id))) ? LIGHT_WITHIN : 0;
+}
+
 // Slopes of the extinction along the pieces of a walk, and the extinction at its end.
 static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, const SampleKey *key, Turn *turn, Sink *sink) {
     const SceneView *scene = t->scene;
@@ -101,9 +112,7 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
                 Vec3 end = v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d);
                 Filling f = medium_filling(t, id, end, walk->d);
                 turn->distance = turn->distance - f_zero_unless(ends, spec_dot(dt, f.extinction));
-                // One lane alone may have slipped through the edge of a border.
-                Mask within = ends & turn->points & m_gt(spec_max(f.extinction), f_set(0));
-                sink->faces |= m_count(within) > (LANES > 1 ? 1 : 0) ? LIGHT_WITHIN : 0;
+                watch_light(t, end, id, walk->d, ends & turn->points & m_gt(spec_max(f.extinction), f_set(0)), sink);
             }
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);

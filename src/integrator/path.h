@@ -132,10 +132,13 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     w.pdf = picture_pdf(call, wi, w.sample.wo, w.sample.lobe, w.pdf);
     w.d = frame_to_world(&si->sh, w.sample.wo);
     Vec3 o = interaction_offset(si, w.d);
-    if (scene->has_media) {
+    Int medium = medium_behind(group, si->ng, w.d, v->medium);
+    if (scene->has_media && m_any(w.m & w.passed)) {
         o = v3_select(w.passed, interaction_behind(si, w.d), o);
+        Int through = medium_passed(t, group, si, &v->hit, w.d, v->medium, w.m & w.passed);
+        medium = i_select(w.passed, through, medium);
     }
-    append_paths(t, v, si->p, o, &w, medium_behind(group, si->ng, w.d, v->medium), next_count);
+    append_paths(t, v, si->p, o, &w, medium, next_count);
     if (keeps_coverage(t)) {
         Mask passes = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
         cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);

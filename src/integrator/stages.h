@@ -3,6 +3,7 @@
 
 #include "accel/trace.h"
 #include "integrator/state.h"
+#include "integrator/touch.h"
 #include "math/rng.h"
 #include "sensor/filter.h"
 #include "sensor/sensor.h"
@@ -233,13 +234,19 @@ KFN void hit_store(Tracer *t, int32_t k, const Hit *hit) {
     f_store(ws->hit_z + k, hit->p.z);
 }
 
+// Closest hits of rays that media may change along.
+KFN Hit trace_media(const Tracer *t, const Ray *ray, Mask m, bool coherent) {
+    Hit hit = trace_closest(t->scene, ray, m, coherent);
+    return t->scene->has_media && t->scene->borders_touch ? hit_touching(t->scene, &hit, ray, m) : hit;
+}
+
 static void trace_stage(Tracer *t, int32_t bounce) {
     const Paths *p = &t->ws.paths[t->current];
     double start = stage_seconds();
     for (int32_t k = 0; k < t->active; k += LANES) {
         Mask m = m_first_n(t->active - k);
         Ray ray = path_ray(p, k);
-        Hit hit = trace_closest(t->scene, &ray, m, bounce == 0);
+        Hit hit = trace_media(t, &ray, m, bounce == 0);
         if (t->scene->hide_emitters && (bounce == 0 || t->scene->through)) {
             Mask seen = t->scene->through ? m & mi_eq(i_load(p->depth + k), i_set(0)) : m;
             hit = trace_past_emitters(t, ray, seen, hit);

@@ -30,6 +30,45 @@ KFN Hit walk_hit(const Hit *hit, Mask mine) {
     return safe;
 }
 
+// The medium at infinity: that of the sensor, unless surfaces enclose it.
+static Int medium_beyond(const Tracer *t) {
+    int32_t id = t->sensor->medium;
+    for (int64_t i = 0; i < t->scene->groups_count; i++) {
+        const Group *group = t->scene->groups + i;
+        id = group->interior == t->sensor->medium || group->exterior == t->sensor->medium ? -1 : id;
+    }
+    return i_set(id);
+}
+
+// The media around points: a ray along d says so where it meets a surface that has a medium on either side.
+static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
+    const SceneView *scene = t->scene;
+    Int medium = medium_beyond(t);
+    Mask left = m;
+    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
+        Ray ray = {o, d, f_set(INFINITY)};
+        Hit hit = trace_media(t, &ray, left, false);
+        t->job->rays += m_count(left);
+        left = left & mi_lt(i_set(-1), hit.shape);
+        Mask known = m_set(false);
+        Int groups = SHAPE_FIELD(scene, i_max(hit.shape, i_set(0)), group);
+        for (Mask rest = left, mine; m_any(rest); rest = rest & ~mine) {
+            int32_t id = i_lane(groups, m_first(rest));
+            const Group *group = scene->groups + id;
+            mine = rest & mi_eq(groups, i_set(id));
+            Hit safe = walk_hit(&hit, mine);
+            Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
+            if (group->interior >= 0 || group->exterior >= 0) {
+                medium = i_select(mine, medium_behind(group, si.ng, v3_neg(d), medium), medium);
+                known = known | mine;
+            }
+            o = v3_select(mine, interaction_behind(&si, d), o);
+        }
+        left = left & ~known;
+    }
+    return medium;
+}
+
 // What the surfaces that the lanes of m hit do to light that passes along d, and where the ray goes on behind them.
 // `may` becomes the lanes whose surface could let light through, *medium what they go on in (null: there are no media).
 static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Mask *may, Int *medium) {
@@ -53,7 +92,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         *o = v3_select(mine, medium ? interaction_behind(&si, d) : interaction_offset(&si, d), *o);
         *may = *may | mine;
         if (medium) {
-            *medium = i_select(mine, medium_behind(group, si.ng, d, *medium), *medium);
+            *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);
         }
     }
     return pass;
@@ -71,7 +110,7 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Ma
     Mask left = m;
     *blocked = m_set(false);
     for (int32_t i = 0; m_any(left); i++) {
-        Hit hit = trace_closest(t->scene, &ray, left, false);
+        Hit hit = trace_media(t, &ray, left, false);
         t->job->rays += m_count(left);
         Vec3 o = ray.o;
         Mask found = left & mi_lt(i_set(-1), hit.shape), may = m_set(false);

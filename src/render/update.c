@@ -8,6 +8,7 @@
 #include "medium/majorant_build.h"
 #include "medium/table.h"
 #include "shape/affine.h"
+#include "shape/touches.h"
 #include "shape/update.h"
 
 #include <math.h>
@@ -108,6 +109,18 @@ static rey_result check_bounds(const rey_scene *scene) {
                                     10 * (double)FARTHEST);
 }
 
+// Whether shapes or instances changed since this was called last.
+static bool shapes_changed(const rey_scene *scene) {
+    bool changed = false;
+    for (int64_t i = 0; i < scene->view.shapes_count; i++) {
+        changed |= scene->dirty_shapes[i] != 0;
+    }
+    for (int64_t i = 0; i < scene->view.instances_count; i++) {
+        changed |= scene->dirty_instances[i] != 0;
+    }
+    return changed;
+}
+
 rey_result rey_scene_update(rey_scene *scene) {
     SceneView *view = &scene->view;
     rey_result result = check_places(scene);
@@ -139,6 +152,9 @@ rey_result rey_scene_update(rey_scene *scene) {
     }
     if (result == REY_OK) {
         result = check_bounds(scene);
+    }
+    if (result == REY_OK && shapes_changed(scene)) {
+        result = rey_borders_touch(scene, &view->borders_touch);
     }
     if (result != REY_OK) {
         return result;

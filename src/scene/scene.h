@@ -228,6 +228,7 @@ typedef struct SceneView {
     void *embree;             // RTCScene
     // Spheres that stand in the scene by themselves and that kernels meet instead of Embree: all of them, or none.
     int32_t own_spheres[MOST_OWN_SPHERES], own_spheres_count;
+    bool borders_touch;       // faces at which media end lie in other faces (shape/touches.h)
     int32_t collections;      // number of shapegroups
     bool uniform_emitters;    // every emitter is chosen with the same probability
     int32_t emitter_cdf;      // tables offset of cumulative emitter weights

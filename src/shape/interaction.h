@@ -43,19 +43,17 @@ KFN void frame_from_tangent_adj(const Frame *f, Vec3 dp_du, const Frame *df, Vec
     }
 }
 
+// How far from a point of a surface rays begin.
+KFN Float interaction_step(Vec3 p) { return (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f; }
+
 // Origin of a ray that leaves si towards d: off the surface by an epsilon of the coordinates' size.
 KFN Vec3 interaction_offset(const Interaction *si, Vec3 d) {
-    Float largest = f_max(f_max(f_abs(si->p.x), f_abs(si->p.y)), f_abs(si->p.z));
-    Float step = (1.0f + largest) * 9e-5f;
-    return v3_madd(si->p, f_copysign(step, v3_dot(si->ng, d)), si->ng);
+    return v3_madd(si->p, f_copysign(interaction_step(si->p), v3_dot(si->ng, d)), si->ng);
 }
 
 // The same of a ray that passes undeviated. It stays the same line: next to outlines, a step to the side would lengthen what lies
 // within by much more than that step, and in media the lengths count.
-KFN Vec3 interaction_behind(const Interaction *si, Vec3 d) {
-    Float largest = f_max(f_max(f_abs(si->p.x), f_abs(si->p.y)), f_abs(si->p.z));
-    return v3_madd(si->p, (1.0f + largest) * 9e-5f, d);
-}
+KFN Vec3 interaction_behind(const Interaction *si, Vec3 d) { return v3_madd(si->p, interaction_step(si->p), d); }
 
 // Density per solid angle, seen from ref along d, of points that are uniform over an area around si.
 KFN Float area_density(Vec3 ref, Vec3 d, const Interaction *si, Float area) {

@@ -6,45 +6,6 @@
 #include "integrator/boundary/edge.h"
 #include "integrator/flight.h"
 
-// The medium at infinity: that of the sensor, unless surfaces enclose it.
-static Int medium_beyond(const Tracer *t) {
-    int32_t id = t->sensor->medium;
-    for (int64_t i = 0; i < t->scene->groups_count; i++) {
-        const Group *group = t->scene->groups + i;
-        id = group->interior == t->sensor->medium || group->exterior == t->sensor->medium ? -1 : id;
-    }
-    return i_set(id);
-}
-
-// The media around points: a ray along d says so where it meets a surface that has a medium on either side.
-static NOINLINE Int medium_around(Tracer *t, Vec3 o, Vec3 d, Mask m) {
-    const SceneView *scene = t->scene;
-    Int medium = medium_beyond(t);
-    Mask left = m;
-    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
-        Ray ray = {o, d, f_set(INFINITY)};
-        Hit hit = trace_closest(scene, &ray, left, false);
-        t->job->rays += m_count(left);
-        left = left & mi_lt(i_set(-1), hit.shape);
-        Mask known = m_set(false);
-        Int groups = SHAPE_FIELD(scene, i_max(hit.shape, i_set(0)), group);
-        for (Mask rest = left, mine; m_any(rest); rest = rest & ~mine) {
-            int32_t id = i_lane(groups, m_first(rest));
-            const Group *group = scene->groups + id;
-            mine = rest & mi_eq(groups, i_set(id));
-            Hit safe = walk_hit(&hit, mine);
-            Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
-            if (group->interior >= 0 || group->exterior >= 0) {
-                medium = i_select(mine, medium_behind(group, si.ng, v3_neg(d), medium), medium);
-                known = known | mine;
-            }
-            o = v3_select(mine, interaction_behind(&si, d), o);
-        }
-        left = left & ~known;
-    }
-    return medium;
-}
-
 // Where rays from the edge end.
 typedef struct Leg {
     Hit near;        // shape -1: a collision
@@ -66,7 +27,7 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
             Hit safe = walk_hit(hit, mine);
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
             *o = v3_select(mine, interaction_behind(&si, d), *o);
-            *medium = i_select(mine, medium_behind(group, si.ng, d, *medium), *medium);
+            *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);
             passed = passed | mine;
         }
     }
@@ -80,7 +41,7 @@ static NOINLINE Leg leg_trace(Tracer *t, Vec3 o, Vec3 d, Int medium, const Sampl
     Mask left = m;
     for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
         Ray ray = {o, d, f_set(INFINITY)};
-        Hit hit = trace_closest(t->scene, &ray, left, false);
+        Hit hit = trace_media(t, &ray, left, false);
         t->job->rays += m_count(left);
         Mask found = left & mi_lt(i_set(-1), hit.shape), collides = m_set(false);
         Float far = f_select(found, f_max(v3_dot(v3_sub(hit.p, o), d), f_set(0)), f_set(INFINITY));

@@ -1,0 +1,40 @@
+// touch.h: borders of media that lie in other surfaces (SceneView.borders_touch), as that of a box of fog which stands on a floor, or
+// beside another one. Embree meets one of the two, whichever it is, and rays step over both: so that the other one counts as well, it
+// is looked for. Surfaces that scatter are met in the place of the border that lies in them; of two borders the ray crosses first the
+// one whose near side is the medium that it comes from. Of three surfaces in one plane, one is lost.
+#pragma once
+
+#include "accel/trace.h"
+#include "bsdf/bsdf.h"
+#include "shape/shape.h"
+
+// Lanes of m whose shapes are of the kind null.
+KFN Mask null_lanes(const SceneView *scene, Int shape, Mask m) {
+    Int groups = SHAPE_FIELD(scene, i_max(shape, i_set(0)), group);
+    Mask null = m_set(false);
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(groups, m_first(left));
+        mine = left & mi_eq(groups, i_set(id));
+        null = null | (mine & m_set(scene->bsdfs[scene->groups[id].bsdf].kind == BSDF_NULL));
+    }
+    return null;
+}
+
+// What a ray meets where Embree says that it meets `hit`.
+static NOINLINE Hit hit_touching(const SceneView *scene, const Hit *hit, const Ray *ray, Mask m) {
+    Hit out = *hit;
+    m = null_lanes(scene, hit->shape, m & mi_lt(i_set(-1), hit->shape));
+    if (!m_any(m)) {
+        return out;
+    }
+    Float left = ray->tmax - v3_dot(v3_sub(hit->p, ray->o), ray->d);
+    Hit other = trace_beside(scene, hit, ray->d, interaction_step(hit->p), left, m);
+    Mask found = m & mi_lt(i_set(-1), other.shape), takes = found & ~null_lanes(scene, other.shape, found);
+    out.shape = i_select(takes, other.shape, hit->shape);
+    out.prim = i_select(takes, other.prim, hit->prim);
+    out.instance = i_select(takes, other.instance, hit->instance);
+    out.u = f_select(takes, other.u, hit->u);
+    out.v = f_select(takes, other.v, hit->v);
+    out.p = v3_select(takes, other.p, hit->p);
+    return out;
+}

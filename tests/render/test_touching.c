@@ -1,0 +1,131 @@
+// Borders of media that lie in other surfaces: boxes side by side, a pile of layers, fog that stands on a lamp, all in closed form
+// with their derivatives; and lights beside a border, which rays slip through now and then.
+#include "rooms.h"
+
+enum { ACROSS = 16, SETS = 8, MOST_PATHS = 1 << 14 };
+
+// Parallel rays along (0.6, 0, -0.8), all of which pass all of what a scene has.
+static const char sensor[] =
+    "<integrator type='volpath'><integer name='max_depth' value='8'/></integrator>"
+    "<sensor type='orthographic'><transform name='to_world'><scale value='0.1'/><lookat origin='-6, 0, 8' target='0, 0, 0' "
+    "up='0, 1, 0'/></transform><film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/></film>"
+    "</sensor>";
+
+static const char media[] =
+    "<medium type='homogeneous' id='thin'><float name='sigma_t' value='0.5'/><float name='albedo' value='0'/></medium>"
+    "<medium type='homogeneous' id='dense'><float name='sigma_t' value='1.2'/><float name='albedo' value='0'/></medium>";
+
+#define SKY "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
+#define BOX(half, middle, medium) \
+    "<shape type='cube'><transform name='to_world'><scale x='9' y='9' z='" half "'/><translate z='" middle "'/></transform>" \
+    "<bsdf type='null'/><ref name='interior' id='" medium "'/></shape>"
+#define LAMP \
+    "<shape type='rectangle'><transform name='to_world'><scale value='9'/></transform><emitter type='area'><float name='radiance' " \
+    "value='2'/></emitter></shape>"
+
+// What is seen: radiance exp(-0.5 thin - 1.2 dense), by the lengths in the two media.
+typedef struct Pile {
+    const char *text, *scene;
+    double radiance, thin, dense;
+} Pile;
+
+static const Pile piles[] = {
+    {"two boxes", SKY BOX("0.5", "0.5", "thin") BOX("0.5", "-0.5", "dense"), 1, 1.25, 1.25},
+    {"two boxes of one medium", SKY BOX("0.5", "0.5", "thin") BOX("0.5", "-0.5", "thin") BOX("0.1", "3", "dense"), 1, 2.5, 0.25},
+    {"layers",
+     SKY BOX("0.1", "0.3", "thin") BOX("0.1", "0.1", "dense") BOX("0.1", "-0.1", "thin") BOX("0.1", "-0.3", "dense"), 1, 0.5, 0.5},
+    {"a box on a lamp", LAMP BOX("0.5", "0.5", "dense") BOX("0.1", "3", "thin"), 2, 0.25, 1.25},
+    {"two boxes on a lamp", LAMP BOX("0.5", "0.5", "dense") BOX("0.1", "1.1", "thin"), 2, 0.25, 1.25},
+};
+
+static Room pile_open(const char *text, int lanes) {
+    rey_context_def def = rey_default_context_def();
+    char path[64];
+    Room room;
+    def.threads = 2;
+    def.lanes = lanes;
+    snprintf(path, sizeof path, "/tmp/reynolds_touching_%ld.xml", (long)getpid());
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f, "<scene version='3.0.0'>%s%s%s</scene>", sensor, media, text);
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
+    rey_result result = rey_scene_load(room.ctx, path, NULL, 0, &room.scene);
+    unlink(path);
+    ok(room, result);
+    return room;
+}
+
+// Mean over pixels and seeds of the picture (param -1) or its derivative, against what it should be.
+static void expect(Room room, const char *text, int param, double expected) {
+    double sum = 0, squares = 0;
+    const float one = 1;
+    for (int s = 0; s < SETS; s++) {
+        float image[3 * ACROSS * ACROSS];
+        double mean = 0;
+        rey_render_def def = def_make(MOST_PATHS / (ACROSS * ACROSS), (uint32_t)s, 1);
+        ok(room, param < 0 ? rey_render(room.scene, &def, image, NULL)
+                           : rey_jvp(room.scene, &def, (rey_selection){&param, 1}, &one, image, NULL, NULL));
+        for (int i = 0; i < 3 * ACROSS * ACROSS; i++) {
+            mean += (double)image[i] / (3 * ACROSS * ACROSS);
+        }
+        sum += mean;
+        squares += mean * mean;
+    }
+    double mean = sum / SETS, error = sqrt(fmax(squares / SETS - mean * mean, 0) / (SETS - 1));
+    if (fabs(mean - expected) > 5 * error + 1e-3 * fabs(expected) || error * sqrt(sample_share()) > 0.01 * fabs(expected)) {
+        fail_msg("%s: %.6g +- %.2g, expected %.6g", text, mean, error, expected);
+    }
+}
+
+static void judge(const Pile *pile, int lanes) {
+    Room room = pile_open(pile->scene, lanes);
+    double value = pile->radiance * exp(-0.5 * pile->thin - 1.2 * pile->dense);
+    expect(room, pile->text, -1, value);
+    expect(room, pile->text, rey_param_find(room.scene, "thin.sigma_t.value.value"), -pile->thin * value);
+    expect(room, pile->text, rey_param_find(room.scene, "dense.sigma_t.value.value"), -pile->dense * value);
+    room_close(room);
+}
+
+static void test_piles(void **state) {
+    UNUSED(state);
+    for (size_t i = 0; i < COUNT_OF(piles); i++) {
+        judge(piles + i, 16);
+    }
+    judge(piles, 8);
+    judge(piles, 1);
+}
+
+// A lamp above a box of fog: were it in the fog, its gradient would lack a part and be refused.
+static void spot_at(const char *height, rey_result expected) {
+    char text[2048];
+    snprintf(text, sizeof text,
+             BOX("0.8", "0", "thin") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><translate z='-1.1'/>"
+             "</transform></shape><emitter type='spot' id='spot'><transform name='to_world'><lookat origin='0.5, 0.2, %s' "
+             "target='0, 0, -9' up='0, 1, 0'/></transform></emitter>",
+             height);
+    Room room = pile_open(text, 1);
+    int param = rey_param_find(room.scene, "spot.to_world");
+    assert_true(param >= 0);
+    float tangent[16] = {0}, image[3 * ACROSS * ACROSS];
+    tangent[3] = 1;
+    for (uint32_t seed = 0; seed < 4; seed++) {
+        rey_render_def def = def_make(512, seed, 1);
+        rey_result result = rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL);
+        if (result != expected) {
+            fail_msg("a spot at z = %s, seed %u: %d, %s", height, seed, result, rey_error(room.ctx));
+        }
+    }
+    room_close(room);
+}
+
+static void test_lights_beside_borders(void **state) {
+    UNUSED(state);
+    spot_at("4", REY_OK);
+    spot_at("0.3", REY_ERROR_INCOMPLETE);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_piles), cmocka_unit_test(test_lights_beside_borders)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
