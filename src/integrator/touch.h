@@ -1,7 +1,7 @@
-// touch.h: borders of media that lie in other surfaces (SceneView.borders_touch), as that of a box of fog which stands on a floor, or
-// beside another one. Embree meets one of the two, whichever it is, and rays step over both: so that the other one counts as well, it
-// is looked for. Surfaces that scatter are met in the place of the border that lies in them; of two borders the ray crosses first the
-// one whose near side is the medium that it comes from. Of three surfaces in one plane, one is lost.
+// touch.h: borders of media that lie in other surfaces (SceneView.borders_touch), as that of a box of fog which stands on a floor,
+// or beside another one. Embree meets one of the two, whichever it is, and rays step over both: so that the other one counts as
+// well, it is looked for. Surfaces that scatter are met in the place of the border that lies in them; of two borders the ray
+// crosses first the one whose near side is the medium that it comes from. Of three surfaces in one plane, one is lost.
 #pragma once
 
 #include "accel/trace.h"

@@ -6,6 +6,7 @@
 #include "render/boundary.h"
 #include "render/cuts.h"
 #include "render/dropped.h"
+#include "render/edge_on.h"
 #include "render/motion.h"
 #include "render/particles.h"
 #include "scene/sink.h"
@@ -195,6 +196,15 @@ static const char *gap_of_score(const SceneView *view, const Param *p) {
     return NULL;
 }
 
+static rey_result check_edge_on(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
+    char text[2 * OBJECT_NAME];
+    return rey_moves_edge_on(scene, sensor, p, text)
+               ? rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                          "the gradient of %s does not exist yet in this place: %s, so that none crosses it, and what its motion "
+                          "does to them jumps. Turned or moved by a thousandth, it exists", p->name, text)
+               : REY_OK;
+}
+
 static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
     char object[OBJECT_NAME];
     const char *gap = rey_cuts_gap(scene, sensor, p, object);
@@ -251,6 +261,10 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         const char *gap = find_gap(&scene->view, def, p, info.terms, volumes);
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
+        }
+        result = check_edge_on(scene, scene->view.sensors + def->sensor, p);
+        if (result != REY_OK) {
+            return result;
         }
         result = def->terms ? REY_OK : check_cuts(scene, scene->view.sensors + def->sensor, p);
         if (result != REY_OK) {

@@ -36,8 +36,9 @@ static void judge(Case c) {
 }
 
 // The case as the slab grows from thickness 2 s, s = 1, given dI / ds; and as it moves along the view, where nothing changes.
-// The border is a surface, or that of the box of a volume.
+// The border is a surface, or that of the box of a volume. No ray may run along its sides.
 static void judge_border(Case c) {
+    define(&c, "tilt", "0.1");
     Case box = c;
     c.param = "slab.to_world";
     c.tangent[10] = 1;
@@ -192,7 +193,7 @@ static void test_turned_flakes(void **state) {
     const double area = 0.8, yz = 0.2;
     Case turned = {"flakes from another side", {{"sky", "1"}, {"medium", "flakes"}, {"S", "0.5, 0.4, 0.64, 0, 0, 0.2"}}, {0},
                    "camera.to_world", {[6] = 1, [7] = -3, [9] = 0.5f}, {0}};
-    Case grown = {"more flakes", {{"sky", "1"}, {"medium", "flakes"}}, {0}, "slab.to_world", {[10] = 1}, {0}};
+    Case grown = {"more flakes", {{"sky", "1"}, {"medium", "flakes"}, {"tilt", "0.1"}}, {0}, "slab.to_world", {[10] = 1}, {0}};
     for (int k = 0; k < 3; k++) {
         turned.value[k] = grown.value[k] = exp(-2 * sigma[k] * area);
         turned.derivative[k] = 2 * sigma[k] * yz / area * turned.value[k];
@@ -205,7 +206,8 @@ static void test_turned_flakes(void **state) {
 // The three of them as functions of where the slab begins and ends.
 static void test_borders(void **state) {
     UNUSED(state);
-    const double albedo[3] = {0.9, 0.5, 0.2}, g = 0.3, p = (1 - g * g) / (4 * pi * pow(1 + g, 3)), light = 5;
+    const double albedo[3] = {0.9, 0.5, 0.2}, g = 0.3, tilted = sqrt(1.02), ways = 1 + tilted; // to a depth of 1 and back
+    const double p = (1 - g * g) / (4 * pi * pow(1 + g * g + 2 * g / tilted, 1.5)), light = 5;
     Case through = {"transmittance", {{"sky", "1"}}, {0}, NULL, {0}, {0}};
     Case scattered = {"scattering", {{"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}}, {0}, NULL, {0}, {0}};
     Case glow = {"emission", {{"emission", "0.5"}}, {0}, NULL, {0}, {0}};
@@ -213,8 +215,8 @@ static void test_borders(void **state) {
         double s = sigma[k];
         through.value[k] = exp(-2 * s);
         through.derivative[k] = -2 * s * through.value[k];
-        scattered.value[k] = albedo[k] * p * light * (1 - exp(-4 * s)) / 2;
-        scattered.derivative[k] = albedo[k] * p * light * 2 * s * exp(-4 * s);
+        scattered.value[k] = albedo[k] * p * light * (1 - exp(-2 * ways * s)) / ways;
+        scattered.derivative[k] = albedo[k] * p * light * 2 * s * exp(-2 * ways * s);
         glow.value[k] = 0.5 * (1 - exp(-2 * s)) / s;
         glow.derivative[k] = 2 * 0.5 * exp(-2 * s);
     }
