@@ -191,6 +191,28 @@ KFN Spec border_gain(const Filling *f, Spec scattered, Spec radiance) {
     return spec_add(spec_mul(f->extinction, spec_sub(scattered, radiance)), f->emission);
 }
 
+// Where surfaces move (ride.h): adds the adjoint `position` of all points of the ray that led to the records to that of the vertex
+// where it began. Where it ends at an attached vertex, that turns it: `end` is the part that the radiance from there asks for.
+static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int channel, Int slot, Vec3 position, const Glide *end,
+                              Mask m) {
+    const Workspace *ws = &t->ws;
+    rows_scatter(&ws->drag, channel, slot, v3_add(rows_gather(&ws->drag, channel, slot), position), m);
+    Mask slides = mi_eq(i_load(ws->records.slides + batch->first), i_set(1));
+    m = m & ~slides & mi_lt(i_set(-1), i_gather(ws->next, slot));
+    if (m_any(m)) {
+        rows_scatter(&ws->pull, channel, slot, v3_add(rows_gather(&ws->pull, channel, slot), end->position), m);
+        rows_scatter(&ws->turn, channel, slot, v3_add(rows_gather(&ws->turn, channel, slot), end->turn), m);
+    }
+}
+
+// The same of one point p of the ray along d, given dp and the part of it that the end asks for.
+static void ride_add_point(const Tracer *t, const RecordBatch *batch, int channel, Int slot, Vec3 p, Vec3 d, Vec3 dp, Vec3 attached,
+                           Mask m) {
+    Glide end = {.ref = glide_reference(t, slot, p), .d = d};
+    glide_add(&end, p, attached, m);
+    ride_add(t, batch, channel, slot, v3_select(m, dp, v3_zero()), &end, m);
+}
+
 // ---- surfaces ----------------------------------------------------------------------------------------------------
 
 typedef struct BorderSurface {
@@ -218,7 +240,7 @@ static NOINLINE BorderSurface border_surface(const Tracer *t, const RecordBatch 
     s.m = s.m & m_gt(f_abs(cosine), f_set(LEAST_COSINE));
     s.rcp = f_safe_rcp(f_select(s.m, cosine, f_set(1)));
     s.medium[0] = i_load(r->medium + at);
-    s.medium[1] = medium_behind(s.group, s.si.ng, s.d, s.medium[0]);
+    s.medium[1] = medium_passed(t, s.group, &s.si, &s.hit, s.d, s.medium[0], s.m);
     s.p[0] = interaction_offset(&s.si, v3_neg(s.d));
     s.p[1] = interaction_offset(&s.si, s.d);
     return s;
@@ -226,7 +248,7 @@ static NOINLINE BorderSurface border_surface(const Tracer *t, const RecordBatch 
 
 static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     BorderSurface s = border_surface(t, batch);
-    const int sides = t->job->rides ? 1 : 2; // behind surfaces that scatter, other rays begin
+    const int sides = t->scene->bsdfs[s.group->bsdf].kind == BSDF_NULL ? 2 : 1; // behind others, other rays begin
     for (int side = 0; side < sides; side++) {
         for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
             int32_t id = i_lane(s.medium[side], m_first(left));
@@ -237,18 +259,27 @@ static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     }
 }
 
-static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffix, Mask finite, Sink *sink) {
-    BorderSurface s = border_surface(t, batch);
-    Spec radiance = spec_mul(spec_load(t->ws.records.weight, batch->first), suffix), jump = spec_zero();
+// What a border's motion along the ray brings, of which *lost is what the radiance from beyond it loses.
+static NOINLINE Spec border_jump(const Tracer *t, const RecordBatch *batch, const BorderSurface *s, Spec radiance, Spec *lost) {
+    Spec jump = spec_zero();
+    *lost = spec_zero();
     for (int side = 0; side < 2; side++) {
-        for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
-            int32_t id = i_lane(s.medium[side], m_first(left));
-            mine = left & mi_eq(s.medium[side], i_set(id));
-            Filling f = medium_filling(t, id, s.p[side], s.d);
-            Spec gain = border_gain(&f, border_scattered(t, batch, side, s.slot, mine), radiance);
-            jump = spec_add(jump, spec_zero_unless(mine, spec_scale(gain, f_set(side ? -1 : 1))));
+        Float sign = f_set(side ? -1 : 1);
+        for (Mask left = s->m & mi_lt(i_set(-1), s->medium[side]), mine; m_any(left); left = left & ~mine) {
+            int32_t id = i_lane(s->medium[side], m_first(left));
+            mine = left & mi_eq(s->medium[side], i_set(id));
+            Filling f = medium_filling(t, id, s->p[side], s->d);
+            Spec gain = border_gain(&f, border_scattered(t, batch, side, s->slot, mine), radiance);
+            jump = spec_add(jump, spec_zero_unless(mine, spec_scale(gain, sign)));
+            *lost = spec_sub(*lost, spec_zero_unless(mine, spec_scale(spec_mul(f.extinction, radiance), sign)));
         }
     }
+    return jump;
+}
+
+static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffix, Mask finite, Sink *sink) {
+    BorderSurface s = border_surface(t, batch);
+    Spec lost, jump = border_jump(t, batch, &s, spec_mul(spec_load(t->ws.records.weight, batch->first), suffix), &lost);
     Mask m = s.m & finite & m_finite(spec_sum(jump));
     for (int c = 0; c < drives(t); c++) {
         Float dx = spec_dot(spec_mul(slot_adjoint(t, s.slot, c), s.beta), jump);
@@ -261,6 +292,9 @@ static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffi
             Glide g = glide_load(t, c, s.slot, glide_reference(t, s.slot, s.hit.p), s.d);
             glide_add(&g, s.hit.p, v3_neg(d.p), m);
             glide_store(t, &g, c, s.slot, m);
+        } else if (t->job->rides) {
+            Float loses = spec_dot(spec_mul(slot_adjoint(t, s.slot, c), s.beta), lost) * s.rcp;
+            ride_add_point(t, batch, c, s.slot, s.hit.p, s.d, v3_neg(d.p), v3_scale(s.si.ng, -loses), m);
         }
         forward_flush(t, sink, s.slot, c, m);
     }
@@ -340,6 +374,11 @@ static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, S
                 Glide g = glide_load(t, c, b.slot, glide_reference(t, b.slot, b.o), b.d);
                 glide_add(&g, b.p[k], v3_neg(face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx)), b.face[k].m);
                 glide_store(t, &g, c, b.slot, b.face[k].m);
+            } else if (t->job->rides) {
+                Float end = spec_dot(delta, spec_mul(b.inside[k].extinction, onward));
+                Vec3 all = face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx);
+                Vec3 attached = face_turn(t->scene, b.sigma_t, b.face + k, b.d, k ? -end : end);
+                ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(attached), b.face[k].m);
             }
         }
         forward_flush(t, sink, b.slot, c, b.m);

@@ -88,6 +88,11 @@ KFN void record_flight(Tracer *t, const Flights *f, int32_t count, int32_t bounc
     f_store(r->dx + at, f->d.x);
     f_store(r->dy + at, f->d.y);
     f_store(r->dz + at, f->d.z);
+    if (t->job->rides) {
+        const Paths *p = &t->ws.paths[t->current];
+        Mask slides = m_lt(real_gather(p->pdf, f->at), f_set(0)) | mi_eq(i_gather(p->flies, f->at), i_set(1));
+        i_store(r->slides + at, i_select(slides, i_set(1), i_set(0)));
+    }
     f_store(r->ldist + at, f->flight.t);
     f_store(r->sw + at, f->tmax);
     f_store(r->u + at, f->probe);
@@ -97,11 +102,11 @@ KFN void record_flight(Tracer *t, const Flights *f, int32_t count, int32_t bounc
     spec_store(r->weight, at, f->flight.weight);
 }
 
-// A collision, off both ends of its flight: the next ray must not begin on the wrong side of a border.
-KFN Float flight_inside(const Flights *f) {
-    Float largest = f_max(f_max(f_abs(f->o.x), f_abs(f->o.y)), f_abs(f->o.z));
-    Float step = f_min((1.0f + largest) * 3e-6f, 0.5f * f->tmax);
-    return f_select(f->flight.real, f_min(f_max(f->flight.t, step), f->tmax - step), f->flight.t);
+// The distance to a collision on the way from o to tmax, off both ends: the next ray must not begin on the wrong side of a border.
+KFN Float flight_inside(Vec3 o, Float distance, Float tmax) {
+    Float largest = f_max(f_max(f_abs(o.x), f_abs(o.y)), f_abs(o.z));
+    Float step = f_min((1.0f + largest) * 3e-6f, 0.5f * tmax);
+    return f_min(f_max(distance, step), tmax - step);
 }
 
 // Flies one batch: paths that collide go to the medium's group, all carry their weight.
@@ -113,7 +118,7 @@ static void fly(Tracer *t, int32_t id, const int32_t *order, int32_t count, int3
     Flights f = flights_load(t, id, order, count, bounce);
     Track track = track_of(t, id);
     f.flight = track_flight(&track, f.o, f.d, f.tmax, f.shares, f.m, &f.key, 0);
-    f.flight.t = flight_inside(&f);
+    f.flight.t = f_select(f.flight.real, flight_inside(f.o, f.flight.t, f.tmax), f.flight.t);
     Spec emission = spec_zero();
     if (medium->emission >= 0) {
         emission = flight_emission(t, &f, bounce);

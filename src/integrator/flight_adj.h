@@ -98,25 +98,30 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     return a;
 }
 
-// Accumulates the adjoint d of the extinction at a distance along the flight.
-KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
+// Adds to g what the adjoint d of the extinction at a distance along the flight makes of the ray.
+static NOINLINE void flight_point_glide(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Mask m) {
     const SceneView *scene = t->scene;
     Vec3 p = v3_madd(a->f.o, at, a->f.d);
-    extinction_adj(scene, a->medium, p, a->f.d, d, sink, m);
-    if (g && a->medium->flakes >= 0) {
+    if (a->medium->flakes >= 0) {
         Vec3 dp = v3_zero(), dw = v3_zero();
         extinction_turn(scene, a->medium, p, a->f.d, d, m, &dp, &dw);
         glide_add(g, p, dp, m);
         g->turn = v3_add(g->turn, v3_select(m, dw, v3_zero()));
         d = spec_scale(d, flakes_area(scene, a->medium->flakes, p, a->f.d));
     }
+    glide_look(scene, g, scene->volumes + a->medium->sigma_t, p, spec_scale(d, f_set((real)scene->theta[a->medium->scale])), m);
+}
+
+// Accumulates that adjoint.
+KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
+    extinction_adj(t->scene, a->medium, v3_madd(a->f.o, at, a->f.d), a->f.d, d, sink, m);
     if (g) {
-        glide_look(scene, g, scene->volumes + a->medium->sigma_t, p, spec_scale(d, f_set((real)scene->theta[a->medium->scale])), m);
+        flight_point_glide(t, a, at, d, g, m);
     }
 }
 
-// g: null unless the ray glides.
-static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Glide *g, Sink *sink) {
+// g: null unless the ray moves; end: of attached lanes, what the radiance of their end asks for alone (ride_add), else null.
+static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Glide *g, Glide *end, Sink *sink) {
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, a->f.beta);
     const Mask m = a->f.m;
@@ -126,6 +131,9 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
             Spec behind = spec_zero_unless(m_lt(a->point[k], a->emission_at), a->emission);
             Spec lost = spec_scale(spec_mul(worth, spec_add(a->onward, behind)), -each);
             flight_point_adj(t, a, a->point[k], lost, g, sink, m);
+            if (end) {
+                flight_point_glide(t, a, a->point[k], spec_scale(spec_mul(worth, a->onward), -each), end, m);
+            }
         }
         flight_point_adj(t, a, a->end, spec_mul(worth, a->hit), g, sink, a->collided);
         if (m_any(a->probed)) {
@@ -152,17 +160,20 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
     a.f.m = a.f.m & finite;
     a.probed = a.probed & finite;
     a.collided = a.collided & finite;
-    const bool glides = t->job->glides;
+    const bool glides = t->job->glides, rides = t->job->rides;
     Vec3 ref = glides ? glide_reference(t, slot, a.f.o) : a.f.o;
     for (int c = 0; c < drives(t); c++) {
-        Glide g = {.ref = ref};
+        Glide g = {.ref = ref}, end = {.ref = glide_reference(t, slot, ref), .d = a.f.d};
         if (glides) {
             g = glide_load(t, c, slot, ref, a.f.d);
         }
-        flight_adj(t, &a, live, spec_zero_unless(finite, slot_adjoint(t, slot, c)), glides ? &g : NULL, sink);
+        Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
+        flight_adj(t, &a, live, delta, glides || rides ? &g : NULL, rides ? &end : NULL, sink);
         forward_flush(t, sink, slot, c, finite);
         if (glides) {
             glide_store(t, &g, c, slot, a.f.m);
+        } else if (rides) {
+            ride_add(t, batch, c, slot, g.position, &end, a.f.m);
         }
     }
     if (glides) {

@@ -4,7 +4,7 @@
 // for path_adj.h. Sampling, densities, MIS weights and roulette are detached.
 #pragma once
 
-#include "integrator/flight.h"
+#include "integrator/leg.h"
 
 // ---- surfaces ----------------------------------------------------------------------------------------------------
 
@@ -321,11 +321,16 @@ static void path_forward(Tracer *t, int32_t *begin) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
-        if (!t->placed || bounce > t->first_bounce) {
+        const bool legs = scene->has_media && t->rungs; // the number of vertices counts
+        if (legs) {
+            legs_stage(t, bounce);
+        } else if (!t->placed || bounce > t->first_bounce) {
             trace_stage(t, bounce);
         }
         if (scene->has_media) {
-            flight_stage(t, begin, bounce);
+            if (!legs) {
+                flight_stage(t, begin, bounce);
+            }
             if (t->fork && bounce == t->first_bounce) {
                 fork_air(t);
             }

@@ -227,6 +227,19 @@ static void glides_end(Tracer *t, int32_t count, Sink *sink) {
     }
 }
 
+// The borders that a batch of surface vertices lies on. Whether these are no vertices of the path: where surfaces move, segments
+// are attached through surfaces of the kind null.
+static bool passed_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Mask m, Sink *sink) {
+    const bool passed = t->job->rides && t->scene->bsdfs[t->scene->groups[batch->group].bsdf].kind == BSDF_NULL;
+    if (border_is_live(t, batch) && (passed || !t->job->rides)) {
+        border_surface_sweep(t, batch, suffix, finite, sink);
+    }
+    if (passed) {
+        ride_flight(t, batch, slot, m);
+    }
+    return passed;
+}
+
 // Sweeps the records of a chunk of so many paths from the last vertex to the first.
 static void path_backward(Tracer *t, int32_t count) {
     PathJob *job = t->job;
@@ -271,8 +284,8 @@ static void path_backward(Tracer *t, int32_t count) {
             collision_sweep(t, batch, slot, suffix, finite, live_passing, &p, &sink);
             continue;
         }
-        if (border_is_live(t, batch) && !job->rides) {
-            border_surface_sweep(t, batch, suffix, finite, &sink);
+        if (passed_sweep(t, batch, slot, suffix, finite, m, &sink)) {
+            continue;
         }
         Spec attached = job->any_motion ? attached_keep(t, batch, slot, suffix, finite) : suffix;
         if (surface) {

@@ -197,6 +197,11 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     Vec3 darea, w = s->wo_d;
     Float distance = v3_length(v3_sub(q, s->si.p));
     Vec3 dr = segment_adj(w, distance, n, v->onward, v3_sub(v->wo, back), &darea);
+    if (t->job->rides) { // points of the way move with both ends
+        Vec3 pull = rows_gather(&ws->pull, channel, s->slot), turn = rows_gather(&ws->turn, channel, s->slot);
+        pull = v3_madd(pull, f_safe_rcp(distance), turn);
+        dr = v3_add(dr, v3_madd(pull, -v3_dot(w, pull), w));
+    }
     Hit hit = {i_gather(r->shape, next), i_gather(r->prim, next), real_gather(r->u, next), real_gather(r->v, next), q,
                i_gather(r->instance, next)};
     points_move_adj(t, &hit, dr, darea, sink, attached);
@@ -292,6 +297,9 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     rows_scatter(&t->ws.back, channel, s->slot, back, s->m);
     rows_scatter(&t->ws.drag, channel, s->slot, carried.drag, s->m);
     rows_scatter(&t->ws.turn, channel, s->slot, carried.turn, s->m);
+    if (t->job->rides) {
+        rows_scatter(&t->ws.pull, channel, s->slot, v3_zero(), s->m);
+    }
 }
 
 // Forgets the vertices of the chunk before.
@@ -302,8 +310,8 @@ KFN void vertices_forget(Tracer *t) {
     for (int c = 0; c < SPEC_N; c++) {
         memset(ws->attached[c], 0, bytes);
     }
-    const ChannelRows *rows[] = {&ws->drag, &ws->turn};
-    for (int i = 0; i < 2; i++) {
+    const ChannelRows *rows[] = {&ws->drag, &ws->turn, &ws->pull};
+    for (int i = 0; i < (t->job->rides ? 3 : 2); i++) {
         for (int c = 0; c < drives(t); c++) {
             memset(rows[i]->x[c], 0, bytes);
             memset(rows[i]->y[c], 0, bytes);

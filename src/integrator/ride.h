@@ -7,7 +7,8 @@
 //   dL = dx T (s a S + j) - dD s L,                                                                            (border.h, 1)
 // dD = dx where the end slides, and along segments that are attached the change of their length. S is found by the path's probe.
 // Shadow rays from collisions keep their direction, and their ends slide over the lights; those from surfaces keep both ends.
-// NOT differentiated: extinctions that vary or depend on the direction, and surfaces that rays pass.
+// Borders of media are passed, and points of the way between attached ends move with both (ride_add).
+// NOT differentiated: surfaces other than null that rays pass, volumes of phase functions.
 #pragma once
 
 #include "integrator/border.h"

@@ -92,11 +92,12 @@ typedef struct Workspace {
     int32_t *pixel, *sample;
     // per slot, of the vertex that the sweep has just left (path_move.h): its record (-1: none), position and normal, what
     // leaves it but does not go on along a chain, and per channel the adjoint of the direction back to the vertex before it,
-    // and where the vertex slides, of the ray's position there and of its direction
+    // and where the vertex slides, of the ray's position there and of its direction; where it is attached in media, of points on
+    // the way to it, and of these times their distance beyond it (ride_add)
     int32_t *next;
     MOVE_FLOATS(DECLARE_FLOAT)
     SpecRows attached;
-    ChannelRows back, drag, turn;
+    ChannelRows back, drag, turn, pull;
     // per slot, of the flight that has the path's probe (probe.h): its record (-1: none) and medium, what all flights
     // together and this one are worth, where along it the probe is, and what is scattered there
     int32_t *probe, *probe_medium;
@@ -130,8 +131,8 @@ static inline size_t workspace_layout_moves(Workspace *ws, char *block, size_t a
     CARVE(ws->next, n)
     MOVE_FLOATS(CARVE_SAMPLE)
     CARVE_SPEC(ws->attached, n)
-    ChannelRows *rows[] = {&ws->back, &ws->drag, &ws->turn};
-    for (int i = 0; i < 3; i++) {
+    ChannelRows *rows[] = {&ws->back, &ws->drag, &ws->turn, &ws->pull};
+    for (int i = 0; i < 4; i++) {
         CARVE_SPEC(rows[i]->x, n)
         CARVE_SPEC(rows[i]->y, n)
         CARVE_SPEC(rows[i]->z, n)

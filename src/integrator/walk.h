@@ -5,7 +5,6 @@
 #include "bsdf/bsdf.h"
 #include "integrator/fog.h"
 
-enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be blocked
 
 typedef struct Walk {
     int32_t count;

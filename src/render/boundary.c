@@ -110,7 +110,9 @@ static rey_result check_rides(rey_scene *scene, int term) {
     const SceneView *view = &scene->view;
     char name[OBJECT_NAME];
     for (int64_t i = 0; i < view->shapes_count; i++) {
-        if (view->shapes[i].kind == SHAPE_MESH && (view->shapes[i].flags & SHAPE_HAS_NORMALS)) {
+        const ShapeRecord *shape = view->shapes + i;
+        bool solid = !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        if (solid && shape->kind == SHAPE_MESH && (shape->flags & SHAPE_HAS_NORMALS)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, "where, in participating media, normals of vertices turn away from what sees them", name);
         }
@@ -180,7 +182,8 @@ static rey_result boundary_check(const Render *r, int term) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         bool curved = shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_BSPLINE || shape->kind == SHAPE_LINEAR;
-        if (curved || (shape->collection >= 0 && shape->kind != SHAPE_MESH)) {
+        bool hides = !view->has_media || !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        if (hides && (curved || (shape->collection >= 0 && shape->kind != SHAPE_MESH))) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, curved ? "the outlines of curves and grids of distances"
                                               : "the outlines of spheres, disks and cylinders in shapegroups", name);

@@ -2,6 +2,7 @@
 // jump, and the cones of spots without a soft border.
 #include "render/light_borders.h"
 
+#include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "render/texture_steps.h"
 #include "scene/texels.h"
@@ -138,12 +139,30 @@ static rey_result find_borders(rey_scene *scene, Array *borders) {
     return result;
 }
 
+// Borders of media hide nothing, so that nothing jumps where they pass through surfaces.
+static void leave_out_passed(const SceneView *view, Array *meetings) {
+    MeetingRecord *all = meetings->data;
+    size_t kept = 0;
+    for (size_t i = 0; i < meetings->count && view->has_media; i++) {
+        bool passed = false;
+        for (int k = 0; k < 2; k++) {
+            int32_t shape = all[i].shape[k];
+            passed |= shape >= 0 && rey_bsdf_passes(view->bsdfs[view->shapes[shape].bsdf].kind);
+        }
+        if (!passed) {
+            all[kept++] = all[i];
+        }
+    }
+    meetings->count = view->has_media ? kept : meetings->count;
+}
+
 rey_result rey_meetings_with_borders(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings) {
     Array borders = {0};
     rey_result result = find_borders(scene, &borders);
     if (result == REY_OK) {
         result = rey_meetings_find(scene, borders.data, (int32_t)borders.count, moves, user, meetings);
     }
+    leave_out_passed(&scene->view, meetings);
     rey_array_free(scene->ctx, &borders);
     return result;
 }

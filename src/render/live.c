@@ -64,11 +64,12 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
                       texture_live(view, job, medium->flakes);
     bool emission = volume_live(view, job, medium->emission), borders = job->volume_at[medium->sigma_t] >= 0;
     bool albedo = volume_live(view, job, medium->albedo), phase = phase_live(view, job, medium->phase);
-    if (job->glides) { // rays glide over them
+    if (job->glides || job->rides) { // rays glide over them
         extinction |= volume_varies(view, medium->sigma_t) || medium->flakes >= 0; // which rays that turn see from another side
         albedo |= volume_varies(view, medium->albedo);
         emission |= volume_varies(view, medium->emission);
-        borders = phase = true;
+        borders = true;
+        phase |= job->glides;
     }
     return (extinction ? LIVE_EXTINCTION : 0) | (albedo ? LIVE_ALBEDO : 0) | (phase ? LIVE_PHASE : 0) |
            (emission ? LIVE_GLOW : 0) | (medium->bounded && borders ? LIVE_BORDER : 0);

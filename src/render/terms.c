@@ -120,19 +120,26 @@ static const char *gap_of_cameras(const SceneView *view) {
 
 // What is not known of surfaces that move in scenes with media, null where all is.
 static const char *gap_of_rides(const SceneView *view) {
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        int kind = view->bsdfs[i].kind;
-        if (rey_bsdf_opens(kind) || rey_bsdf_bends(kind)) {
-            return "in scenes with participating media, what moves changes the ways through surfaces that let light pass and those "
-                   "along smooth mirrors and glass. Known are volumes, surfaces of the kind 'null', at which media end, lights, "
-                   "and what moves among surfaces that all scatter";
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        const ShapeRecord *shape = view->shapes + i;
+        bool passes = rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        if (passes && shape->emitter >= 0) {
+            return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
+        }
+        if (!passes && (rey_bsdf_holds(view, shape->bsdf, rey_bsdf_opens) || rey_bsdf_holds(view, shape->bsdf, rey_bsdf_bends))) {
+            return "in scenes with participating media, what moves changes the ways through masks and thin glass and those along "
+                   "smooth mirrors and glass. Known are volumes, lights, and what moves among surfaces that all scatter or are of "
+                   "the kind 'null', at which media end";
         }
     }
     for (int64_t i = 0; i < view->media_count; i++) {
-        const MediumNode *medium = view->media + i;
-        if (medium->bounded || medium->flakes >= 0 || medium->emission >= 0) {
-            return "in media that vary, glow or are made of flakes, collisions that move with surfaces look them up elsewhere. "
-                   "Known is what moves in homogeneous media that do neither";
+        if (view->media[i].emission >= 0) {
+            return "in media that glow, the edges that surfaces and collisions see of what moves lack that light";
+        }
+    }
+    for (int64_t i = 0; i < view->volumes_count; i++) {
+        if (jumps(view->volumes + i)) {
+            return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
         }
     }
     return phases_read_volumes(view) ? "collisions that move with surfaces look up volumes of phase functions elsewhere" : NULL;
@@ -293,8 +300,9 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
     if (result == REY_OK && (r->faces & LIGHT_WITHIN)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                        "the gradient of lights at a point that lie within a participating medium, and of cameras beside them, "
-                        "does not exist yet: points next to a light, from which its light is scattered, must move as it does");
+                        "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
+                        "that move beside them, does not exist yet: points next to a light, from which its light is scattered, "
+                        "must move as it does");
     }
     int missing = r->stats.missing_terms & REY_TERM_TERMINATOR, bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {

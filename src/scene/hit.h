@@ -14,6 +14,11 @@ typedef struct Hit {
     Int instance; // of shapes with SHAPE_INSTANCED, else 0
 } Hit;
 
+KFN Hit hit_select(Mask m, const Hit *a, const Hit *b) {
+    return (Hit){i_select(m, a->shape, b->shape), i_select(m, a->prim, b->prim), f_select(m, a->u, b->u),
+                 f_select(m, a->v, b->v), v3_select(m, a->p, b->p), i_select(m, a->instance, b->instance)};
+}
+
 // Texture coordinates and, on surfaces, the hit that they belong to: attributes of meshes are read there.
 typedef struct TexCoord {
     Float x, y;

@@ -200,6 +200,11 @@ static const Motion motions[] = {
     {"ride_fog.xml", "block.to_world", TURN, {0.3f, 1, 0.2f}, 3, 2},
     {"ride_fog.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 1},
     {"ride_fog.xml", "ball.to_world", GROW, {-0.7f, 0.3f, 0.4f}, 0.03, 1},
+    {"ride_hull.xml", "ball.to_world", SHIFT, {1, 0.3f, -0.4f}, 0.03, 2},
+    {"ride_hull.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.05, 1},
+    {"ride_hull.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 2},
+    {"ride_cloud.xml", "ball.to_world", SHIFT, {1, 0.3f, -0.4f}, 0.03, 2},
+    {"ride_cloud.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 2},
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }

@@ -300,7 +300,7 @@ static void test_refusals(void **state) {
     ok(room, rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL));
     ok(room, rey_param_set(room.scene, rey_param_find(room.scene, "bulb.position"), within, 3));
     assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL), REY_ERROR_INCOMPLETE);
-    assert_non_null(strstr(rey_error(room.ctx), "cameras beside them"));
+    assert_non_null(strstr(rey_error(room.ctx), "cameras and surfaces that move beside them"));
     room_close(room);
 }
 

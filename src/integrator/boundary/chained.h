@@ -110,7 +110,7 @@ static void chained_start(Tracer *t, const Segments *q, int32_t half) {
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
             if (t->scene->has_media) { // what lies before the edge is on both sides the same
                 f_store(t->ws.paths[0].skip + (side * half + k), real_gather(q->behind, at) * -0.5f);
-                i_store(t->ws.paths[0].medium + (side * half + k), i_gather(q->around, at));
+                i_store(t->ws.paths[0].medium + (side * half + k), i_gather(q->medium, at));
             }
         }
     }

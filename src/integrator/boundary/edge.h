@@ -6,11 +6,6 @@
 #include "integrator/boundary/mark.h"
 #include "integrator/path_move.h"
 
-KFN Hit hit_select(Mask m, const Hit *a, const Hit *b) {
-    return (Hit){i_select(m, a->shape, b->shape), i_select(m, a->prim, b->prim), f_select(m, a->u, b->u),
-                 f_select(m, a->v, b->v), v3_select(m, a->p, b->p), i_select(m, a->instance, b->instance)};
-}
-
 // A point x(t) of an edge, attached to its surface.
 typedef struct EdgePoint {
     Hit hit;
@@ -453,7 +448,7 @@ static Mask edge_is_seen(Tracer *t, const EdgePoint *e, const Ray rays[2], Mask 
     Vec3 o = v3_scale(v3_add(rays[0].o, rays[1].o), f_set((real)0.5)), to = v3_sub(e->p, o);
     Float reach = v3_length(to);
     Ray ray = {o, v3_scale(to, f_safe_rcp(reach)), f_set(INFINITY)};
-    Hit hit = trace_closest(t->scene, &ray, m, false);
+    Hit hit = trace_solid(t->scene, &ray, m);
     t->job->rays += m_count(m);
     Mask own = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance) &
                (e->round | mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other));
@@ -466,7 +461,7 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n,
     Mask own[2], clear[2], grazed[2], above = m_gt(edge_first_rise(e, n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
-        Hit hit = trace_closest(t->scene, &ray, m, false);
+        Hit hit = trace_solid(t->scene, &ray, m);
         Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
         // Surfaces that pass through each other are met where the ray is as far from the curve, by the angle in which it does.

@@ -38,7 +38,7 @@ static void far_start(Tracer *t, const Segments *q) {
         Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), LOAD_V3(*q, dx, dy, dz, slot), f_zero_unless(m, f_set(INFINITY))};
         path_begin(t, k, slot, &ray, f_set(1));
         if (t->scene->has_media) {
-            i_store(t->ws.paths[0].medium + k, i_gather(q->around, slot));
+            i_store(t->ws.paths[0].medium + k, i_gather(q->medium, slot));
         }
     }
     t->active = n;

@@ -192,9 +192,10 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     t->lobes = in->upstream ? q->lobe : NULL;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
         if (!t->placed) {
-            trace_stage(t, 1);
             if (media) {
-                flight_stage(t, begin, bounce);
+                legs_stage(t, bounce);
+            } else {
+                trace_stage(t, 1);
             }
         }
         t->placed = false;

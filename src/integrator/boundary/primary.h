@@ -89,7 +89,7 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
-        Hit hit = trace_closest(t->scene, &ray, own, false);
+        Hit hit = trace_solid(t->scene, &ray, own);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         t->job->rays += m_count(own);
         if (t->scene->hide_emitters) {
@@ -122,6 +122,37 @@ static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinh
     return kept_count;
 }
 
+// In media, what lies before the edge is on both sides the same: the paths k and half + k begin half-way between the edge and the
+// last border before it, in lanes of m, with what gets there; their media begin at the edge.
+static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32_t half, Mask m) {
+    Paths *p = &t->ws.paths[0];
+    const EdgePoint *e = &s->edge;
+    Ray ray = primary_ray(t, s, 0).ray;
+    Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), step = interaction_step(e->p);
+    Vec3 out = v3_scale(s->n, f_select(m_gt(edge_first_rise(e, s->n), f_set(0)), -step, step));
+    Vec3 from = v3_select(s->silhouette, v3_add(e->p, out), v3_madd(e->p, -4.0f * step, ray.d));
+    Ray back = {from, v3_neg(ray.d), reach};
+    Hit before = trace_closest(t->scene, &back, m, false);
+    t->job->rays += m_count(m);
+    Float clear = f_select(mi_lt(i_set(-1), before.shape), f_min(v3_length(v3_sub(before.p, from)), reach), reach);
+    Mask blocked;
+    Fog fog = {i_set(t->sensor->medium), stream_key(t, i_iota() + k, 0, STREAM_SHADOW)};
+    Ray to = {ray.o, v3_normalize(v3_sub(from, ray.o)), v3_length(v3_sub(from, ray.o))};
+    Spec arrives = walk_transmittance(t, to, m, &fog, &blocked, NULL);
+    Int medium = medium_around(t, from, back.d, m);
+    for (int side = 0; side < 2; side++) {
+        int32_t at = side * half + k;
+        Vec3 d = record_v3(p->dx, p->dy, p->dz, at), o = record_v3(p->ox, p->oy, p->oz, at);
+        o = v3_madd(o, reach - 0.5f * clear, d);
+        f_store(p->ox + at, o.x);
+        f_store(p->oy + at, o.y);
+        f_store(p->oz + at, o.z);
+        f_store(p->skip + at, -0.5f * clear);
+        i_store(p->medium + at, medium);
+        spec_store(p->beta, at, spec_mul(spec_load(p->beta, at), spec_zero_unless(m, arrives)));
+    }
+}
+
 // Starts the two paths of every sample that was kept: slots k and half + k.
 static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, int64_t first, const int32_t *kept,
                           int32_t count, int32_t half) {
@@ -141,6 +172,9 @@ static void primary_start(Tracer *t, const BoundaryJob *b, const Pinhole *pinhol
             // Lanes beyond the count carry rays that end at once.
             r.ray.tmax = f_zero_unless(m_first_n(count - k), r.ray.tmax);
             path_begin(t, side * half + k, slot + side * half, &r.ray, r.weight);
+        }
+        if (t->job->rides) {
+            primary_approach(t, &s, k, half, m_first_n(count - k) & s.m);
         }
     }
     t->active = 2 * half;

@@ -4,7 +4,7 @@
 //   dI += integral dl dw |w x T| n . (e' - r') (L- - L+) W.
 // Where a surface looks past an edge, this is so for what is scattered in the air behind it, before the light meets a surface;
 // surfaces behind it are attached (indirect.h). Lights at a point are attached, too.
-// NOT differentiated: edges that are seen through surfaces.
+// Borders of media are passed.
 #pragma once
 
 #include "integrator/boundary/chained.h"
@@ -18,12 +18,12 @@ static void riding_shine(Tracer *t, Segment *s, Int number, Segments *q) {
         return;
     }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
     m = leg.m & mi_lt(i_set(-1), leg.air);
     // Directions stay, and the ends slide over their lights.
     s->attached = m_set(false);
     s->distance = f_select(mi_lt(s->source, i_set(0)), f_set(INFINITY), s->distance);
-    segment_keep_leg(&leg, q, m);
+    segment_keep_leg(around, &leg, q, m);
     i_compress(q->sighted + q->count, i_set(0), m);
     segment_keep(s, o, &leg.near, true, number, q, m);
 }
@@ -33,12 +33,12 @@ static void riding_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
     Vec3 o = chained_offset(s);
     Int around = medium_around(t, o, s->d, s->m);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, s->m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
     Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air));
     if (m_any(m)) {
         Float behind;
         m = chained_between(t, s, leg.near.p, m, &behind);
-        segment_keep_leg(&leg, q, m);
+        segment_keep_leg(around, &leg, q, m);
         i_compress(q->sighted + q->count, i_set(0), m);
         chained_keep(s, o, &leg.near, behind, number, q, m);
     }
@@ -54,7 +54,7 @@ static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     Vec2 lens = sensor_has_lens(t->sensor) ? rng_2d(&key, DIMENSION_LENS) : (Vec2){f_set(0.5f), f_set(0.5f)};
     Float x = (real)job->x + film.x * (real)job->width, y = (real)job->y + film.y * (real)job->height;
     Ray ray = sensor_ray(scene, t->sensor, x, y, lens).ray;
-    Hit hit = trace_closest(scene, &ray, m, false);
+    Hit hit = trace_solid(scene, &ray, m);
     t->job->rays += m_count(m);
     Mask ends = mi_lt(i_set(-1), hit.shape);
     Float length = f_select(ends, v3_dot(v3_sub(hit.p, ray.o), ray.d), f_set(INFINITY));
@@ -79,27 +79,37 @@ static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     return near;
 }
 
+// The extinction of whatever media points lie in, along d.
+static NOINLINE Spec extinction_at(const Tracer *t, Int medium, Vec3 p, Vec3 d, Mask m) {
+    Spec extinction = spec_zero();
+    for (Mask left = m & mi_lt(i_set(-1), medium), mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(medium, m_first(left));
+        Track track = track_of(t, id);
+        mine = left & mi_eq(medium, i_set(id));
+        extinction = spec_select(mine, medium_extinction(t->scene, &track, p, d), extinction);
+    }
+    return extinction;
+}
+
 // Keeps those of them that the edge sees.
 static void riding_see(Tracer *t, Segment *s, Vec3 near, Int number, Segments *q) {
-    const int32_t medium = t->sensor->medium;
     Vec3 o = chained_offset(s), d = v3_neg(s->d);
-    Ray back = {o, d, v3_length(v3_sub(near, o))};
-    Hit met = trace_closest(t->scene, &back, s->m, false);
-    t->job->rays += m_count(s->m);
-    Mask m = s->m & mi_lt(met.shape, i_set(0));
+    Leg leg = {.air = medium_around(t, near, s->d, s->m)};
+    leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
+    leg.weight = extinction_at(t, leg.air, near, d, s->m);
+    Mask m = s->m & m_gt(spec_max(leg.weight), f_set(0)), blocked;
     if (!m_any(m)) {
         return;
     }
-    Track track = track_of(t, medium);
-    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = {.air = i_set(medium), .around = i_set(medium)};
-    leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
-    leg.weight = spec_mul(medium_extinction(t->scene, &track, near, d),
-                          track_transmittance(&track, near, s->d, s->distance, m, &key, 0));
+    Int around = medium_around(t, o, s->d, m);
+    Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE)};
+    Ray back = {o, d, v3_length(v3_sub(near, o))};
+    leg.weight = spec_mul(leg.weight, walk_transmittance(t, back, m, &fog, &blocked, NULL));
+    leg.around = leg.air;
     m = m & m_gt(spec_max(leg.weight), f_set(0));
     Float behind;
     m = chained_between(t, s, near, m, &behind);
-    segment_keep_leg(&leg, q, m);
+    segment_keep_leg(around, &leg, q, m);
     i_compress(q->sighted + q->count, i_set(1), m);
     chained_keep(s, o, &leg.near, behind, number, q, m);
 }
@@ -117,7 +127,7 @@ static void ridings_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         Segment s;
         if (turn.sighted) {
             Vec3 near = riding_sight(t, b, pinhole, i_iota() + i, turn.share, m_first_n(count - i), &s);
-            if (m_any(s.m) && t->sensor->medium >= 0) {
+            if (m_any(s.m)) {
                 riding_see(t, &s, near, i_iota() + i, q);
             }
             continue;

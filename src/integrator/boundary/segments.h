@@ -7,7 +7,8 @@
 // them; the near side of the edge adds nothing, because its own light moves along with it.
 #pragma once
 
-#include "integrator/boundary/airborne.h"
+#include "integrator/boundary/edge.h"
+#include "integrator/leg.h"
 #include "integrator/boundary/view.h"
 
 // Beside the numbers of edges: the light, and where on it or which direction.
@@ -28,13 +29,13 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
 // what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
-// (airborne.h), what the flight to it weighs, and whether it was looked for along a ray of the sensor's.
+// (leg.h), and the edge, what the flight to it weighs, and whether it was looked for along a ray of the sensor's.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         F(nudge_u) F(nudge_v)                                                                                                  \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
 #define SEGMENT_INTS(I)                                                                                                \
-    I(number) I(lit) I(source) I(air) I(around) I(sighted) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
+    I(number) I(lit) I(source) I(air) I(around) I(medium) I(sighted) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light) S(flown)
 
 // Near vertices of one level (upstream.h): where they lie, where the particle came from and went on, and what the motion of a
@@ -289,7 +290,7 @@ static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
     Vec3 p = s->edge.p, n;
     Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
     Ray back = {o, v3_neg(s->d), 32.0f * step};
-    Hit met = trace_closest(t->scene, &back, s->m, false);
+    Hit met = trace_solid(t->scene, &back, s->m);
     t->job->rays += m_count(s->m);
     Mask m = s->m & mi_lt(i_set(-1), met.shape);
     m = m & ~(mi_eq(met.shape, s->edge.hit.shape) & mi_eq(met.instance, s->edge.hit.instance));
@@ -334,8 +335,9 @@ static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Int number,
     return m & m_gt(spec_max(through), f_set(0));
 }
 
-// Keeps where the flights of m from the edge have ended, of segments that are stored next.
-KFN void segment_keep_leg(const Leg *leg, Segments *q, Mask m) {
+// Keeps where the flights of m from the edge, in `medium`, have ended, of segments that are stored next.
+KFN void segment_keep_leg(Int medium, const Leg *leg, Segments *q, Mask m) {
+    i_compress(q->medium + q->count, medium, m);
     i_compress(q->air + q->count, leg->air, m);
     i_compress(q->around + q->count, leg->around, m);
     spec_compress(q->flown, q->count, leg->weight, m);
@@ -351,7 +353,7 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
         m = segment_shine(t, s, o, around, number, m);
     } else {
         Ray ahead = {o, s->d, f_set(INFINITY)};
-        s->far = trace_closest(t->scene, &ahead, m, false);
+        s->far = trace_solid(t->scene, &ahead, m);
         t->job->rays += m_count(m);
         m = s->attached = m & mi_lt(i_set(-1), s->far.shape);
     }
@@ -359,9 +361,9 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
         return;
     }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, o, v3_neg(s->d), around, &key, m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
     m = rides ? leg.m & mi_lt(leg.air, i_set(0)) : leg.m;
-    segment_keep_leg(&leg, q, m);
+    segment_keep_leg(around, &leg, q, m);
     segment_keep(s, o, &leg.near, lit, number, q, m);
 }
 

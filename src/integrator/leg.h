@@ -1,0 +1,91 @@
+// leg.h: ways through scenes with media that nobody records: up to where a ray collides or meets a surface that scatters. Surfaces
+// of the kind null are passed on the way and are no vertices, so that the number of vertices is that of the way's depth.
+#pragma once
+
+#include "integrator/flight.h"
+
+// Where such ways end.
+typedef struct Leg {
+    Hit near;        // shape -1: a collision
+    Int air, around; // the medium that it is in, -1 = a surface; the medium that the ray came through
+    Spec weight;
+    Mask m;
+} Leg;
+
+// Surfaces that rays pass: moves the lanes of m among them on, and returns them.
+static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Int *medium) {
+    const SceneView *scene = t->scene;
+    Int groups = SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group);
+    Mask passed = m_set(false);
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(groups, m_first(left));
+        const Group *group = scene->groups + id;
+        mine = left & mi_eq(groups, i_set(id));
+        if (scene->bsdfs[group->bsdf].kind == BSDF_NULL) {
+            Hit safe = walk_hit(hit, mine);
+            Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
+            *o = v3_select(mine, interaction_behind(&si, d), *o);
+            *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);
+            passed = passed | mine;
+        }
+    }
+    return passed;
+}
+
+// The ray's media begin at `from`, a point of its line; what it passes before that is nothing. weight: of the paths that go so.
+static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
+    Leg leg = {.near = {i_set(-1), i_set(0), f_set(0), f_set(0), ray.o, i_set(0)}, .air = i_set(-1), .around = medium};
+    leg.weight = weight;
+    leg.m = m_set(false);
+    Mask left = m;
+    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
+        Hit hit = trace_media(t, &ray, left, false);
+        t->job->rays += m_count(left);
+        Mask found = left & mi_lt(i_set(-1), hit.shape), collides = m_set(false);
+        Float far = f_select(found, v3_dot(v3_sub(hit.p, from), ray.d), f_set(INFINITY));
+        Mask begun = m_gt(far, f_set(0));
+        for (Mask rest = left & begun & mi_lt(i_set(-1), medium), mine; m_any(rest); rest = rest & ~mine) {
+            int32_t id = i_lane(medium, m_first(rest));
+            Track track = track_of(t, id);
+            mine = rest & mi_eq(medium, i_set(id));
+            Spec shares = channel_shares(t, leg.weight);
+            Flight f = track_flight(&track, from, ray.d, far, shares, mine, key, (uint32_t)i * MOST_COLLISIONS);
+            Mask collided = mine & f.real;
+            leg.weight = spec_select(mine, spec_mul(leg.weight, f.weight), leg.weight);
+            leg.near.p = v3_select(collided, v3_madd(from, flight_inside(from, f.t, far), ray.d), leg.near.p);
+            leg.air = i_select(collided, i_set(id), leg.air);
+            collides = collides | collided;
+        }
+        leg.around = i_select(left, medium, leg.around);
+        Int behind = medium;
+        Mask passed = leg_pass(t, &hit, ray.d, found & ~collides, &ray.o, &behind), met = found & ~collides & ~passed;
+        medium = i_select(begun, behind, medium);
+        from = v3_select(passed & begun, hit.p, from);
+        leg.near = hit_select(met, &hit, &leg.near);
+        leg.m = leg.m | met | collides;
+        left = passed;
+    }
+    leg.m = leg.m & m_gt(spec_max(leg.weight), f_set(0)) & m_finite(spec_sum(leg.weight));
+    return leg;
+}
+
+// What trace_stage and flight_stage do, for such ways of paths.
+static void legs_stage(Tracer *t, int32_t bounce) {
+    Paths *p = &t->ws.paths[t->current];
+    for (int32_t k = 0; k < t->active; k += LANES) {
+        Mask m = m_first_n(t->active - k);
+        Ray ray = path_ray(p, k);
+        Vec3 from = v3_madd(ray.o, -f_load(p->skip + k), ray.d);
+        Int medium = i_select(m, i_load(p->medium + k), i_set(-1));
+        SampleKey key = stream_key(t, i_select(m, i_load(p->slot + k), i_set(0)), bounce, STREAM_FLIGHT);
+        m = m & m_gt(ray.tmax, f_set(0)); // some rays end at once
+        Leg leg = leg_trace(t, ray, from, medium, spec_load(p->beta, k), &key, m);
+        leg.near.shape = i_select(leg.m, leg.near.shape, i_set(-1));
+        hit_store(t, k, &leg.near);
+        Mask collides = leg.m & mi_lt(i_set(-1), leg.air);
+        Int group = leg.air + ((int32_t)t->scene->groups_count + 1);
+        i_store(t->ws.hit_group + k, i_select(collides, group, i_load(t->ws.hit_group + k)));
+        i_store(p->medium + k, leg.around);
+        spec_store(p->beta, k, spec_zero_unless(m & m_finite(spec_sum(leg.weight)), leg.weight));
+    }
+}
