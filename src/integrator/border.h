@@ -8,6 +8,7 @@
 // surface's. What is scattered is found by a path of its own, at one border of each path.
 #pragma once
 
+#include "integrator/carried.h"
 #include "integrator/glide.h"
 #include "integrator/probe.h"
 #include "shape/move.h"
@@ -191,12 +192,15 @@ KFN Spec border_gain(const Filling *f, Spec scattered, Spec radiance) {
     return spec_add(spec_mul(f->extinction, spec_sub(scattered, radiance)), f->emission);
 }
 
-// Where surfaces move (ride.h): adds the adjoint `position` of all points of the ray that led to the records to that of the vertex
-// where it began. Where it ends at an attached vertex, that turns it: `end` is the part that the radiance from there asks for.
-static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int channel, Int slot, Vec3 position, const Glide *end,
-                              Mask m) {
+// Where surfaces move (ride.h): adds the adjoint `all` of points of the ray that led to the records to that of the vertex where it
+// began, or to the sensor. Where it ends at an attached vertex, that turns it: `end` is the part that the radiance from there asks
+// for.
+static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int channel, Int slot, const Glide *all,
+                              const Glide *end, Sink *sink, Mask m) {
     const Workspace *ws = &t->ws;
-    rows_scatter(&ws->drag, channel, slot, v3_add(rows_gather(&ws->drag, channel, slot), position), m);
+    const Carried first = {all->position, all->turn};
+    first_ride_adj(t, batch, slot, all->ref, &first, sink, m);
+    rows_scatter(&ws->drag, channel, slot, v3_add(rows_gather(&ws->drag, channel, slot), all->position), m);
     Mask slides = mi_eq(i_load(ws->records.slides + batch->first), i_set(1));
     m = m & ~slides & mi_lt(i_set(-1), i_gather(ws->next, slot));
     if (m_any(m)) {
@@ -207,10 +211,11 @@ static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int cha
 
 // The same of one point p of the ray along d, given dp and the part of it that the end asks for.
 static void ride_add_point(const Tracer *t, const RecordBatch *batch, int channel, Int slot, Vec3 p, Vec3 d, Vec3 dp, Vec3 attached,
-                           Mask m) {
-    Glide end = {.ref = glide_reference(t, slot, p), .d = d};
+                           Sink *sink, Mask m) {
+    Glide end = {.ref = glide_reference(t, slot, p), .d = d}, all = {.ref = p, .d = d, .turn = v3_zero()};
     glide_add(&end, p, attached, m);
-    ride_add(t, batch, channel, slot, v3_select(m, dp, v3_zero()), &end, m);
+    all.position = v3_select(m, dp, v3_zero());
+    ride_add(t, batch, channel, slot, &all, &end, sink, m);
 }
 
 // ---- surfaces ----------------------------------------------------------------------------------------------------
@@ -294,7 +299,7 @@ static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffi
             glide_store(t, &g, c, s.slot, m);
         } else if (t->job->rides) {
             Float loses = spec_dot(spec_mul(slot_adjoint(t, s.slot, c), s.beta), lost) * s.rcp;
-            ride_add_point(t, batch, c, s.slot, s.hit.p, s.d, v3_neg(d.p), v3_scale(s.si.ng, -loses), m);
+            ride_add_point(t, batch, c, s.slot, s.hit.p, s.d, v3_neg(d.p), v3_scale(s.si.ng, -loses), sink, m);
         }
         forward_flush(t, sink, s.slot, c, m);
     }
@@ -378,7 +383,7 @@ static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, S
                 Float end = spec_dot(delta, spec_mul(b.inside[k].extinction, onward));
                 Vec3 all = face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx);
                 Vec3 attached = face_turn(t->scene, b.sigma_t, b.face + k, b.d, k ? -end : end);
-                ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(attached), b.face[k].m);
+                ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(attached), sink, b.face[k].m);
             }
         }
         forward_flush(t, sink, b.slot, c, b.m);

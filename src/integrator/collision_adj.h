@@ -116,6 +116,10 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
             Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, &to, true, sink);
             g.position = v3_add(g.position, dp);
         }
+        if (t->job->rides) {
+            const Carried first = {g.position, g.turn};
+            first_ride_adj(t, batch, slot, s.hit.p, &first, sink, finite);
+        }
         forward_flush(t, sink, slot, c, s.m);
         if (glides) {
             glide_store(t, &g, c, slot, finite);

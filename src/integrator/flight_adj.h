@@ -163,18 +163,18 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
     const bool glides = t->job->glides, rides = t->job->rides;
     Vec3 ref = glides ? glide_reference(t, slot, a.f.o) : a.f.o;
     for (int c = 0; c < drives(t); c++) {
-        Glide g = {.ref = ref}, end = {.ref = glide_reference(t, slot, ref), .d = a.f.d};
+        Glide g = {.ref = ref, .d = a.f.d}, end = {.ref = glide_reference(t, slot, ref), .d = a.f.d};
         if (glides) {
             g = glide_load(t, c, slot, ref, a.f.d);
         }
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
         flight_adj(t, &a, live, delta, glides || rides ? &g : NULL, rides ? &end : NULL, sink);
-        forward_flush(t, sink, slot, c, finite);
         if (glides) {
             glide_store(t, &g, c, slot, a.f.m);
         } else if (rides) {
-            ride_add(t, batch, c, slot, g.position, &end, a.f.m);
+            ride_add(t, batch, c, slot, &g, &end, sink, a.f.m);
         }
+        forward_flush(t, sink, slot, c, finite);
     }
     if (glides) {
         glide_refer(t, slot, ref, a.f.m);

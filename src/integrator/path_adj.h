@@ -37,8 +37,10 @@ static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
         if (sink->any_motion || t->job->glides) {
             rows_scatter(&t->ws.turn, c, slot, move.d, m);
         }
-        if (sink->any_camera && batch->first_vertex && !t->job->glides) {
-            Carried carried = {v3_zero(), move.d};
+        const Carried carried = {v3_zero(), move.d};
+        if (t->job->rides) {
+            first_ride_adj(t, batch, slot, d, &carried, sink, m);
+        } else if (sink->any_camera && batch->first_vertex && !t->job->glides) {
             camera_move_adj(t, slot, d, &carried, sink, m);
         }
         forward_flush(t, sink, slot, c, m);

@@ -14,7 +14,7 @@
 // transmittances of shadow rays.
 #pragma once
 
-#include "integrator/sweep.h"
+#include "integrator/carried.h"
 #include "shape/move.h"
 
 // Adjoint of one vertex: of wi (local), of the direction onwards, of the light sample, shading frame, surface and uv; and
@@ -175,11 +175,6 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
     return dp;
 }
 
-// What the ray that found a vertex carries back: the adjoints of its position there, and of its direction.
-typedef struct Carried {
-    Vec3 drag, turn;
-} Carried;
-
 // The segment to the next vertex, which the sweep has just left: returns the adjoint of this vertex's position.
 static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const VertexAdj *v, int channel, Sink *sink) {
     const Workspace *ws = &t->ws;
@@ -206,18 +201,6 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
                i_gather(r->instance, next)};
     points_move_adj(t, &hit, dr, darea, sink, attached);
     return v3_select(attached, v3_sub(drag, dr), drag);
-}
-
-// The sensor's part in the adjoints of the rays that it sent out.
-static void camera_move_adj(const Tracer *t, Int slot, Vec3 target, const Carried *carried, Sink *sink, Mask m) {
-    Vec2 lens = {f_set(0), f_set(0)};
-    if (sensor_has_lens(t->sensor)) {
-        SampleKey key = slot_key(t, slot);
-        lens = rng_2d(&key, DIMENSION_LENS);
-    }
-    RayAdj ray = {target, carried->drag, carried->turn};
-    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), lens, &ray, sink,
-                   m);
 }
 
 // Adjoint of where vertices lie, for one delta; dp: of their positions. The lanes of `slides` lie where a ray meets
@@ -288,16 +271,18 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     if (m_any(s->scattered & s->chained)) {
         chain_move_adj(t, s, weight, live, channel, &carried, sink);
     }
+    const bool rides = t->job->rides;
+    if (sink->any_camera && (s->first || rides)) { // borders may lie before what the sensor sees
+        Mask seen = rides ? s->m & mi_eq(i_load(t->ws.records.depth + s->at), i_set(0)) : s->m;
+        camera_move_adj(t, s->slot, s->si.p, &carried, sink, seen);
+    }
     if (s->first) {
-        if (sink->any_camera) {
-            camera_move_adj(t, s->slot, s->si.p, &carried, sink, s->m);
-        }
         return;
     }
     rows_scatter(&t->ws.back, channel, s->slot, back, s->m);
     rows_scatter(&t->ws.drag, channel, s->slot, carried.drag, s->m);
     rows_scatter(&t->ws.turn, channel, s->slot, carried.turn, s->m);
-    if (t->job->rides) {
+    if (rides) {
         rows_scatter(&t->ws.pull, channel, s->slot, v3_zero(), s->m);
     }
 }

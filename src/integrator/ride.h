@@ -7,7 +7,8 @@
 //   dL = dx T (s a S + j) - dD s L,                                                                            (border.h, 1)
 // dD = dx where the end slides, and along segments that are attached the change of their length. S is found by the path's probe.
 // Shadow rays from collisions keep their direction, and their ends slide over the lights; those from surfaces keep both ends.
-// Borders of media are passed, and points of the way between attached ends move with both (ride_add).
+// Borders of media are passed, and points of the way between attached ends move with both (ride_add). The sensor's ray moves as
+// the sensor says: by o' + s d' at the distance s, with a collision there or where it meets a surface (first_ride_adj).
 // NOT differentiated: surfaces other than null that rays pass, volumes of phase functions.
 #pragma once
 
@@ -87,6 +88,8 @@ static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec ra
         if (t->job->live[batch->group] & LIVE_MOTION) {
             shape_move_adj(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit, &s.si, &d, sink, m);
         }
+        const Carried first = {v3_neg(d.p), v3_zero()};
+        first_ride_adj(t, batch, s.slot, s.hit.p, &first, sink, m);
         rows_scatter(&t->ws.drag, c, s.slot, v3_sub(rows_gather(&t->ws.drag, c, s.slot), d.p), m);
         forward_flush(t, sink, s.slot, c, m);
     }

@@ -69,7 +69,7 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
         albedo |= volume_varies(view, medium->albedo);
         emission |= volume_varies(view, medium->emission);
         borders = true;
-        phase |= job->glides;
+        phase |= job->any_camera; // which then sees collisions from another side
     }
     return (extinction ? LIVE_EXTINCTION : 0) | (albedo ? LIVE_ALBEDO : 0) | (phase ? LIVE_PHASE : 0) |
            (emission ? LIVE_GLOW : 0) | (medium->bounded && borders ? LIVE_BORDER : 0);

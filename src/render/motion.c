@@ -79,6 +79,15 @@ int32_t rey_camera_theta(const SensorRecord *s, int32_t number) {
     }
 }
 
+bool rey_cameras_glide(const SceneView *view) {
+    for (int64_t i = 0; i < view->shapes_count && view->has_media; i++) {
+        if (view->shapes[i].emitter >= 0 || !rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind)) {
+            return false;
+        }
+    }
+    return view->has_media;
+}
+
 static bool only_separates(const SceneView *view, const ShapeRecord *shape) {
     return shape->emitter < 0 && shape_moves(shape->kind) && rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
 }
@@ -110,7 +119,8 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
     if (p->camera >= 0 && rey_camera_theta(r->plan.sensor, p->camera) == p->theta) {
-        *(view->has_media ? &job->glides : &job->any_motion) = true;
+        *(rey_cameras_glide(view) ? &job->glides : &job->any_motion) = true;
+        job->rides = job->any_motion && view->has_media;
         job->any_camera = true;
         return (int32_t *)(uintptr_t)job->camera_at + p->camera;
     }

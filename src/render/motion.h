@@ -14,6 +14,9 @@ void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, con
 // where media end, and neither the path's vertices nor what hides light are among them.
 bool rey_moves_border(const SceneView *view, const Param *p);
 
+// Whether cameras that move take whole paths along (integrator/glide.h): in scenes with media, where no surface scatters or shines.
+bool rey_cameras_glide(const SceneView *view);
+
 // Where a sensor keeps one of its numbers (CAMERA_), -1 where it has none.
 int32_t rey_camera_theta(const SensorRecord *s, int32_t number);
 

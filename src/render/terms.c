@@ -93,19 +93,19 @@ static bool phases_read_volumes(const SceneView *view) {
     return false;
 }
 
-// What is not known of cameras that move in scenes with media, null where all is.
-static const char *gap_of_cameras(const SceneView *view) {
-    for (int64_t i = 0; i < view->shapes_count; i++) {
-        if (view->shapes[i].emitter >= 0 || !rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind)) {
-            return "in scenes with participating media, cameras move past the edges of what they and collisions see. Known are "
-                   "cameras in scenes whose surfaces are all of the kind 'null'";
-        }
-    }
+static bool has_projector(const SceneView *view) {
     for (int64_t i = 0; i < view->emitters_count; i++) {
         if (view->emitters[i].kind == EMITTER_PROJECTOR) {
-            return "in scenes with participating media, collisions that move with the camera pass the border of a projector's "
-                   "light";
+            return true;
         }
+    }
+    return false;
+}
+
+// What is not known of cameras that move among media and their borders alone, null where all is.
+static const char *gap_of_glides(const SceneView *view) {
+    if (has_projector(view)) {
+        return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
     }
     if (phases_read_volumes(view)) {
         return "collisions that move with the camera look up volumes of phase functions elsewhere";
@@ -118,7 +118,7 @@ static const char *gap_of_cameras(const SceneView *view) {
     return NULL;
 }
 
-// What is not known of surfaces that move in scenes with media, null where all is.
+// What is not known of surfaces that move in scenes with media, and of cameras among them, null where all is.
 static const char *gap_of_rides(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
@@ -131,6 +131,9 @@ static const char *gap_of_rides(const SceneView *view) {
                    "smooth mirrors and glass. Known are volumes, lights, and what moves among surfaces that all scatter or are of "
                    "the kind 'null', at which media end";
         }
+    }
+    if (has_projector(view)) {
+        return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         if (view->media[i].emission >= 0) {
@@ -155,7 +158,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
         return NULL;
     }
     if (p->camera >= 0) {
-        return gap_of_cameras(view);
+        return rey_cameras_glide(view) ? gap_of_glides(view) : gap_of_rides(view);
     }
     if (p->geometry >= 0 || p->instance >= 0) {
         return gap_of_rides(view);

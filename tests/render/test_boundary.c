@@ -205,6 +205,13 @@ static const Motion motions[] = {
     {"ride_hull.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 2},
     {"ride_cloud.xml", "ball.to_world", SHIFT, {1, 0.3f, -0.4f}, 0.03, 2},
     {"ride_cloud.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 2},
+    {"ride_fog.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
+    {"ride_fog.xml", "camera.to_world", TURN, {0.3f, 1, 0.5f}, 1, 1},
+    {"ride_fog.xml", "camera.x_fov", ADD, {0, 0, 0}, 1, 1},
+    {"ride_hull.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
+    {"ride_hull.xml", "camera.to_world", TURN, {0.3f, 1, 0.5f}, 1, 1},
+    {"ride_cloud.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
+    {"ride_cloud.xml", "camera.to_world", TURN, {0.3f, 1, 0.5f}, 1, 2},
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }

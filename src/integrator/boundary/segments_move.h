@@ -137,7 +137,7 @@ static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
         Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY)) & ~air;
         Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
         points_slide_adj(in, &at.hit, c.drag, lens, sink, ray);
-        // A collision that the sensor sees does not move.
+        collisions_slide_adj(in, at.hit.p, c.drag, lens, sink, air);
         f_store(q->up[bounce].seen + k, f_zero_unless(ray | air, rate + sink_taken(sink)));
         points_move_adj(in->t, &at.hit, c.drag, v3_zero(), sink, ray);
         f_store(q->up[bounce].unseen + k, f_zero_unless(ray, rate + sink_taken(sink)));
@@ -179,15 +179,18 @@ static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
     Carried c = ways_begin_adj(in, k, worth[0], false, sink, m);
     Vec2 lens = near_lens(in, i_min(i_iota() + k, i_set(q->count - 1)));
     for (int32_t j = 0; j < q->levels; j++) {
-        Float rcp = f_zero_unless(m_ne(worth[j], f_set(0)), 1.0f / f_select(m_ne(worth[j], f_set(0)), worth[j], f_set(1)));
+        // Shares of the whole, which may be so small that one over it is infinite.
+        Float some = f_select(m_ne(worth[j], f_set(0)), worth[j], f_set(1)), seen = f_load(q->up[j].seen + k) / some;
         upstream_ride_adj(in->t, q, j, k, &c, sink, m);
         UpstreamVertex at = upstream_load(q, j, k);
         Mask ray = m & mi_eq(at.met, i_set(UPSTREAM_RAY)) & mi_lt(i_set(-1), at.hit.shape);
+        Mask air = m & mi_lt(i_set(UPSTREAM_NONE), at.met) & mi_lt(at.hit.shape, i_set(0));
+        collisions_slide_adj(in, at.hit.p, v3_scale(c.drag, seen), lens, sink, air);
         if (m_any(ray)) {
-            points_slide_adj(in, &at.hit, v3_scale(c.drag, f_load(q->up[j].seen + k) * rcp), lens, sink, ray);
-            points_move_adj(in->t, &at.hit, v3_scale(c.drag, f_load(q->up[j].unseen + k) * rcp), v3_zero(), sink, ray);
+            points_slide_adj(in, &at.hit, v3_scale(c.drag, seen), lens, sink, ray);
+            points_move_adj(in->t, &at.hit, v3_scale(c.drag, f_load(q->up[j].unseen + k) / some), v3_zero(), sink, ray);
         }
-        Float share = worth[j + 1] * rcp;
+        Float share = worth[j + 1] / some;
         c = (Carried){v3_scale(c.drag, share), v3_scale(c.turn, share)};
         upstream_turn_adj(in->t, q, j, k, &c, sink, m);
     }

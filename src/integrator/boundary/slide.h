@@ -49,6 +49,16 @@ static void points_slide_adj(const Indirect *in, const Hit *hit, Vec3 dp, Vec2 l
     surfaces_slide_adj(in, hit, &d, lens, sink, m);
 }
 
+// Of collisions that the sensor sees at fixed film positions and distances.
+static void collisions_slide_adj(const Indirect *in, Vec3 p, Vec3 dp, Vec2 lens, Sink *sink, Mask m) {
+    if (sink->any_camera && m_any(m)) {
+        View view = view_make(in->t->scene, in->pinhole, in->t->sensor, lens);
+        Seen seen = view_see(&view, p);
+        RayAdj ray = {p, dp, v3_zero()};
+        sensor_ray_adj(in->t->scene, in->t->sensor, seen.x, seen.y, view.lens, &ray, sink, m & seen.valid);
+    }
+}
+
 KFN Float sink_taken(Sink *sink) {
     Float d = sink->derivative;
     sink->derivative = f_set(0);

@@ -1,0 +1,35 @@
+// carried.h: what rays carry back to where they come from, and the sensor's part in it.
+#pragma once
+
+#include "integrator/sweep.h"
+
+// What the ray that found a vertex carries back: the adjoints of its position there, and of its direction.
+typedef struct Carried {
+    Vec3 drag, turn;
+} Carried;
+
+// The sensor's part in the adjoints of the rays that it sent out.
+static void camera_move_adj(const Tracer *t, Int slot, Vec3 target, const Carried *carried, Sink *sink, Mask m) {
+    Vec2 lens = {f_set(0), f_set(0)};
+    if (sensor_has_lens(t->sensor)) {
+        SampleKey key = slot_key(t, slot);
+        lens = rng_2d(&key, DIMENSION_LENS);
+    }
+    RayAdj ray = {target, carried->drag, carried->turn};
+    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), lens, &ray, sink,
+                   m);
+}
+
+// The lanes of a batch's records that lie on the sensor's ray, or at its end, where surfaces move in media.
+KFN Mask records_first(const Tracer *t, const RecordBatch *batch, Mask m) {
+    return m & mi_eq(i_load(t->ws.records.depth + batch->first), i_set(0));
+}
+
+// What they ask of the sensor: the adjoint c of the ray's position at p, and of its direction.
+static NOINLINE void first_ride_adj(const Tracer *t, const RecordBatch *batch, Int slot, Vec3 p, const Carried *c, Sink *sink,
+                                    Mask m) {
+    m = m & m_finite(v3_dot(c->drag, c->drag) + v3_dot(c->turn, c->turn));
+    if (sink->any_camera) {
+        camera_move_adj(t, slot, p, c, sink, records_first(t, batch, m));
+    }
+}
