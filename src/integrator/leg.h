@@ -8,7 +8,7 @@
 typedef struct Leg {
     Hit near;        // shape -1: a collision
     Int air, around; // the medium that it is in, -1 = a surface; the medium that the ray came through
-    Spec weight;
+    Spec weight, emission; // emission: of the media on the way, where paths bring light, times weights
     Mask m;
 } Leg;
 
@@ -36,6 +36,7 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
 static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
     Leg leg = {.near = {i_set(-1), i_set(0), f_set(0), f_set(0), ray.o, i_set(0)}, .air = i_set(-1), .around = medium};
     leg.weight = weight;
+    leg.emission = spec_zero();
     leg.m = m_set(false);
     Mask left = m;
     for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
@@ -48,9 +49,15 @@ static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec we
             int32_t id = i_lane(medium, m_first(rest));
             Track track = track_of(t, id);
             mine = rest & mi_eq(medium, i_set(id));
+            const uint32_t dimension = (uint32_t)i * MOST_COLLISIONS;
             Spec shares = channel_shares(t, leg.weight);
-            Flight f = track_flight(&track, from, ray.d, far, shares, mine, key, (uint32_t)i * MOST_COLLISIONS);
+            Flight f = track_flight(&track, from, ray.d, far, shares, mine, key, dimension);
             Mask collided = mine & f.real;
+            if (t->rungs && t->scene->media[id].emission >= 0) {
+                Float u = rng_1d(key, MOST_SURFACES_IN_A_ROW * MOST_COLLISIONS + (uint32_t)i), probe;
+                Spec count, sent = emission_flown(&track, from, ray.d, f.t, shares, key, dimension, u, mine, &probe, &count);
+                leg.emission = spec_add(leg.emission, spec_zero_unless(mine, spec_mul(leg.weight, sent)));
+            }
             leg.weight = spec_select(mine, spec_mul(leg.weight, f.weight), leg.weight);
             leg.near.p = v3_select(collided, v3_madd(from, flight_inside(from, f.t, far), ray.d), leg.near.p);
             leg.air = i_select(collided, i_set(id), leg.air);
@@ -82,6 +89,9 @@ static void legs_stage(Tracer *t, int32_t bounce) {
         Leg leg = leg_trace(t, ray, from, medium, spec_load(p->beta, k), &key, m);
         leg.near.shape = i_select(leg.m, leg.near.shape, i_set(-1));
         hit_store(t, k, &leg.near);
+        if (t->rungs) {
+            slot_add(t, i_select(m, i_load(p->slot + k), i_set(0)), leg.emission, m & m_finite(spec_sum(leg.emission)));
+        }
         Mask collides = leg.m & mi_lt(i_set(-1), leg.air);
         Int group = leg.air + ((int32_t)t->scene->groups_count + 1);
         i_store(t->ws.hit_group + k, i_select(collides, group, i_load(t->ws.hit_group + k)));

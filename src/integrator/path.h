@@ -295,11 +295,12 @@ static void fork_store(Tracer *t, int32_t count) {
     }
 }
 
-// The same in media: which paths collide first. All that they bring is theirs.
+// The same in media: which paths collide first. All that they bring is theirs; others have brought what media sent out on
+// their way.
 static void fork_air(Tracer *t) {
     const Paths *p = &t->ws.paths[t->current];
     for (int c = 0; c < SPEC_N; c++) {
-        memset(t->fork->base[c], 0, CHUNK * sizeof(real));
+        memcpy(t->fork->base[c], t->ws.radiance[c], CHUNK * sizeof(real));
     }
     memset(t->fork->chained, 0, CHUNK * sizeof(int32_t));
     for (int32_t k = 0; k < t->active; k += LANES) {

@@ -135,11 +135,6 @@ static const char *gap_of_rides(const SceneView *view) {
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";
     }
-    for (int64_t i = 0; i < view->media_count; i++) {
-        if (view->media[i].emission >= 0) {
-            return "in media that glow, the edges that surfaces and collisions see of what moves lack that light";
-        }
-    }
     for (int64_t i = 0; i < view->volumes_count; i++) {
         if (jumps(view->volumes + i)) {
             return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";

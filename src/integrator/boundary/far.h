@@ -79,6 +79,9 @@ static void far_paths(Indirect *in, int32_t *begin) {
     if (in->upstream) {
         t->fork = &q->fork;
         memset(q->fork.chained, 0, CHUNK * sizeof(int32_t));
+        for (int c = 0; c < SPEC_N; c++) {
+            memset(q->fork.base[c], 0, CHUNK * sizeof(real));
+        }
     }
     path_forward(t, begin);
     t->fork = NULL;
@@ -101,11 +104,19 @@ KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
     return rung < 0 ? spec_gather(in->t->ws.radiance, slot) : spec_gather(in->q.rungs + rung * SPEC_N, slot);
 }
 
-// What they brought along chains that begin at their first vertices.
+// What they brought along chains that begin at their first vertices; in media, what is scattered or sent out before the
+// first surface.
 KFN Spec far_chain(const Indirect *in, Int slot, int32_t bounce) {
     const Fork *fork = &in->q.fork;
     Mask chained = mi_eq(i_gather(fork->chained, slot), i_set(1)) & m_set(far_rung(in, bounce) != 0);
-    return spec_zero_unless(chained, spec_sub(far_reflected(in, slot, bounce), spec_gather(fork->base, slot)));
+    Spec base = spec_gather(fork->base, slot), all = far_reflected(in, slot, bounce);
+    return in->t->scene->has_media ? spec_select(chained, all, base) : spec_zero_unless(chained, spec_sub(all, base));
+}
+
+// What the surfaces that they meet first emit: what they brought with one segment, less what media sent out.
+KFN Spec far_emitted(const Indirect *in, Int slot) {
+    Spec first = spec_gather(in->q.rungs, slot);
+    return in->upstream && in->t->scene->has_media ? spec_sub(first, spec_gather(in->q.fork.base, slot)) : first;
 }
 
 // What jumps at an edge along a chain: everything, if the near point is part of it. What far points on the lit side emit is
@@ -115,7 +126,7 @@ KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
     Int other = slot + far_half(q);
     Int kind = i_gather(q->lit, slot);
     Mask lit = mi_eq(kind, i_set(1)), full = mi_eq(i_gather(q->full, slot), i_set(1));
-    Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), spec_gather(q->rungs, slot));
+    Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), far_emitted(in, slot));
     Spec all = spec_sub(far_reflected(in, slot, bounce), emitted), chain = far_chain(in, slot, bounce);
     if (in->b->kind != BOUNDARY_CHAINED_HORIZON) { // whose samples are of one side
         all = spec_sub(all, far_reflected(in, other, bounce));
@@ -148,7 +159,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     case BOUNDARY_MEETING:
         return reflected;
     default:
-        reflected = spec_mul(l, spec_sub(reflected, spec_gather(q->rungs, slot)));
+        reflected = spec_mul(l, spec_sub(reflected, far_emitted(in, slot)));
         return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
     }
 }
