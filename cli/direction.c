@@ -10,6 +10,7 @@
 #include "base/context.h"
 #include "scene/absent.h"
 #include "scene/names.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -211,9 +212,10 @@ static rey_result add_motion(rey_context *ctx, const char *spec, const Op *op, c
     return REY_OK;
 }
 
-static rey_result add_constant(rey_context *ctx, const char *spec, const Op *op, const rey_param_info *info,
+static rey_result add_constant(rey_context *ctx, const char *spec, const Op *op, const rey_param_info *info, int channels,
                                float *tangent) {
     int64_t last = info->dims ? info->shape[info->dims - 1] : 1;
+    last = channels > 1 && op->value_count != last ? channels : last; // a colour for every voxel
     if (op->value_count != 1 && op->value_count != last) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: add takes %s%lld number%s for %s, got %d", spec,
                         last > 1 ? "1 or " : "", (long long)last, PLURAL(last), info->name, op->value_count);
@@ -224,12 +226,12 @@ static rey_result add_constant(rey_context *ctx, const char *spec, const Op *op,
     return REY_OK;
 }
 
-static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info *info, float *tangent) {
+static rey_result add_file(rey_context *ctx, const Op *op, const rey_param_info *info, int channels, float *tangent) {
     float *values = rey_alloc_array(ctx, (size_t)info->count, sizeof *values);
     if (!values) {
         return REY_ERROR_MEMORY;
     }
-    rey_result result = cli_npy_read_tangent(ctx, op->file, info, values);
+    rey_result result = cli_npy_read_tangent(ctx, op->file, info, channels, values);
     for (int64_t i = 0; i < info->count && !result; i++) {
         tangent[i] += values[i];
     }
@@ -281,6 +283,7 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
         return result;
     }
     Op op = {.id = OP_ADD, .values = {1}, .value_count = 1};
+    const int channels = rey_scene_grid_channels(scene, param);
     size_t length = cli_direction_name_length(spec);
     if (spec[length]) {
         result = parse_op(ctx, spec, spec + length + 1, &op);
@@ -290,10 +293,10 @@ static rey_result add_spec(rey_context *ctx, rey_scene *scene, const char *spec,
     }
     switch (op.id) {
     case OP_ADD:
-        result = add_constant(ctx, spec, &op, &info, tangent);
+        result = add_constant(ctx, spec, &op, &info, channels, tangent);
         break;
     case OP_FILE:
-        result = add_file(ctx, &op, &info, tangent);
+        result = add_file(ctx, &op, &info, channels, tangent);
         break;
     default:
         result = add_motion(ctx, spec, &op, &info, rey_param_values(scene, param), tangent);

@@ -5,6 +5,7 @@
 #include "base/context.h"
 #include "io/image.h"
 #include "scene/absent.h"
+#include "scene/scene.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -55,7 +56,8 @@ static rey_result load_one(rey_context *ctx, rey_scene *scene, const char *name,
         return result ? result : REY_ERROR_MEMORY;
     }
     bool array = size > 4 && strcasecmp(path + size - 4, ".npy") == 0;
-    result = array ? cli_npy_read_param(ctx, path, &info, values) : read_picture(ctx, path, &info, values);
+    result = array ? cli_npy_read_param(ctx, path, &info, rey_scene_grid_channels(scene, param), values)
+                   : read_picture(ctx, path, &info, values);
     if (result == REY_OK) {
         char why[1024];
         result = rey_param_set(scene, param, values, info.count);

@@ -97,20 +97,32 @@ static rey_result read_values(rey_context *ctx, FILE *file, const char *path, co
     return REY_OK;
 }
 
+// The shape of a grid with its channels in a dimension of their own; "" of others.
+static void apart_text(const rey_param_info *info, int channels, char text[96]) {
+    text[0] = 0;
+    if (channels > 0 && info->dims == 3) {
+        snprintf(text, 96, "%lldx%lldx%lldx%d", (long long)info->shape[0], (long long)info->shape[1],
+                 (long long)info->shape[2] / channels, channels);
+    }
+}
+
 // flat: an array of one dimension will do as well.
-static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_info *info, bool flat, float *values) {
+static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_info *info, int channels, bool flat, float *values) {
     FILE *file = fopen(path, "rb");
     if (!file) {
         return rey_fail(ctx, REY_ERROR_IO, "%s: cannot open: %s", path, strerror(errno));
     }
     Header header = {.shape = ""};
     rey_result result = read_header(ctx, file, path, &header);
-    char shape[64];
+    char shape[64], apart[96];
     cli_shape_text(info, shape, sizeof shape);
-    flat = flat && !strchr(header.shape, 'x');
-    if (!result && !flat && strcmp(shape, header.shape[0] ? header.shape : "1") != 0) {
-        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s as in the scene", path, info->name,
-                          header.shape[0] ? header.shape : "1", shape);
+    apart_text(info, channels, apart);
+    const char *found = header.shape[0] ? header.shape : "1";
+    flat = flat && !strchr(found, 'x');
+    if (!result && !flat && strcmp(shape, found) != 0 && strcmp(apart, found) != 0) {
+        const bool colours = channels > 1;
+        result = rey_fail(ctx, REY_ERROR_PARAM, "%s: '%s' has the shape %s, expected %s%s%s as in the scene", path, info->name,
+                          found, shape, colours ? " or " : "", colours ? apart : "");
     }
     if (!result && header.count != info->count) {
         result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: holds %lld numbers, the parameter has %lld", path,
@@ -123,10 +135,10 @@ static rey_result npy_read(rey_context *ctx, const char *path, const rey_param_i
     return result;
 }
 
-rey_result cli_npy_read_param(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
-    return npy_read(ctx, path, info, false, values);
+rey_result cli_npy_read_param(rey_context *ctx, const char *path, const rey_param_info *info, int channels, float *values) {
+    return npy_read(ctx, path, info, channels, false, values);
 }
 
-rey_result cli_npy_read_tangent(rey_context *ctx, const char *path, const rey_param_info *info, float *values) {
-    return npy_read(ctx, path, info, true, values);
+rey_result cli_npy_read_tangent(rey_context *ctx, const char *path, const rey_param_info *info, int channels, float *values) {
+    return npy_read(ctx, path, info, channels, true, values);
 }

@@ -274,6 +274,8 @@ static void test_errors(void **state) {
         {"parameters.0={name: air.interior_medium.albedo.value.value, regularisers: {sparsity: 1}}", "are for grids of voxels"},
         {"parameters.0.regularisers.normals=1", "normals is for 'parameterisation: laplacian'"},
         {"views=[{target: target_0.exr, held_out: true}]", "all are held out"},
+        {"parameters.0.start=truth.vol", "truth.vol holds 6 x 6 x 6 x 1 numbers, expected 5 x 5 x 5 x 1 (z, y, x, channels)"},
+        {"parameters.0.start=target_0.exr", "not a VOL file"},
         {"parameters.0.carve=true", "carve needs views with a 'silhouette'"},
         {"parameters=[{name: air.interior_medium.albedo.value.value, carve: true}]", "carve is for grids of voxels"},
         {"views.0.silhouette=half.exr", "half.exr"},

@@ -114,6 +114,36 @@ static void test_encodings(void **state) {
     rey_vol_free(*state, &v);
 }
 
+// For a grid of known size, channels may lie side by side along x.
+static void test_sizes(void **state) {
+    static const float data[24] = {0.5f, 1, 2, [23] = 7};
+    static const struct {
+        int64_t shape[4];
+        int dims;
+        const char *words;
+    } cases[] = {{{1, 2, 4, 3}, 4, NULL},
+                 {{1, 2, 12}, 3, NULL},
+                 {{1, 4, 2, 3}, 4, "holds 1 x 4 x 2 x 3 numbers, expected 1 x 2 x 4 x 3 (z, y, x, channels)"},
+                 {{2, 1, 12}, 3, "holds 2 x 1 x 12 x 1 numbers"},
+                 {{1, 2, 3, 4}, 4, "holds 1 x 2 x 3 x 4 numbers"},
+                 {{1, 2, 4, 2}, 4, "holds 1 x 2 x 4 x 2 numbers"}};
+    char path[64];
+    float values[24];
+    snprintf(path, sizeof path, "/tmp/reynolds_vol_%ld.npy", (long)getpid());
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        assert_int_equal(rey_npy_write(*state, path, data, cases[i].shape, cases[i].dims), REY_OK);
+        rey_result result = rey_grid_read_as(*state, path, (const int32_t[3]){4, 2, 1}, 3, values);
+        unlink(path);
+        assert_int_equal(result, cases[i].words ? REY_ERROR_PARAM : REY_OK);
+        if (cases[i].words) {
+            assert_non_null(strstr(rey_error(*state), cases[i].words));
+        } else {
+            assert_memory_equal(values, data, sizeof data);
+        }
+    }
+    assert_int_equal(rey_grid_read_as(*state, path, (const int32_t[3]){4, 2, 1}, 3, values), REY_ERROR_IO);
+}
+
 // Arrays of Z x Y x X, and with channels.
 static void test_npy(void **state) {
     static const float data[24] = {0.5f, 1, 2, [23] = 7};
@@ -193,7 +223,7 @@ static void test_truncated(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_written_is_read), cmocka_unit_test(test_encodings),
-                                       cmocka_unit_test(test_npy), cmocka_unit_test(test_refused),
+                                       cmocka_unit_test(test_npy), cmocka_unit_test(test_sizes), cmocka_unit_test(test_refused),
                                        cmocka_unit_test(test_truncated)};
     return cmocka_run_group_tests(tests, open_context, close_context);
 }

@@ -2,6 +2,7 @@
 #include "fit/optimizer.h"
 #include "fit/lbfgs.h"
 #include "fit/rigid.h"
+#include "io/grid.h"
 #include "io/image.h"
 #include "scene/absent.h"
 #include "scene/names.h"
@@ -49,15 +50,21 @@ static rey_result set_bounds(Job *job, const JobParameter *p, const rey_param_in
     return REY_OK;
 }
 
+static rey_result read_start_file(Job *job, const Unknown *unknown, const char *path, rey_image *image, float *start) {
+    const int32_t size[3] = {unknown->grid.nx, unknown->grid.ny, unknown->grid.nz};
+    return size[0] ? rey_grid_read_as(job->ctx, path, size, unknown->grid.channels, start)
+                   : rey_image_read(job->ctx, path, image);
+}
+
 static rey_result start_from_file(Job *job, const JobParameter *p, const Unknown *unknown, float *start) {
     const char *path = rey_job_path(job, p->start_file);
     rey_image image = {0};
-    rey_result result = path ? rey_image_read(job->ctx, path, &image) : REY_ERROR_MEMORY;
+    rey_result result = path ? read_start_file(job, unknown, path, &image, start) : REY_ERROR_MEMORY;
     if (result && result != REY_ERROR_MEMORY) {
         result = rey_job_fail_at(job, rey_job_place_of(p->node, "start", NULL), result, "parameter '%s': %s", unknown->name,
                                  rey_error(job->ctx));
     }
-    if (!result) {
+    if (!result && !unknown->grid.nx) {
         if (image.srgb) {
             rey_image_decode_srgb(&image);
         }
@@ -100,7 +107,7 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
         memcpy(start, rey_param_values(scene, unknown->param), (size_t)unknown->count * sizeof *start);
         return REY_OK;
     }
-    int64_t last = unknown->dims ? unknown->shape[unknown->dims - 1] : 1;
+    int64_t last = unknown->grid.nx ? unknown->grid.channels : unknown->dims ? unknown->shape[unknown->dims - 1] : 1;
     if (p->start_count != 1 && p->start_count != unknown->count && p->start_count != last) {
         return rey_job_fail_at(job, rey_job_place_of(p->node, "start", "name"), REY_ERROR_PARAM,
                                "parameter '%s': start holds %d numbers, expected %s%lld", unknown->name, p->start_count,

@@ -128,3 +128,21 @@ rey_result rey_grid_read(rey_context *ctx, const rey_grid *grid, float *values) 
     rey_free(ctx, bytes);
     return result;
 }
+
+rey_result rey_grid_read_as(rey_context *ctx, const char *path, const int32_t size[3], int32_t channels, float *values) {
+    rey_grid grid;
+    rey_result result = rey_grid_open(ctx, path, &grid);
+    if (result != REY_OK) {
+        return result;
+    }
+    bool apart = grid.channels == channels && grid.nx == size[0], side = grid.channels == 1 && grid.nx == size[0] * channels;
+    if (grid.nz == size[2] && grid.ny == size[1] && (apart || side)) {
+        result = rey_grid_read(ctx, &grid, values);
+    } else {
+        result = rey_fail(ctx, REY_ERROR_PARAM,
+                          "%s holds %d x %d x %d x %d numbers, expected %d x %d x %d x %d (z, y, x, channels)", path, grid.nz,
+                          grid.ny, grid.nx, grid.channels, size[2], size[1], size[0], channels);
+    }
+    rey_grid_close(ctx, &grid);
+    return result;
+}

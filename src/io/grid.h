@@ -21,4 +21,7 @@ rey_result rey_grid_open(rey_context *ctx, const char *path, rey_grid *out);
 int64_t rey_grid_count(const rey_grid *grid); // at most 2^31 - 1
 // All values, each of them finite.
 rey_result rey_grid_read(rey_context *ctx, const rey_grid *grid, float *values);
+// The values of a file for a grid of that size. Of files without channels, those of a voxel may lie side by side along x:
+// Z x Y x (X channels). Failures: those of opening and reading, REY_ERROR_PARAM where the size is another one.
+rey_result rey_grid_read_as(rey_context *ctx, const char *path, const int32_t size[3], int32_t channels, float *values);
 void rey_grid_close(rey_context *ctx, rey_grid *grid);

@@ -89,6 +89,12 @@ rey_result rey_param_get_info(const rey_scene *scene, int param, rey_param_info 
     return REY_OK;
 }
 
+int rey_scene_grid_channels(const rey_scene *scene, int param) {
+    const Param *p = param_at(scene, param);
+    const TextureNode *t = p && p->texture >= 0 ? scene->view.textures + p->texture : NULL;
+    return t && t->kind == TEXTURE_VOLUME ? t->channels : 0;
+}
+
 int rey_param_find(const rey_scene *scene, const char *name) {
     if (!scene || !name) {
         return -1;

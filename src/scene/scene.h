@@ -309,6 +309,8 @@ int rey_terms_of(const char *text, const char **wrong);
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);
+// Numbers of each voxel of a parameter that is a grid over space, whose shape is Z x Y x (X channels); 0 of all others.
+int rey_scene_grid_channels(const rey_scene *scene, int param);
 // Forgets all parameters and aliases but the first so many.
 void rey_scene_forget_params(rey_scene *scene, size_t params, size_t aliases);
 // Writes a parameter's values after checking them, and counts its version up.

@@ -1,5 +1,8 @@
 // test_cli_params.c: which parameters there are: names, patterns, those that nothing uses, and reasons said once.
 #include "command.h"
+#include "io/image.h"
+
+#include <math.h>
 
 static int count_words(const char *text, const char *words) {
     int count = 0;
@@ -249,6 +252,58 @@ static void wrong_names_are_usage_errors(void **state) {
     json_free(node);
 }
 
+#define COLOURS "fog.interior_medium.albedo.data"
+
+static double slope_of(Fixture *f, const char *scene, const char *direction) {
+    char arguments[512];
+    snprintf(arguments, sizeof arguments, "grad %s --param " COLOURS ":%s --spp 16 --json", scene, direction);
+    JsonNode *node = run_json(f, 0, arguments);
+    double value = json_value(node, "value", NAN);
+    json_free(node);
+    return value;
+}
+
+// Files of a grid of colours hold Z x Y x (3 X) numbers or Z x Y x X x 3, as tangents and as values; other shapes are refused.
+static void grids_have_two_shapes(void **state) {
+    Fixture *f = *state;
+    enum { COUNT = 2 * 1 * 4 * 3 };
+    static const int64_t shapes[][4] = {{2, 1, 12}, {2, 1, 4, 3}, {COUNT}, {2, 1, 3, 4}, {2, 4, 1, 3}, {2, 1, 4, 3}};
+    static const int dims[] = {3, 4, 1, 4, 4, 4};
+    static const char *const names[] = {"long.npy", "apart.npy", "row.npy", "turned.npy", "other.npy", "colours.npy"};
+    rey_context *ctx = NULL;
+    float tangent[COUNT], colours[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        tangent[i] = (float)(i % 5) - 1.5f;
+        colours[i] = 0.3f + 0.02f * (float)i;
+    }
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (int k = 0; k < 6; k++) {
+        assert_int_equal(rey_npy_write(ctx, names[k], k < 5 ? tangent : colours, shapes[k], dims[k]), REY_OK);
+    }
+    rey_context_destroy(ctx);
+    write_file("fog.xml",
+               "<scene version='3.0.0'><integrator type='volpath'/><sensor type='perspective'><transform name='to_world'>"
+               "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+               "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor><emitter type='constant'/>"
+               "<shape type='cube' id='fog'><bsdf type='null'/><medium name='interior' type='homogeneous'>"
+               "<volume name='albedo' type='gridvolume'><string name='filename' value='colours.npy'/>"
+               "<transform name='to_world'><scale value='2'/><translate value='-1'/></transform></volume>"
+               "</medium></shape></scene>");
+    double expected = slope_of(f, "fog.xml", "file=long.npy");
+    assert_true(fabs(expected) > 1e-4);
+    assert_true(slope_of(f, "fog.xml", "file=apart.npy") == expected);
+    assert_true(slope_of(f, "fog.xml", "file=row.npy") == expected);
+    double all = slope_of(f, "fog.xml", "add=1"), red = slope_of(f, "fog.xml", "add=1,0,0");
+    double rest = slope_of(f, "fog.xml", "add=0,1,1");
+    assert_true(red > 0 && fabs(red + rest - all) < 1e-4 * all);
+    static const char *const words[] = {"has the shape 2x1x3x4, expected 2x1x12 or 2x1x4x3 as in the scene",
+                                        "has the shape 2x4x1x3, expected 2x1x12 or 2x1x4x3 as in the scene"};
+    expect_said(f, 1, "grad fog.xml --param " COLOURS ":file=turned.npy", words[0]);
+    expect_said(f, 1, "grad fog.xml --param " COLOURS ":file=other.npy", words[1]);
+    expect(f, 0, "params fog.xml --load " COLOURS "=colours.npy");
+    expect_said(f, 1, "params fog.xml --load " COLOURS "=turned.npy", words[0]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unused_objects_are_told),
@@ -260,6 +315,7 @@ int main(void) {
         cmocka_unit_test(suggestions_are_listed),
         cmocka_unit_test(terms_that_do_not_exist_are_errors),
         cmocka_unit_test(wrong_names_are_usage_errors),
+        cmocka_unit_test(grids_have_two_shapes),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
