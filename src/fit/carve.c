@@ -2,6 +2,7 @@
 // than the visual hull, never less.
 #include "fit/carve.h"
 
+#include "medium/majorant_build.h"
 #include "render/projection.h"
 #include "sensor/kinds.h"
 
@@ -96,14 +97,15 @@ static void voxel_corners(const SceneView *view, const VolumeNode *v, const int6
     }
 }
 
-// Repeated voxels have a part beyond the other side of the grid, too; mirrored ones next to themselves.
-static bool is_wrapped(const VolumeNode *v, const int64_t at[3]) {
+// Repeated voxels have a part beyond the other side of the grid, too; mirrored ones next to themselves. Around a cube that is
+// turned, the medium's box holds more of both.
+static bool is_wrapped(const SceneView *view, const VolumeNode *v, const int64_t at[3]) {
     const int32_t n[3] = {v->nx, v->ny, v->nz};
     bool border = false;
     for (int i = 0; i < 3; i++) {
         border = border || at[i] == 0 || at[i] == n[i] - 1;
     }
-    return border && v->wrap == WRAP_REPEAT;
+    return (border && v->wrap == WRAP_REPEAT) || rey_volume_goes_on(view, v);
 }
 
 // Marks what one view sees nothing of; returns how many voxels are new among them.
@@ -115,7 +117,7 @@ static int64_t carve_by(const rey_scene *scene, const FitView *view, const Volum
     for (int64_t i = 0; i < voxels; i++) {
         const int64_t at[3] = {i % v->nx, i / v->nx % v->ny, i / v->nx / v->ny};
         double corners[8][3];
-        if (carved[i * channels] || is_wrapped(v, at)) {
+        if (carved[i * channels] || is_wrapped(&scene->view, v, at)) {
             continue;
         }
         voxel_corners(&scene->view, v, at, corners);

@@ -33,18 +33,13 @@ static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p, Vec3
     const MediumNode *medium = scene->media + id;
     Track track = track_of(t, id);
     Filling f = {.emission = spec_zero()};
-    Vec3 q = volume_to_local(scene, track.sigma_t, p, 1);
     Mask inside = m_set(true);
     if (medium->bounded) {
-        const bool box = medium_fills_box(track.sigma_t);
-        const Float own[3] = {q.x, q.y, q.z}, world[3] = {p.x, p.y, p.z};
+        const Float at[3] = {p.x, p.y, p.z};
         for (int k = 0; k < 3; k++) {
-            real corner = 0, size = 1;
-            if (box) {
-                medium_box(scene, track.sigma_t, k, &corner, &size);
-            }
-            Float x = box ? world[k] : own[k];
-            inside = inside & m_ge(x, f_set(corner)) & m_le(x, f_set(corner + size));
+            real corner, size;
+            medium_box(scene, track.sigma_t, k, &corner, &size);
+            inside = inside & m_ge(at[k], f_set(corner)) & m_le(at[k], f_set(corner + size));
         }
     }
     f.extinction = spec_zero_unless(inside, medium_extinction(scene, &track, p, d));
@@ -59,20 +54,14 @@ static NOINLINE Filling medium_filling(const Tracer *t, int32_t id, Vec3 p, Vec3
 // ray begins or ends are none.
 static NOINLINE void medium_faces(const SceneView *scene, const VolumeNode *v, Vec3 o, Vec3 d, Float tmax, Mask m,
                                   Face face[2]) {
-    const bool box = medium_fills_box(v), local = v->table >= 0 && !box;
-    Vec3 own = local ? volume_to_local(scene, v, o, 1) : o, way = local ? volume_to_local(scene, v, d, 0) : d;
-    const Float p[3] = {own.x, own.y, own.z}, q[3] = {way.x, way.y, way.z};
+    const Float p[3] = {o.x, o.y, o.z}, q[3] = {d.x, d.y, d.z};
     Float low = f_set(-INFINITY), high = f_set(INFINITY), apart[2] = {f_set(0), f_set(0)};
     Float far = f_min(tmax, f_set(1e30f)), least = (1.0f + f_max(f_max(f_abs(o.x), f_abs(o.y)), f_abs(o.z))) * 1.5e-4f;
     face[0].axis = face[1].axis = i_set(0);
     face[0].upper = face[1].upper = m_set(false);
     for (int k = 0; k < 3; k++) {
-        real corner = 0, size = 1;
-        if (box) {
-            medium_box(scene, v, k, &corner, &size);
-        }
-        const float *r = scene->tables + (local ? v->table : 0) + 4 * k;
-        real scale = local ? (real)1 / (real)sqrtf(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) : 1; // to distances in the world
+        real corner, size;
+        medium_box(scene, v, k, &corner, &size);
         Float first = f_set(-INFINITY), last = f_set(INFINITY);
         slab((p[k] - corner) * (1 / size), q[k] * (1 / size), &first, &last);
         Mask up = m_gt(q[k], f_set(0)), enters = m_gt(first, low), leaves = m_lt(last, high);
@@ -83,8 +72,8 @@ static NOINLINE void medium_faces(const SceneView *scene, const VolumeNode *v, V
         face[0].upper = (face[0].upper & ~enters) | (enters & ~up);
         face[1].upper = (face[1].upper & ~leaves) | (leaves & up);
         // How far the ray's ends are from the faces' planes.
-        apart[0] = f_select(enters, first * f_abs(q[k]) * scale, apart[0]);
-        apart[1] = f_select(leaves, (far - last) * f_abs(q[k]) * scale, apart[1]);
+        apart[0] = f_select(enters, first * f_abs(q[k]), apart[0]);
+        apart[1] = f_select(leaves, (far - last) * f_abs(q[k]), apart[1]);
     }
     Mask crosses = m & m_lt(low, high);
     face[0].at = low;
@@ -93,25 +82,16 @@ static NOINLINE void medium_faces(const SceneView *scene, const VolumeNode *v, V
     face[1].m = crosses & m_gt(high, f_set(0)) & m_lt(high, far) & m_gt(apart[1], least);
 }
 
-// Accumulates the adjoint dx of the distances at which rays along d cross faces, at p.
-static NOINLINE void face_adj(const SceneView *scene, const VolumeNode *v, const Face *face, Vec3 p, Vec3 d, Float dx,
-                              Sink *sink) {
-    const bool box = medium_fills_box(v);
+// Accumulates the adjoint dx of the distances at which rays along d cross faces.
+static NOINLINE void face_adj(const SceneView *scene, const VolumeNode *v, const Face *face, Vec3 d, Float dx, Sink *sink) {
     const int32_t at = sink->volume_at[v - scene->volumes];
     if (at < 0) {
         return;
     }
-    Vec3 q = volume_to_local(scene, v, p, 1), way = volume_to_local(scene, v, d, 0);
-    const Float along[3] = {box ? d.x : way.x, box ? d.y : way.y, box ? d.z : way.z};
-    Vec3 dq = v3_zero();
-    Float *own[3] = {&dq.x, &dq.y, &dq.z};
+    const Float along[3] = {d.x, d.y, d.z};
     for (int k = 0; k < 3; k++) {
         Mask m = face->m & mi_eq(face->axis, i_set(k)) & m_gt(f_abs(along[k]), f_set(LEAST_COSINE));
         Float share = f_zero_unless(m, dx * f_safe_rcp(along[k]));
-        if (!box) { // the face is where q is 0 or 1
-            *own[k] = -share;
-            continue;
-        }
         // Half of x + y + z -+ (|x| + |y| + |z|) + t, of the row of to_world.
         for (int j = 0; j < 3; j++) {
             real x = (real)scene->theta[v->to_world + 4 * k + j], half = x > 0 ? (real)0.5 : x < 0 ? (real)-0.5 : 0;
@@ -119,22 +99,18 @@ static NOINLINE void face_adj(const SceneView *scene, const VolumeNode *v, const
         }
         sink_add_uniform(sink, at + 4 * k + 3, share, m);
     }
-    if (!box) {
-        volume_place_adj(scene, v, q, dq, sink, face->m);
-    }
 }
 
 // What the adjoint dx is worth to points of the ray that move: all over along.
-static NOINLINE Vec3 face_turn(const SceneView *scene, const VolumeNode *v, const Face *face, Vec3 d, Float dx) {
-    const bool local = v->table >= 0 && !medium_fills_box(v);
-    Vec3 way = local ? volume_to_local(scene, v, d, 0) : d, share = v3_zero();
-    const Float along[3] = {way.x, way.y, way.z};
+static NOINLINE Vec3 face_turn(const Face *face, Vec3 d, Float dx) {
+    Vec3 share = v3_zero();
+    const Float along[3] = {d.x, d.y, d.z};
     Float *own[3] = {&share.x, &share.y, &share.z};
     for (int k = 0; k < 3; k++) {
         Mask m = face->m & mi_eq(face->axis, i_set(k)) & m_gt(f_abs(along[k]), f_set(LEAST_COSINE));
         *own[k] = f_zero_unless(m, dx * f_safe_rcp(along[k]));
     }
-    return local ? volume_to_world_adj(scene, v, share) : share;
+    return share;
 }
 
 // A point of a medium's box next to where a ray enters it, or leaves it.
@@ -341,11 +317,10 @@ static NOINLINE BorderBox border_box(const Tracer *t, const RecordBatch *batch) 
     return b;
 }
 
-// 1 / n . d of faces; in volumes that repeat, of their own space.
-static Float face_slant(const Tracer *t, const BorderBox *b, int k) {
-    Vec3 d = medium_fills_box(b->sigma_t) ? b->d : volume_to_local(t->scene, b->sigma_t, b->d, 0);
+// 1 / n . d of faces.
+static Float face_slant(const BorderBox *b, int k) {
     Int axis = b->face[k].axis;
-    Float along = f_select(mi_eq(axis, i_set(0)), d.x, f_select(mi_eq(axis, i_set(1)), d.y, d.z));
+    Float along = f_select(mi_eq(axis, i_set(0)), b->d.x, f_select(mi_eq(axis, i_set(1)), b->d.y, b->d.z));
     return f_safe_rcp(f_abs(along));
 }
 
@@ -354,7 +329,7 @@ static void border_box_offer(Tracer *t, const RecordBatch *batch) {
     for (int k = 0; k < 2; k++) {
         Spec there = spec_mul(b.beta, b.weight[k]);
         border_offer(t, batch, k, b.slot, batch->group, b.p[k], b.d,
-                     spec_dot(there, b.inside[k].extinction) * face_slant(t, &b, k), b.face[k].m);
+                     spec_dot(there, b.inside[k].extinction) * face_slant(&b, k), b.face[k].m);
     }
 }
 
@@ -374,15 +349,15 @@ static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, S
         for (int k = 0; k < 2; k++) {
             Float dx = f_zero_unless(b.face[k].m, spec_dot(delta, gain[k]));
             dx = k ? dx : -dx;
-            face_adj(t->scene, b.sigma_t, b.face + k, b.p[k], b.d, dx, sink);
+            face_adj(t->scene, b.sigma_t, b.face + k, b.d, dx, sink);
             if (t->job->glides) {
                 Glide g = glide_load(t, c, b.slot, glide_reference(t, b.slot, b.o), b.d);
-                glide_add(&g, b.p[k], v3_neg(face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx)), b.face[k].m);
+                glide_add(&g, b.p[k], v3_neg(face_turn(b.face + k, b.d, dx)), b.face[k].m);
                 glide_store(t, &g, c, b.slot, b.face[k].m);
             } else if (t->job->rides) {
                 Float end = spec_dot(delta, spec_mul(b.inside[k].extinction, onward));
-                Vec3 all = face_turn(t->scene, b.sigma_t, b.face + k, b.d, dx);
-                Vec3 attached = face_turn(t->scene, b.sigma_t, b.face + k, b.d, k ? -end : end);
+                Vec3 all = face_turn(b.face + k, b.d, dx);
+                Vec3 attached = face_turn(b.face + k, b.d, k ? -end : end);
                 ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(attached), sink, b.face[k].m);
             }
         }

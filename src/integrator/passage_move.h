@@ -75,11 +75,11 @@ static NOINLINE void passed_boxes_adj(const Tracer *t, const Walk *walk, int32_t
             Float dx = f_zero_unless(face[k].m, spec_dot(dt, f.extinction));
             dx = k ? -dx : dx;
             if (box_is_live(t, id)) {
-                face_adj(t->scene, v, face + k, p, walk->d, dx, sink);
+                face_adj(t->scene, v, face + k, walk->d, dx, sink);
             }
             if (turn) {
                 Float far = f_zero_unless(face[k].m, v3_dot(v3_sub(p, turn->from), walk->d));
-                Vec3 share = face_turn(t->scene, v, face + k, walk->d, dx);
+                Vec3 share = face_turn(face + k, walk->d, dx);
                 turn->d = v3_madd(turn->d, -far, share);
                 turn->shift = v3_sub(turn->shift, share);
             }

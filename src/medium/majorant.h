@@ -13,6 +13,8 @@ typedef struct MajorantWalk {
     Float majorant;   // of the cell that the walk stands in
     Float least;      // bounds of cells count as at least this much
     Mask m;           // lanes that are still inside
+    int32_t wrap;     // of sigma_t; WRAP_CLAMP also where it is constant
+    Mask coarse;      // where it repeats: lanes on whose way there are too many cells, which take the bound of all of them
 } MajorantWalk;
 
 // Distances at which the ray enters and leaves [0, 1] along one axis.
@@ -24,12 +26,14 @@ KFN void slab(Float o, Float d, Float *low, Float *high) {
     *high = f_min(*high, f_select(parallel, never, f_max(a, b)));
 }
 
-// A heterogeneous medium fills a box along the world's axes around the cube of its extinction, as the format has it, and the
-// voxels at the cube's border reach to that box. With volumes that repeat it ends with the cube.
-KFN bool medium_fills_box(const VolumeNode *v) { return v->table >= 0 && (v->kind == VOLUME_CONSTANT || v->wrap == WRAP_CLAMP); }
-
-// Where that box begins along an axis, and its size.
+// A heterogeneous medium fills a box along the world's axes around the cube of its extinction, as the format has it. Up to that
+// box, the voxels at the cube's border go on, or the grid repeats. Where the box begins along an axis, and its size.
 KFN void medium_box(const SceneView *scene, const VolumeNode *v, int axis, real *corner, real *size) {
+    *corner = 0;
+    *size = 1;
+    if (v->table < 0) {
+        return;
+    }
     const float *row = scene->theta + v->to_world + 4 * axis;
     real x = (real)row[0], y = (real)row[1], z = (real)row[2];
     *size = (x < 0 ? -x : x) + (y < 0 ? -y : y) + (z < 0 ? -z : z);
@@ -42,20 +46,41 @@ KFN void medium_span(const SceneView *scene, const MediumNode *medium, const Vol
     if (!medium->bounded) {
         return;
     }
-    const bool box = medium_fills_box(v);
-    if (v->table >= 0 && !box) {
-        o = volume_to_local(scene, v, o, 1);
-        d = volume_to_local(scene, v, d, 0);
-    }
     const Float p[3] = {o.x, o.y, o.z}, q[3] = {d.x, d.y, d.z};
     for (int k = 0; k < 3; k++) {
-        real corner = 0, size = 1;
-        if (box) {
-            medium_box(scene, v, k, &corner, &size);
-        }
+        real corner, size;
+        medium_box(scene, v, k, &corner, &size);
         slab((p[k] - corner) * (1 / size), q[k] * (1 / size), low, high);
     }
     *high = f_max(*high, *low);
+}
+
+// More cells than that are not worth the steps; only grids that repeat many times in their box have them.
+enum { MOST_CELLS = 256 };
+
+// Where a walk through cells that repeat leaves its cell along an axis; there is no rounding that adds up.
+KFN Float majorant_border(const MajorantWalk *w, int k, Float p, Float v, int32_t n) {
+    Mask up = m_gt(v, f_set(0)), still = ~m_finite(w->step[k]) | w->coarse;
+    Float rcp = f_select(still, f_set(0), f_select(up, w->step[k], -w->step[k])) * (real)n;
+    Float border = f_from_i(w->cell[k] + i_select(up, i_set(1), i_set(0))) * (1 / (real)n);
+    return f_select(still, f_set(INFINITY), (border - p) * rcp);
+}
+
+// The same as in majorant_start where cells repeat: they are counted on beyond the grid.
+static NOINLINE void majorant_start_repeated(const MediumNode *medium, MajorantWalk *w) {
+    const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
+    const Float p[3] = {w->o.x, w->o.y, w->o.z}, v[3] = {w->d.x, w->d.y, w->d.z};
+    Float length = f_select(w->m, w->end - w->t, f_set(0)), cells = f_set(0);
+    for (int k = 0; k < 3; k++) {
+        Float at = (p[k] + w->t * v[k]) * (real)n[k];
+        cells = cells + f_abs(at) + f_abs(v[k] * length) * (real)n[k];
+    }
+    w->coarse = m_ge(cells, f_set(MOST_CELLS)) | ~m_finite(cells);
+    for (int k = 0; k < 3; k++) {
+        Float at = f_select(w->coarse, f_set(0), (p[k] + w->t * v[k]) * (real)n[k]);
+        w->cell[k] = i_from_f(f_floor(at));
+        w->next[k] = majorant_border(w, k, p[k], v[k], n[k]);
+    }
 }
 
 // From world point o along the unit direction d, for the distance tmax.
@@ -63,6 +88,8 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
                                 Float tmax, Mask m) {
     const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
     MajorantWalk w = {.o = volume_to_local(scene, sigma_t, o, 1), .d = volume_to_local(scene, sigma_t, d, 0)};
+    w.wrap = medium->bounded && sigma_t->kind == VOLUME_GRID ? sigma_t->wrap : WRAP_CLAMP;
+    w.coarse = m_set(false);
     const Float p[3] = {w.o.x, w.o.y, w.o.z}, v[3] = {w.d.x, w.d.y, w.d.z};
     w.t = f_set(0);
     w.end = tmax;
@@ -80,18 +107,27 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
         w.next[k] = f_select(still | last, f_set(INFINITY), (border - p[k]) * rcp);
         w.step[k] = f_select(still, f_set(INFINITY), f_abs(rcp) * (1 / (real)n[k]));
     }
+    if (w.wrap != WRAP_CLAMP) {
+        majorant_start_repeated(medium, &w);
+    }
     return w;
 }
 
 // One cell on: along the axis whose border comes first. Lanes of m that leave the medium leave the walk.
 KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
     const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
-    const Float v[3] = {w->d.x, w->d.y, w->d.z};
+    const Float p[3] = {w->o.x, w->o.y, w->o.z}, v[3] = {w->d.x, w->d.y, w->d.z};
     Mask left = m;
     for (int k = 0; k < 3; k++) {
         Mask mine = left & m_le(w->next[k], border);
         Mask up = m_gt(v[k], f_set(0));
         Int cell = i_select(mine, w->cell[k] + i_select(up, i_set(1), i_set(-1)), w->cell[k]);
+        if (w->wrap != WRAP_CLAMP) {
+            w->cell[k] = cell;
+            w->next[k] = f_select(mine, majorant_border(w, k, p[k], v[k], n[k]), w->next[k]);
+            left = left & ~mine;
+            continue;
+        }
         w->cell[k] = i_max(i_min(cell, i_set(n[k] - 1)), i_set(0));
         Mask last = mi_eq(w->cell[k], i_select(up, i_set(n[k] - 1), i_set(0)));
         w->next[k] = f_select(mine, f_select(last, f_set(INFINITY), w->next[k] + w->step[k]), w->next[k]);
@@ -100,13 +136,27 @@ KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, 
     w->m = w->m & ~(m & m_ge(w->t, w->end));
 }
 
+// The bound of the cell that the walk stands in.
+KFN Float majorant_here(const SceneView *scene, const MediumNode *medium, const MajorantWalk *w) {
+    Int x = w->cell[0], y = w->cell[1], z = w->cell[2];
+    if (w->wrap != WRAP_CLAMP) {
+        x = texture_wrap(x, medium->nx, w->wrap);
+        y = texture_wrap(y, medium->ny, w->wrap);
+        z = texture_wrap(z, medium->nz, w->wrap);
+    }
+    Int cell = (z * medium->ny + y) * medium->nx + x;
+    if (w->wrap != WRAP_CLAMP) {
+        cell = i_select(w->coarse, i_set(medium->nx * medium->ny * medium->nz), cell); // that of all cells
+    }
+    return f_max(table_at(scene, cell + medium->table), w->least);
+}
+
 // Goes on until the majorants on the way have used up the optical depths. Lanes that get there are returned and stand at
 // w->t under w->majorant; the others have left the medium.
 KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Mask m) {
     Mask left = m & w->m, found = m_set(false);
     while (m_any(left)) {
-        Int cell = (w->cell[2] * medium->ny + w->cell[1]) * medium->nx + w->cell[0];
-        Float majorant = f_max(table_at(scene, cell + medium->table), w->least);
+        Float majorant = majorant_here(scene, medium, w);
         Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
         Float through = majorant * f_max(exit - w->t, f_set(0));
         Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);

@@ -1,4 +1,5 @@
-// majorant_build.c: the largest extinction in each supervoxel, over all voxels that lookups inside it may read.
+// majorant_build.c: the largest extinction in each supervoxel, over all voxels that lookups inside it may read; and behind them
+// the largest one of all.
 #include "medium/majorant_build.h"
 
 static int32_t supervoxels(int32_t voxels) { return voxels < MOST_SUPERVOXELS ? voxels : MOST_SUPERVOXELS; }
@@ -8,7 +9,7 @@ int32_t rey_medium_table_size(const VolumeNode *sigma_t, MediumNode *medium) {
     medium->nx = grid ? supervoxels(sigma_t->nx) : 1;
     medium->ny = grid ? supervoxels(sigma_t->ny) : 1;
     medium->nz = grid ? supervoxels(sigma_t->nz) : 1;
-    return medium->nx * medium->ny * medium->nz;
+    return medium->nx * medium->ny * medium->nz + 1;
 }
 
 // Index of a voxel that may lie beyond the grid, as texture_wrap has it.
@@ -65,16 +66,30 @@ static float largest_square(const SceneView *view, int32_t flakes) {
     return largest;
 }
 
+bool rey_volume_goes_on(const SceneView *view, const VolumeNode *v) {
+    for (int k = 0; k < 3 && v->to_world >= 0 && v->kind == VOLUME_GRID && v->wrap != WRAP_CLAMP; k++) {
+        const float *row = view->theta + v->to_world + 4 * k;
+        float sum = fabsf(row[0]) + fabsf(row[1]) + fabsf(row[2]), most = fmaxf(fmaxf(fabsf(row[0]), fabsf(row[1])), fabsf(row[2]));
+        if (sum > most * 1.000001f) {
+            return true;
+        }
+    }
+    return false;
+}
+
 void rey_medium_update(const SceneView *view, const VolumeNode *v, const MediumNode *m, float room) {
     float scale = view->theta[m->scale] * 1.00001f * room;
     if (m->flakes >= 0) {
         scale *= sqrtf(largest_square(view, m->flakes));
     }
+    float *all = view->tables + m->table + m->nx * m->ny * m->nz;
+    *all = 0;
     for (int32_t z = 0; z < m->nz; z++) {
         for (int32_t y = 0; y < m->ny; y++) {
             for (int32_t x = 0; x < m->nx; x++) {
                 float *bound = view->tables + m->table + (z * m->ny + y) * m->nx + x;
                 *bound = scale * largest_in(view, v, m, x, y, z);
+                *all = *bound > *all ? *bound : *all;
             }
         }
     }

@@ -3,6 +3,7 @@
 
 #include "bsdf/table.h"
 #include "emitter/table.h"
+#include "medium/majorant_build.h"
 #include "render/projection.h"
 #include "sensor/kinds.h"
 #include "shape/shape.h"
@@ -107,7 +108,8 @@ static bool reaches_border(const SceneView *view, const VolumeNode *v) {
 static bool jumps_at(const SceneView *view, int32_t id, const Face *face) {
     const MediumNode *medium = view->media + id;
     const VolumeNode *v = view->volumes + medium->sigma_t;
-    if (!medium->bounded || medium->emission >= 0 || v->kind != VOLUME_GRID || reaches_border(view, v)) {
+    if (!medium->bounded || medium->emission >= 0 || v->kind != VOLUME_GRID || reaches_border(view, v) ||
+        rey_volume_goes_on(view, v)) {
         return true;
     }
     double low = INFINITY, high = -INFINITY, size = 0;
@@ -153,7 +155,7 @@ static bool box_runs_along(const SceneView *view, int32_t medium, const Beam *be
     const VolumeNode *v = view->volumes + view->media[medium].sigma_t;
     const float *m = v->to_world >= 0 ? view->theta + v->to_world : NULL;
     float low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
-    if (m && (v->kind == VOLUME_CONSTANT || v->wrap == WRAP_CLAMP)) { // medium_fills_box
+    if (m) { // medium_box
         for (int k = 0; k < 3; k++) {
             low[k] = high[k] = m[4 * k + 3];
             for (int j = 0; j < 3; j++) {
@@ -161,7 +163,6 @@ static bool box_runs_along(const SceneView *view, int32_t medium, const Beam *be
                 high[k] += fmaxf(m[4 * k + j], 0);
             }
         }
-        m = NULL;
     }
     for (int side = 0; side < 6; side++) {
         float p[4][3];
@@ -171,7 +172,7 @@ static bool box_runs_along(const SceneView *view, int32_t medium, const Beam *be
                 p[i][(side / 2 + k) % 3] = at[k] ? high[(side / 2 + k) % 3] : low[(side / 2 + k) % 3];
             }
         }
-        Face face = face_of(m, (const float(*)[3])p, 4);
+        Face face = face_of(NULL, (const float(*)[3])p, 4);
         if (runs_along(beam, &face) && jumps_at(view, medium, &face)) {
             return true;
         }

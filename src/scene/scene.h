@@ -83,8 +83,8 @@ typedef struct MediumNode {
     int32_t phase;
     int32_t flakes;                 // texture of their matrix (medium/flakes.h), -1 = there are none
     int32_t scale, scale_texture;   // theta offset, and the texture of that number
-    int32_t bounded;                // heterogeneous: nothing lies outside of the cube of sigma_t
-    int32_t nx, ny, nz, table;      // supervoxels, and the largest extinction in each of them
+    int32_t bounded;                // heterogeneous: nothing lies outside of the box around the cube of sigma_t
+    int32_t nx, ny, nz, table;      // supervoxels, the largest extinction in each of them, and that in all of them
 } MediumNode;
 
 enum { SHAPE_HAS_NORMALS = 1, SHAPE_HAS_UVS = 2, SHAPE_FLIP_NORMALS = 4, SHAPE_INSTANCED = 16, SHAPE_SMOOTH_GRADIENT = 32 };

@@ -103,6 +103,28 @@ static void run_flakes(const MediaCase *c, int n, MediaFlakes *q, double *gradie
     }
 }
 
+// Where the extinction is the largest share of its bound, along the rays of the first lanes.
+static void follow_bounds(const View *view, const MediaCase *c, Vec3 o, Vec3 d, Float tmax, Mask m, MediaRay *r) {
+    enum { STOPS = 400 };
+    Track track = {&view->scene, &view->scene, &c->medium, &c->sigma_t, false, true, NULL};
+    MajorantWalk w = track_start(&track, o, d, tmax, m);
+    Float bound = f_set(1), sigma = f_set(0);
+    Mask left = w.m;
+    for (int i = 0; i < STOPS && m_any(left); i++) {
+        left = majorant_next(&view->scene, &c->medium, &w, f_set((real)0.05), left);
+        Float there = spec_max(walk_extinction(&view->scene, &track, &w, o, d));
+        Mask closer = left & m_gt(there * bound, sigma * w.majorant);
+        bound = f_select(closer, w.majorant, bound);
+        sigma = f_select(closer, there, sigma);
+    }
+    for (int lane = 0; lane < LANES; lane++) {
+        if (i_lane(m, lane)) {
+            r[lane].bound = (double)f_lane(bound, lane);
+            r[lane].sigma = (double)f_lane(sigma, lane);
+        }
+    }
+}
+
 static void run_track(const MediaCase *c, int n, MediaRay *r) {
     View view;
     view_make(c, &view);
@@ -118,6 +140,9 @@ static void run_track(const MediaCase *c, int n, MediaRay *r) {
         }
         SampleKey key = {.pixel = u_set(0), .sample = (UInt)i_load(samples), .scramble = 7, .sobol = false};
         Mask m = m_first_n(n - first);
+        if (first == 0 && c->medium.bounded) {
+            follow_bounds(&view, c, o, d, tmax, m, r);
+        }
         Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false, true, NULL};
         Spec transmittance = track_transmittance(&track, o, d, tmax, m, &key, 0);
         Spec even = spec_set(f_set((real)1 / SPEC_N));

@@ -3,7 +3,8 @@
 
 #include "scene/scene.h"
 
-enum { MEDIA_THETA = 1024, MEDIA_TABLES = 256 };
+// MEDIA_POSE, MEDIA_PLACE: where to_world lies in theta, and its inverse in the tables.
+enum { MEDIA_THETA = 1024, MEDIA_POSE = MEDIA_THETA - 16, MEDIA_TABLES = 256, MEDIA_PLACE = MEDIA_TABLES - 12 };
 
 typedef struct MediaCase {
     int32_t theta_count;
@@ -23,6 +24,7 @@ typedef struct MediaRay {
     uint32_t sample;
     double transmittance[3], t, weight[3]; // out
     int32_t collided;
+    double bound, sigma; // where the extinction came closest to its bound along the way; not of all rays
 } MediaRay;
 
 // The area that flakes show to w at p, and the adjoint d of it.

@@ -72,28 +72,20 @@ static float faces_worth(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, co
     return sum;
 }
 
-// Points of a box that follows the pose lie on its faces; the world's box around it has the same axes as the world.
+// The box around the cube has the same axes as the world.
 static void check_face(const World *w, const VolumeNode *v, Vec3 p, const Face *face) {
-    Vec3 q = volume_to_local(&w->scene, v, p, 1);
-    float corner = 0, size = 1, x[3] = {q.x, q.y, q.z};
-    if (medium_fills_box(v)) {
-        medium_box(&w->scene, v, face->axis, &corner, &size);
-        memcpy(x, (float[3]){p.x, p.y, p.z}, sizeof x);
-    }
+    float corner, size, x[3] = {p.x, p.y, p.z};
+    medium_box(&w->scene, v, face->axis, &corner, &size);
     assert_near("place on the face", (x[face->axis] - corner) / size, face->upper ? 1 : 0, 1e-4);
 }
 
 static bool inside_box(const World *w, const VolumeNode *v, Vec3 p) {
-    Vec3 q = volume_to_local(&w->scene, v, p, 1);
-    const float own[3] = {q.x, q.y, q.z}, world[3] = {p.x, p.y, p.z};
+    const float x[3] = {p.x, p.y, p.z};
     bool inside = true;
     for (int k = 0; k < 3; k++) {
-        float corner = 0, size = 1;
-        if (medium_fills_box(v)) {
-            medium_box(&w->scene, v, k, &corner, &size);
-        }
-        float x = medium_fills_box(v) ? world[k] : own[k];
-        inside = inside && x >= corner && x <= corner + size;
+        float corner, size;
+        medium_box(&w->scene, v, k, &corner, &size);
+        inside = inside && x[k] >= corner && x[k] <= corner + size;
     }
     return inside;
 }
@@ -116,9 +108,6 @@ static void check_found(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, con
 // Faces next to where the ray begins or ends are a surface's.
 static void check_apart(const World *w, const VolumeNode *v, Vec3 o, Vec3 d, const Face *face, bool leaves) {
     Vec3 p = v3_madd(o, face->at, d), n = v3(face->axis == 0, face->axis == 1, face->axis == 2);
-    if (!medium_fills_box(v)) {
-        n = v3_normalize(table_v3(&w->scene, TABLE + 4 * face->axis));
-    }
     const float cosine = fabsf(v3_dot(n, d)), out = face->upper ? 1 : -1;
     for (int far = 0; far < 2 && cosine > 0.1f; far++) {
         float least = (1 + fmaxf(fmaxf(fabsf(p.x), fabsf(p.y)), fabsf(p.z))) * 1.5e-4f * (far ? 1.5f : 0.6f);
@@ -163,8 +152,8 @@ static void test_faces(void **state) {
                 Vec3 p = v3_madd(o, face[k].at, d);
                 check_face(&w, &v, p, face + k);
                 check_apart(&w, &v, o, d, face + k, k);
-                face_adj(&w.scene, &v, face + k, p, d, worth[k], &sink);
-                turn = v3_add(turn, face_turn(&w.scene, &v, face + k, d, worth[k]));
+                face_adj(&w.scene, &v, face + k, d, worth[k], &sink);
+                turn = v3_add(turn, face_turn(face + k, d, worth[k]));
                 crossed++;
             }
         }
