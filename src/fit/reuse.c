@@ -21,7 +21,9 @@ static bool may_vanish(const rey_scene *scene, const Unknown *p) {
     const int64_t theta = ARRAY_AT(scene->params, Param, p->param).theta;
     bool extinction = false;
     for (int64_t i = 0; i < view->media_count; i++) {
-        extinction |= theta == view->volumes[view->media[i].sigma_t].theta || theta == view->media[i].scale;
+        const MediumNode *medium = view->media + i;
+        extinction |= theta == medium->scale;
+        extinction |= rey_medium_reads(view, medium, ARRAY_AT(scene->params, Param, p->param).texture);
     }
     bool positive = p->low > 0 || p->parameterisation == PARAMETERISATION_SCATTERING;
     return extinction && !positive;

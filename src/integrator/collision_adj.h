@@ -100,6 +100,10 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
     }
     CollisionSweep s = collision_load(t, batch, slot, suffix, p);
     s.at.call.at.hit = &s.hit; // not where it was loaded
+    if (s.at.medium->sigma_s >= 0) { // where an extinction is live, so is what shadow rays pass
+        Spec lit = spec_zero_unless(s.connected, spec_scale(s.lit, s.light_phase));
+        spec_scatter(t->ws.collided, slot, spec_add(lit, spec_scale(s.onward, s.phase)), s.m);
+    }
     for (int c = 0; c < drives(t); c++) {
         Spec delta = spec_zero_unless(finite, slot_adjoint(t, slot, c));
         // Where it goes on, its direction stays: the ray ahead is dragged along as a whole.

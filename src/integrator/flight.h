@@ -165,13 +165,32 @@ typedef struct Collision {
     bool backwards; // wi leads to the light and wo to the camera
 } Collision;
 
+// What scatters over the extinction, at a point of the world: between voxels, a ratio of two fields is not a field of ratios.
+static NOINLINE Spec scattering_ratio(const SceneView *scene, const MediumNode *medium, Vec3 p) {
+    const VolumeNode *sigma_s = scene->volumes + medium->sigma_s, *sigma_t = scene->volumes + medium->sigma_t;
+    Spec s = volume_eval(scene, sigma_s, volume_to_local(scene, sigma_s, p, 1));
+    Spec sum = volume_eval(scene, sigma_t, volume_to_local(scene, sigma_t, p, 1));
+    for (int c = 0; c < SPEC_N; c++) {
+        Mask some = m_gt(sum.c[c], f_set(0));
+        s.c[c] = f_zero_unless(some, s.c[c] / f_select(some, sum.c[c], f_set(1)));
+    }
+    return s;
+}
+
+KFN Spec medium_albedo(const SceneView *scene, const MediumNode *medium, Vec3 p) {
+    if (medium->sigma_s >= 0) {
+        return scattering_ratio(scene, medium, p);
+    }
+    const VolumeNode *albedo = scene->volumes + medium->albedo;
+    return volume_eval(scene, albedo, volume_to_local(scene, albedo, p, 1));
+}
+
 KFN Collision collision_look(const Tracer *t, int32_t medium, const Hit *hit, Vec3 d) {
     const SceneView *scene = t->scene;
     Collision c = {.medium = scene->media + medium, .wi = v3_neg(d)};
-    const VolumeNode *albedo = scene->volumes + c.medium->albedo;
     c.call = (PhaseCall){.scene = scene, .node = c.medium->phase, .floor = t->floor};
     c.call.at = texcoord((Vec2){f_set(0), f_set(0)}, hit);
-    c.albedo = volume_eval(scene, albedo, volume_to_local(scene, albedo, hit->p, 1));
+    c.albedo = t->bare && c.medium->sigma_s >= 0 ? spec_set(f_set(1)) : medium_albedo(scene, c.medium, hit->p);
     return c;
 }
 

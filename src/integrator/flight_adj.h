@@ -3,6 +3,7 @@
 //   -w L + w(s) albedo(s) (what is scattered at s towards the path),
 // and the emission that is met behind s is lost as well. The first part is found at points of its own, the second one at
 // collisions and at the path's probe (probe.h). Nothing is divided by an extinction or a throughput.
+// Of media with a sigma_s and a sigma_a the first part belongs to both, and the second one, without the albedo, to sigma_s.
 // NOT differentiated: the choice of distances, channels and real collisions. Where media lie: border.h.
 #pragma once
 
@@ -10,24 +11,28 @@
 
 enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
 
-// The adjoint of the area of flakes, given that of the extinction at a point of the world, which is scale sigma_t area.
-KFN Float projection_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Spec d) {
-    const VolumeNode *v = scene->volumes + medium->sigma_t;
+// What the extinction loses grows with, and what it gains: one and the same, unless the medium has a sigma_s.
+enum { LOSS, GAIN };
+KFN const VolumeNode *medium_part(const SceneView *scene, const MediumNode *medium, int part) {
+    return scene->volumes + (part == GAIN && medium->sigma_s >= 0 ? medium->sigma_s : medium->sigma_t);
+}
+
+// The adjoint of the area of flakes, given that of scale v area at a point of the world.
+KFN Float projection_adj(const SceneView *scene, const MediumNode *medium, const VolumeNode *v, Vec3 p, Spec d) {
     Spec bare = volume_eval(scene, v, volume_to_local(scene, v, p, 1));
     return spec_dot(d, bare) * (real)scene->theta[medium->scale];
 }
 
-// Accumulates the adjoint d of the extinction along w at a point of the world.
-static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *medium, Vec3 p, Vec3 w, Spec d, Sink *sink,
-                                    Mask m) {
-    const VolumeNode *v = scene->volumes + medium->sigma_t;
+// Accumulates the adjoint d of scale v area along w at a point of the world, v a volume of the medium.
+static NOINLINE void coefficient_adj(const SceneView *scene, const MediumNode *medium, const VolumeNode *v, Vec3 p, Vec3 w,
+                                     Spec d, Sink *sink, Mask m) {
     const int32_t at = sink->texture_at[v->texture], scale_at = sink->texture_at[medium->scale_texture];
     d = spec_zero_unless(m, d);
     if (medium->flakes >= 0) {
-        flakes_area_adj(scene, medium->flakes, p, w, projection_adj(scene, medium, p, d), sink, m);
+        flakes_area_adj(scene, medium->flakes, p, w, projection_adj(scene, medium, v, p, d), sink, m);
         d = spec_scale(d, flakes_area(scene, medium->flakes, p, w));
     }
-    // extinction = scale sigma_t
+    // coefficient = scale v
     if (at >= 0 || volume_moves(scene, v, sink)) {
         volume_world_adj(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale])), sink, m);
     }
@@ -36,10 +41,24 @@ static NOINLINE void extinction_adj(const SceneView *scene, const MediumNode *me
     }
 }
 
+// Accumulates the adjoint d of a part of the extinction along w at a point of the world.
+KFN void extinction_adj(const SceneView *scene, const MediumNode *medium, int part, Vec3 p, Vec3 w, Spec d, Sink *sink, Mask m) {
+    if (medium->sigma_s < 0) {
+        coefficient_adj(scene, medium, scene->volumes + medium->sigma_t, p, w, d, sink, m);
+        return;
+    }
+    // sigma_t = sigma_s + sigma_a
+    coefficient_adj(scene, medium, scene->volumes + medium->sigma_s, p, w, d, sink, m);
+    if (part == LOSS) {
+        coefficient_adj(scene, medium, scene->volumes + medium->sigma_a, p, w, d, sink, m);
+    }
+}
+
 // The same of the point and the direction, as far as flakes are concerned.
-static NOINLINE void extinction_turn(const SceneView *scene, const MediumNode *medium, Vec3 p, Vec3 w, Spec d, Mask m, Vec3 *dp,
-                                     Vec3 *dw) {
-    flakes_area_turn(scene, medium->flakes, p, w, projection_adj(scene, medium, p, spec_zero_unless(m, d)), dp, dw);
+static NOINLINE void extinction_turn(const SceneView *scene, const MediumNode *medium, int part, Vec3 p, Vec3 w, Spec d, Mask m,
+                                     Vec3 *dp, Vec3 *dw) {
+    const VolumeNode *v = medium_part(scene, medium, part);
+    flakes_area_turn(scene, medium->flakes, p, w, projection_adj(scene, medium, v, p, spec_zero_unless(m, d)), dp, dw);
 }
 
 // Points spread evenly over [low, high], one in each of FLIGHT_POINTS parts of it.
@@ -84,6 +103,11 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     a.end = f_select(a.collided, f_load(ws->records.ldist + at), f_set(0));
     // Collisions have the density extinction, and the weight extinction / (extinction + sparse).
     a.hit = spec_mul(a.onward, flight_rcp(t, batch->group, &a.f, a.end));
+    if (a.medium->sigma_s >= 0) {
+        Spec scattered = spec_mul(spec_load(ws->records.weight, at), spec_gather(ws->collided, a.f.slot));
+        a.hit = spec_mul(scattered, flight_rcp(t, batch->group, &a.f, a.end));
+        a.collided = a.collided & m_finite(spec_sum(scattered));
+    }
     a.gain = spec_zero();
     if (m_any(a.probed)) {
         Track track = track_of(t, batch->group);
@@ -98,25 +122,26 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     return a;
 }
 
-// Adds to g what the adjoint d of the extinction at a distance along the flight makes of the ray.
-static NOINLINE void flight_point_glide(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Mask m) {
+// Adds to g what the adjoint d of a part of the extinction at a distance along the flight makes of the ray.
+static NOINLINE void flight_point_glide(const Tracer *t, const FlightAdj *a, int part, Float at, Spec d, Glide *g, Mask m) {
     const SceneView *scene = t->scene;
     Vec3 p = v3_madd(a->f.o, at, a->f.d);
     if (a->medium->flakes >= 0) {
         Vec3 dp = v3_zero(), dw = v3_zero();
-        extinction_turn(scene, a->medium, p, a->f.d, d, m, &dp, &dw);
+        extinction_turn(scene, a->medium, part, p, a->f.d, d, m, &dp, &dw);
         glide_add(g, p, dp, m);
         g->turn = v3_add(g->turn, v3_select(m, dw, v3_zero()));
         d = spec_scale(d, flakes_area(scene, a->medium->flakes, p, a->f.d));
     }
-    glide_look(scene, g, scene->volumes + a->medium->sigma_t, p, spec_scale(d, f_set((real)scene->theta[a->medium->scale])), m);
+    d = spec_scale(d, f_set((real)scene->theta[a->medium->scale]));
+    glide_look(scene, g, medium_part(scene, a->medium, part), p, d, m);
 }
 
 // Accumulates that adjoint.
-KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
-    extinction_adj(t->scene, a->medium, v3_madd(a->f.o, at, a->f.d), a->f.d, d, sink, m);
+KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, int part, Float at, Spec d, Glide *g, Sink *sink, Mask m) {
+    extinction_adj(t->scene, a->medium, part, v3_madd(a->f.o, at, a->f.d), a->f.d, d, sink, m);
     if (g) {
-        flight_point_glide(t, a, at, d, g, m);
+        flight_point_glide(t, a, part, at, d, g, m);
     }
 }
 
@@ -130,14 +155,14 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
         for (int k = 0; k < FLIGHT_POINTS; k++) {
             Spec behind = spec_zero_unless(m_lt(a->point[k], a->emission_at), a->emission);
             Spec lost = spec_scale(spec_mul(worth, spec_add(a->onward, behind)), -each);
-            flight_point_adj(t, a, a->point[k], lost, g, sink, m);
+            flight_point_adj(t, a, LOSS, a->point[k], lost, g, sink, m);
             if (end) {
-                flight_point_glide(t, a, a->point[k], spec_scale(spec_mul(worth, a->onward), -each), end, m);
+                flight_point_glide(t, a, LOSS, a->point[k], spec_scale(spec_mul(worth, a->onward), -each), end, m);
             }
         }
-        flight_point_adj(t, a, a->end, spec_mul(worth, a->hit), g, sink, a->collided);
+        flight_point_adj(t, a, GAIN, a->end, spec_mul(worth, a->hit), g, sink, a->collided);
         if (m_any(a->probed)) {
-            flight_point_adj(t, a, a->f.probe, spec_mul(worth, a->gain), g, sink, a->probed);
+            flight_point_adj(t, a, GAIN, a->f.probe, spec_mul(worth, a->gain), g, sink, a->probed);
         }
     }
     if (live & LIVE_GLOW) {
@@ -205,7 +230,7 @@ static NOINLINE void fog_adj(const Tracer *t, const Walk *walk, Spec transmittan
             Float each = (high - low) * ((real)-1 / FLIGHT_POINTS);
             for (int k = 0; k < FLIGHT_POINTS; k++) {
                 Float at = f_select(m, flight_point(low, high, key, (uint32_t)(i * FLIGHT_POINTS), k), f_set(0));
-                extinction_adj(scene, medium, v3_madd(walk->o[i], at, walk->d), walk->d, spec_scale(dt, each), sink, m);
+                extinction_adj(scene, medium, LOSS, v3_madd(walk->o[i], at, walk->d), walk->d, spec_scale(dt, each), sink, m);
             }
         }
     }

@@ -129,7 +129,7 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
                 Vec3 slope = v3_zero();
                 if (flakes) {
                     Vec3 dw = v3_zero();
-                    extinction_turn(scene, medium, p, walk->d, spec_scale(dt, along), m, &slope, &dw);
+                    extinction_turn(scene, medium, LOSS, p, walk->d, spec_scale(dt, along), m, &slope, &dw);
                     turn->d = v3_add(turn->d, v3_select(m, dw, v3_zero()));
                 }
                 if (grid) {

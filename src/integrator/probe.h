@@ -149,7 +149,8 @@ static void probe_start(Tracer *t, int32_t count) {
     probes_begin(t, n);
 }
 
-// Runs the paths of probes; `out` becomes what each of them brought. The records stay as they are.
+// Runs the paths of probes; `out` becomes what each of them brought. The records stay as they are. t->bare: of their first
+// vertices.
 static void probes_run(Tracer *t, int32_t *begin, int32_t count, uint32_t salt, SpecRows out) {
     const uint32_t scramble = t->job->scramble;
     const int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (int32_t)t->scene->media_count;
@@ -169,6 +170,7 @@ static void probes_run(Tracer *t, int32_t *begin, int32_t count, uint32_t salt, 
         }
     }
     shadow_stage(t, 0);
+    t->bare = false;
     t->current = 1;
     t->active = next_count;
     t->first_bounce = 1;
@@ -183,6 +185,7 @@ static void probe_stage(Tracer *t, int32_t *begin, int32_t count) {
     const Tracer before = *t;
     probe_choose(t, count);
     probe_start(t, count);
+    t->bare = true;
     probes_run(t, begin, count, 0x70726f62u, t->ws.scattered);
     *t = before;
 }

@@ -51,6 +51,7 @@ typedef struct Tracer {
     bool placed;             // the paths' first vertices are known
     bool spares;             // lights are not selected: what vertices bring is found out from the first selected one on
     bool local;              // of surfaces nothing is recorded but what materials ask for
+    bool bare;               // collisions count as if all of the extinction scattered, in media that have a sigma_s
     bool shadows_later;      // shadow rays are traced by the sweep, which must know what they pass
     real *nudge[2];          // per slot, what is added to the uv of those; or null
     const Vec3 *focus;       // where particles are to be seen from (track.h), or null

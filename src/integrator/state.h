@@ -99,10 +99,11 @@ typedef struct Workspace {
     SpecRows attached;
     ChannelRows back, drag, turn, pull;
     // per slot, of the flight that has the path's probe (probe.h): its record (-1: none) and medium, what all flights
-    // together and this one are worth, where along it the probe is, and what is scattered there
+    // together and this one are worth, where along it the probe is, and what is scattered there; and what the collision that was
+    // swept last scatters. Both per unit of albedo where media have a sigma_s
     int32_t *probe, *probe_medium;
     real *probe_total, *probe_worth, *probe_at;
-    SpecRows scattered;
+    SpecRows scattered, collided;
     // the same of the border that has the path's probe (border.h); which side of it that is on, and where
     int32_t *border, *border_side, *border_medium, *border_depth;
     BORDER_FLOATS(DECLARE_FLOAT)
@@ -148,6 +149,7 @@ static inline size_t workspace_layout_probes(Workspace *ws, char *block, size_t 
     CARVE(ws->probe_worth, n)
     CARVE(ws->probe_at, n)
     CARVE_SPEC(ws->scattered, n)
+    CARVE_SPEC(ws->collided, n)
     CARVE(ws->border, n)
     CARVE(ws->border_side, n)
     CARVE(ws->border_medium, n)

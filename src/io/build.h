@@ -72,6 +72,7 @@ typedef struct Builder {
     bool lenient;         // what cannot be read is left out
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
     int32_t shape_flags;  // of all shapes that are built now
+    int32_t beside;       // number + 1 of the volume in whose place those that are built now must stand, 0 = anywhere
     GroupTable groups;
 } Builder;
 
@@ -147,9 +148,8 @@ rey_result build_group(Builder *b, ShapeRecord *shape); // finds its shading gro
 rey_result build_volume(Builder *b, rey_xml_node *node, TextureUse use, const char *path, int32_t *out);
 rey_result build_volume_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, double value,
                              const char *path, int32_t *out);
-// A colour as a volume, known as `path`.name; node and name say where it came from.
-rey_result build_volume_value(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double rgb[3],
-                              const char *path, int32_t *out);
+// What scatters and what absorbs in a medium, and the volume of their sum (build_scattering.c).
+rey_result build_scattering(Builder *b, rey_xml_node *node, const char *path, MediumNode *medium);
 rey_result build_phase(Builder *b, rey_xml_node *node, const char *path, int32_t *out);
 rey_result build_isotropic_phase(Builder *b, int32_t *out);
 rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_t *out);

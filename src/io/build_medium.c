@@ -42,34 +42,6 @@ static rey_result coefficient(Builder *b, rey_xml_node *node, int which, const c
                : rey_xml_fail_value(b->ctx, node, name, "'%s' has %d channels, expected 1 or 3", name, v->channels);
 }
 
-// What scatters and what is absorbed, in place of the extinction and its share that scatters: values only.
-static rey_result get_value(Builder *b, rey_xml_node *node, const char *name, double rgb[3]) {
-    const double zero[3] = {0, 0, 0};
-    TRY(rey_xml_get_colour(b->ctx, node, name, REY_COLOUR_UNBOUNDED, zero, rgb));
-    for (int c = 0; c < 3; c++) {
-        if (!(rgb[c] >= 0)) {
-            return rey_xml_fail_value(b->ctx, node, name, "%s is %g, expected a number >= 0", name, rgb[c]);
-        }
-    }
-    return REY_OK;
-}
-
-static rey_result build_sum(Builder *b, rey_xml_node *node, const char *path, MediumNode *medium) {
-    double scattering[3], absorption[3], sum[3], share[3];
-    if (rey_xml_has(node, "sigma_t") || rey_xml_has(node, "albedo")) {
-        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                            "either 'sigma_t' and 'albedo' or 'sigma_s' and 'sigma_a' may be given, not both");
-    }
-    TRY(get_value(b, node, "sigma_s", scattering));
-    TRY(get_value(b, node, "sigma_a", absorption));
-    for (int c = 0; c < 3; c++) {
-        sum[c] = scattering[c] + absorption[c];
-        share[c] = sum[c] > 0 ? scattering[c] / sum[c] : 0;
-    }
-    TRY(build_volume_value(b, node, "sigma_t", coefficient_use(SIGMA_T), sum, path, &medium->sigma_t));
-    return build_volume_value(b, node, "albedo", coefficient_use(ALBEDO), share, path, &medium->albedo);
-}
-
 static rey_result build_scale(Builder *b, rey_xml_node *node, const char *path, MediumNode *medium) {
     TextureUse use = {REY_COLOUR_UNBOUNDED, true, 0, INFINITY, "", "factor of sigma_t", 0, NULL};
     double one = 1;
@@ -98,11 +70,16 @@ static rey_result build_medium_phase(Builder *b, rey_xml_node *node, const char 
     return REY_OK;
 }
 
+static bool is_grid(const Builder *b, int32_t volume) {
+    return volume >= 0 && ARRAY_AT(b->scene->build.volumes, VolumeNode, volume).kind == VOLUME_GRID;
+}
+
 static rey_result build_bounds(Builder *b, const rey_xml_node *node, MediumNode *medium) {
     const VolumeNode *sigma_t = &ARRAY_AT(b->scene->build.volumes, VolumeNode, medium->sigma_t);
     if (!medium->bounded && sigma_t->kind != VOLUME_CONSTANT) {
+        const char *name = is_grid(b, medium->sigma_s) ? "sigma_s" : is_grid(b, medium->sigma_a) ? "sigma_a" : "sigma_t";
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                            "'sigma_t' of a homogeneous medium is a grid, which 'heterogeneous' can have");
+                            "'%s' of a homogeneous medium is a grid, which 'heterogeneous' can have", name);
     }
     int32_t size = rey_medium_table_size(sigma_t, medium);
     medium->table = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), size);
@@ -116,7 +93,8 @@ rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_
         *out = node->built;
         return REY_OK;
     }
-    MediumNode medium = {.emission = -1, .flakes = -1, .bounded = strcmp(node->type, words[HETEROGENEOUS]) == 0};
+    MediumNode medium = {.sigma_s = -1, .sigma_a = -1, .emission = -1, .flakes = -1};
+    medium.bounded = strcmp(node->type, words[HETEROGENEOUS]) == 0;
     if (!medium.bounded && strcmp(node->type, words[HOMOGENEOUS]) != 0) {
         return build_unknown(b, node, medium_word, NULL);
     }
@@ -124,7 +102,7 @@ rey_result build_medium(Builder *b, rey_xml_node *node, const char *path, int32_
     TRY(rey_xml_get_bool(b->ctx, node, "sample_emitters", true, &ignored));
     TRY(rey_xml_get_bool(b->ctx, node, "has_spectral_extinction", true, &ignored));
     if (rey_xml_has(node, "sigma_s") || rey_xml_has(node, "sigma_a")) {
-        TRY(build_sum(b, node, path, &medium));
+        TRY(build_scattering(b, node, path, &medium));
     } else {
         TRY(coefficient(b, node, SIGMA_T, path, &medium.sigma_t));
         TRY(coefficient(b, node, ALBEDO, path, &medium.albedo));

@@ -4,6 +4,7 @@
 #include "io/grid.h"
 #include "shape/affine.h"
 
+#include <math.h>
 #include <string.h>
 
 static const char *volume_word(void *user, int i) {
@@ -24,6 +25,38 @@ static rey_result add_volume(Builder *b, VolumeNode volume, int32_t *out) {
     return REY_OK;
 }
 
+// Whether two poses are one, written in two ways.
+static bool same_place(const float *pose, const double m[16]) {
+    double largest = 0, apart = 0;
+    for (int k = 0; k < 16; k++) {
+        largest = fmax(largest, fabs(m[k]));
+        apart = fmax(apart, fabs(m[k] - (double)pose[k]));
+    }
+    return apart <= 1e-6 * largest;
+}
+
+// The place of the volume b->beside, whose parameter gets a further name.
+static rey_result share_place(Builder *b, rey_xml_node *node, const char *path, const double m[16], VolumeNode *volume) {
+    rey_scene *scene = b->scene;
+    const int32_t beside = b->beside - 1;
+    const VolumeNode *other = &ARRAY_AT(scene->build.volumes, VolumeNode, beside);
+    char name[MAX_PATH_NAME];
+    if (!same_place(&ARRAY_AT(scene->build.theta, float, other->to_world), m)) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
+                            "'sigma_a' stands elsewhere than 'sigma_s', whose sum is the extinction: expected the same to_world");
+    }
+    volume->to_world = other->to_world;
+    volume->table = other->table;
+    build_join(name, path, "to_world");
+    for (size_t i = 0; i < scene->params.count; i++) {
+        const Param *p = &ARRAY_AT(scene->params, Param, i);
+        if (p->volume >= 0 && p->theta == other->to_world) {
+            return rey_scene_add_alias(scene, name, (int)i);
+        }
+    }
+    return REY_OK;
+}
+
 // Where a volume stands, with the parameter `path`.to_world, which places the box (null = the unit cube).
 static rey_result build_place(Builder *b, rey_xml_node *node, const char *path, const float *box, int32_t id,
                               VolumeNode *volume) {
@@ -39,6 +72,9 @@ static rey_result build_place(Builder *b, rey_xml_node *node, const char *path, 
     if (rey_matrix_determinant(m) == 0) {
         return rey_xml_fail_value(b->ctx, node, "to_world", "the volume's to_world%s cannot be inverted",
                                   box ? " with the box of its file" : "");
+    }
+    if (b->beside) {
+        return share_place(b, node, path, m, volume);
     }
     Param pose = {PARAM_DEFAULTS, .terms = REY_TERM_INTERIOR, .volume = id};
     TRY(build_pose(b, m, path, pose, &volume->to_world));
@@ -194,16 +230,6 @@ static rey_result build_value(Builder *b, rey_xml_node *node, const char *name, 
     build_join(full, path, "value");
     TRY(build_slot(b, node, name, use, &value, 1, full, &texture));
     return add_value(b, node, texture, path, out);
-}
-
-rey_result build_volume_value(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double rgb[3],
-                              const char *path, int32_t *out) {
-    char full[MAX_PATH_NAME], value[MAX_PATH_NAME];
-    int32_t texture;
-    build_join(full, path, name);
-    build_join(value, full, "value");
-    TRY(build_constant(b, node, name, use, rgb, 3, value, &texture));
-    return add_value(b, node, texture, full, out);
 }
 
 rey_result build_volume_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, double value,

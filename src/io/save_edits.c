@@ -94,6 +94,32 @@ static bool can_write_leaf(const Param *p) {
     return p->count == 1 || (p->dims == 1 && p->count == 3) || (p->dims == 2 && p->count == 16);
 }
 
+static rey_result add_edit(Writer *w, Edit edit) {
+    Edit *slot = rey_array_push(w->ctx, &w->edits, sizeof edit, 1);
+    if (!slot) {
+        return REY_ERROR_MEMORY;
+    }
+    edit.next = w->first_edit[edit.node->index];
+    *slot = edit;
+    w->first_edit[edit.node->index] = (int32_t)w->edits.count - 1;
+    return REY_OK;
+}
+
+// Volumes that stand in one place have it written in each of them.
+static rey_result add_shared_places(Writer *w, const Edit *edit) {
+    const Param *p = param_at(w, edit->param);
+    for (int i = 0; i < rey_xml_node_count(w->source->document) && p->volume >= 0; i++) {
+        const rey_xml_node *node = rey_xml_node_at(w->source->document, i);
+        bool placed = node->tag == REY_XML_VOLUME && node->built >= 0 && node != edit->node;
+        if (placed && w->scene->view.volumes[node->built].to_world == p->theta) {
+            Edit shared = *edit;
+            shared.node = node;
+            TRY(add_edit(w, shared));
+        }
+    }
+    return REY_OK;
+}
+
 rey_result rey_save_find_edits(Writer *w) {
     int nodes = rey_xml_node_count(w->source->document);
     w->first_edit = rey_alloc_array(w->ctx, (size_t)nodes + 1, sizeof *w->first_edit);
@@ -111,13 +137,8 @@ rey_result rey_save_find_edits(Writer *w) {
             return rey_fail(w->ctx, REY_ERROR_UNSUPPORTED, "the changed values of '%s' cannot be written into a scene file",
                             param_at(w, i)->name);
         }
-        Edit *slot = rey_array_push(w->ctx, &w->edits, sizeof edit, 1);
-        if (!slot) {
-            return REY_ERROR_MEMORY;
-        }
-        edit.next = w->first_edit[edit.node->index];
-        *slot = edit;
-        w->first_edit[edit.node->index] = (int32_t)w->edits.count - 1;
+        TRY(add_edit(w, edit));
+        TRY(add_shared_places(w, &edit));
     }
     return REY_OK;
 }
@@ -169,9 +190,7 @@ static bool leaf_replaces(const char *leaf, const char *property) {
 
 static bool constant_replaces(const char *constant, const char *property) {
     bool metal = strcmp(constant, "eta") == 0 || strcmp(constant, "k") == 0;
-    bool medium = strcmp(constant, "sigma_t") == 0 || strcmp(constant, "albedo") == 0;
-    bool sum = strcmp(property, "sigma_s") == 0 || strcmp(property, "sigma_a") == 0;
-    return (medium && sum) || strcmp(constant, property) == 0 || (metal && strcmp(property, "material") == 0) ||
+    return strcmp(constant, property) == 0 || (metal && strcmp(property, "material") == 0) ||
            (strcmp(constant, "int_ior") == 0 && strcmp(property, "ext_ior") == 0);
 }
 
@@ -235,19 +254,10 @@ static void write_value(Writer *w, int depth, const rey_xml_node *node, const ch
     rey_save_line(w, depth, "</volume>");
 }
 
-// What goes with a property: the other half of a metal's index, and of a medium's coefficients.
+// What goes with a property: the other half of a metal's index.
 static const char *other_half(const Edit *e) {
-    static const char *const pairs[][2] = {{"eta", "k"}, {"sigma_t", "albedo"}};
     bool metal = strstr(e->node->type, "conductor") != NULL;
-    bool medium = e->node->tag == REY_XML_MEDIUM && (rey_xml_has(e->node, "sigma_s") || rey_xml_has(e->node, "sigma_a"));
-    for (int i = 0; i < COUNT_OF(pairs); i++) {
-        for (int k = 0; k < 2 && (i ? medium : metal); k++) {
-            if (strcmp(e->property, pairs[i][k]) == 0) {
-                return pairs[i][1 - k];
-            }
-        }
-    }
-    return NULL;
+    return metal && strcmp(e->property, "eta") == 0 ? "k" : metal && strcmp(e->property, "k") == 0 ? "eta" : NULL;
 }
 
 // The other half, when other words stood for both.

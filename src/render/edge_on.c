@@ -239,9 +239,9 @@ static bool faces_run_along(const rey_scene *scene, const Param *p, const Beam *
     }
     for (int32_t i = 0; i < (int32_t)view->media_count; i++) {
         const MediumNode *medium = view->media + i;
-        bool moves = all || (p->volume >= 0 && medium->sigma_t == p->volume);
+        bool moves = all || (p->volume >= 0 && view->volumes[medium->sigma_t].to_world == p->theta);
         if (medium->bounded && moves && box_runs_along(view, i, beam)) {
-            snprintf(name, OBJECT_NAME, "the box of the grid of sigma_t");
+            snprintf(name, OBJECT_NAME, "the box of the grid of %s", medium->sigma_s < 0 ? "sigma_t" : "sigma_s");
             return true;
         }
     }

@@ -60,9 +60,11 @@ static bool volume_live(const SceneView *view, const PathJob *job, int32_t id) {
 static bool volume_varies(const SceneView *view, int32_t id) { return id >= 0 && view->volumes[id].kind == VOLUME_GRID; }
 
 static int32_t medium_live(const SceneView *view, const PathJob *job, const MediumNode *medium) {
-    bool extinction = volume_live(view, job, medium->sigma_t) || texture_live(view, job, medium->scale_texture) ||
+    bool extinction = volume_live(view, job, medium->sigma_t) || volume_live(view, job, medium->sigma_s) ||
+                      volume_live(view, job, medium->sigma_a) || texture_live(view, job, medium->scale_texture) ||
                       texture_live(view, job, medium->flakes);
     bool emission = volume_live(view, job, medium->emission), borders = job->volume_at[medium->sigma_t] >= 0;
+    // What scatters, where it is told as such, is a part of the extinction (integrator/flight_adj.h).
     bool albedo = volume_live(view, job, medium->albedo), phase = phase_live(view, job, medium->phase);
     if (job->glides || job->rides) { // rays glide over them
         extinction |= volume_varies(view, medium->sigma_t) || medium->flakes >= 0; // which rays that turn see from another side

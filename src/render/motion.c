@@ -131,6 +131,17 @@ static bool normals_follow(const Render *r, int64_t shape) {
     return r->job.points_at[shape] >= 0 && (r->scene->view.shapes[shape].flags & SHAPE_SMOOTH_NORMALS);
 }
 
+void rey_motion_share_places(Render *r) {
+    const SceneView *view = &r->scene->view;
+    int32_t *volume_at = (int32_t *)(uintptr_t)r->job.volume_at;
+    for (int64_t i = 0; i < view->volumes_count && r->job.any_volumes; i++) {
+        for (int64_t k = 0; k < view->volumes_count && view->volumes[i].to_world >= 0; k++) {
+            bool same = view->volumes[k].to_world == view->volumes[i].to_world;
+            volume_at[i] = same && volume_at[k] >= 0 ? volume_at[k] : volume_at[i];
+        }
+    }
+}
+
 void rey_motion_add_normals(Render *r, int64_t *size) {
     const SceneView *view = &r->scene->view;
     for (int64_t i = 0; i < view->shapes_count; i++) {

@@ -23,6 +23,9 @@ int32_t rey_camera_theta(const SensorRecord *s, int32_t number);
 // Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
 int32_t *rey_motion_slot(Render *r, const Param *p);
 
+// Volumes of one place (the pair of build_scattering.c and its sum) move together.
+void rey_motion_share_places(Render *r);
+
 // Vertex normals that follow selected vertices (SHAPE_SMOOTH_NORMALS) get room behind the selection, from *size on.
 void rey_motion_add_normals(Render *r, int64_t *size);
 // Reverse: adds what the gradient of those normals makes of the gradient of their vertices.

@@ -143,10 +143,19 @@ static const char *gap_of_rides(const SceneView *view) {
     return phases_read_volumes(view) ? "collisions that move with surfaces look up volumes of phase functions elsewhere" : NULL;
 }
 
+// Whether one of the volumes that stand where a parameter says does.
+static bool jumps_there(const SceneView *view, const Param *p) {
+    for (int64_t i = 0; i < view->volumes_count && p->volume >= 0; i++) {
+        if (view->volumes[i].to_world == p->theta && jumps(view->volumes + i)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
 static const char *gap_in_media(const SceneView *view, const Param *p) {
-    const VolumeNode *volume = p->volume >= 0 ? view->volumes + p->volume : NULL;
-    if (volume && jumps(volume)) {
+    if (jumps_there(view, p)) {
         return "with filter_type=\"nearest\" the volume jumps from voxel to voxel, and with \"trilinear\" it does not";
     }
     if (!view->has_media || rey_moves_border(view, p)) {
@@ -187,7 +196,7 @@ static const char *gap_of_score(const SceneView *view, const Param *p) {
     for (int64_t i = 0; i < view->media_count; i++) {
         const MediumNode *medium = view->media + i;
         const VolumeNode *v = view->volumes + medium->sigma_t;
-        bool read = p->theta == v->theta || p->theta == medium->scale;
+        bool read = rey_medium_reads(view, medium, p->texture) || p->theta == medium->scale;
         bool empty = read && view->theta[medium->scale] <= 0;
         int64_t count = v->kind == VOLUME_GRID ? (int64_t)v->nx * v->ny * v->nz * v->channels : v->channels;
         for (int64_t k = 0; k < count && read && !empty; k++) {

@@ -6,6 +6,7 @@
 #include "emitter/update.h"
 #include "math/colour.h"
 #include "medium/majorant_build.h"
+#include "medium/sum.h"
 #include "medium/table.h"
 #include "shape/affine.h"
 #include "shape/touches.h"
@@ -66,6 +67,7 @@ static rey_result update_media(rey_scene *scene) {
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         if (scene->dirty_media[i]) {
+            rey_medium_sum(view, view->media + i);
             rey_medium_update(view, view->volumes + view->media[i].sigma_t, view->media + i, scene->headroom);
         }
     }

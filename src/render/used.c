@@ -67,6 +67,8 @@ static void mark_medium(const Marks *m, int32_t id) {
     m->media[id] = 1;
     mark_volume(m, medium->sigma_t);
     mark_volume(m, medium->albedo);
+    mark_volume(m, medium->sigma_s);
+    mark_volume(m, medium->sigma_a);
     mark_volume(m, medium->emission);
     mark_texture(m, medium->scale_texture);
     mark_phase(m, medium->phase);

@@ -127,6 +127,16 @@ const float *rey_param_values(const rey_scene *scene, int param) {
     return p ? scene->view.theta + p->theta : NULL;
 }
 
+bool rey_medium_reads(const SceneView *view, const MediumNode *medium, int32_t texture) {
+    const int32_t volumes[] = {medium->sigma_t, medium->sigma_s, medium->sigma_a};
+    for (int i = 0; i < COUNT_OF(volumes); i++) {
+        if (volumes[i] >= 0 && view->volumes[volumes[i]].texture == texture) {
+            return true;
+        }
+    }
+    return false;
+}
+
 // Derived data that reads a texture: environment distributions, tables of scattering functions.
 static void texture_changed(rey_scene *scene, int32_t texture) {
     for (int64_t i = 0; i < scene->view.emitters_count; i++) {
@@ -143,7 +153,7 @@ static void texture_changed(rey_scene *scene, int32_t texture) {
     }
     for (int64_t i = 0; i < scene->view.media_count; i++) {
         const MediumNode *m = scene->view.media + i;
-        bool read = scene->view.volumes[m->sigma_t].texture == texture || m->scale_texture == texture || m->flakes == texture;
+        bool read = rey_medium_reads(&scene->view, m, texture) || m->scale_texture == texture || m->flakes == texture;
         scene->dirty_media[i] |= read;
     }
     for (int64_t i = 0; i < scene->view.phases_count; i++) {

@@ -76,9 +76,11 @@ typedef struct PhaseNode {
     int32_t table;                     // first derived value in `tables`, -1 = none
 } PhaseNode;
 
-// Extinction is scale x sigma_t, in media of flakes times their projected area; the share `albedo` of it scatters.
+// Extinction is scale x sigma_t, in media of flakes times their projected area; the share `albedo` of it scatters. Of media that
+// are written with sigma_s and sigma_a, sigma_t is the sum of these, which medium/sum.h derives; they have no albedo (-1).
 typedef struct MediumNode {
     int32_t sigma_t, albedo;        // volumes
+    int32_t sigma_s, sigma_a;       // volumes: what scatters and what absorbs, -1 = sigma_t and albedo say that
     int32_t emission;               // volume: radiance that is added per unit of length, whatever sigma_t and scale are; -1 = none
     int32_t phase;
     int32_t flakes;                 // texture of their matrix (medium/flakes.h), -1 = there are none
@@ -315,5 +317,7 @@ int rey_scene_grid_channels(const rey_scene *scene, int param);
 void rey_scene_forget_params(rey_scene *scene, size_t params, size_t aliases);
 // Writes a parameter's values after checking them, and counts its version up.
 rey_result rey_scene_set(rey_scene *scene, int param, const float *values, int64_t count);
+// Whether a medium's extinction is read from a texture: that of sigma_t itself, or one that it is the sum of.
+bool rey_medium_reads(const SceneView *view, const MediumNode *medium, int32_t texture);
 // Marks the derived data of every parameter whose version is not the one that it was built from.
 void rey_scene_mark_changes(rey_scene *scene);

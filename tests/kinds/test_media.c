@@ -33,7 +33,7 @@ static MediaCase case_of(int nx, int ny, int nz, int channels) {
     bool constant = nx * ny * nz == 1;
     c.sigma_t = (VolumeNode){.kind = constant ? VOLUME_CONSTANT : VOLUME_GRID, .theta = 1, .channels = channels, .nx = nx,
                              .ny = ny, .nz = nz, .filter = FILTER_BILINEAR, .wrap = WRAP_CLAMP, .table = -1};
-    c.medium = (MediumNode){.bounded = true, .flakes = -1};
+    c.medium = (MediumNode){.bounded = true, .sigma_s = -1, .sigma_a = -1, .flakes = -1};
     assert_true(c.theta_count <= MEDIA_THETA);
     return c;
 }
