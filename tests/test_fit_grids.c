@@ -266,6 +266,55 @@ static void test_carving(void **state) {
     rey_fit_result_free(&result);
 }
 
+// The scene with grids of what scatters and what absorbs.
+static void write_pair(const Fixture *f) {
+    static const char *const grid =
+        "<volume name=\"%s\" type=\"gridvolume\"><string name=\"filename\" value=\"start.vol\"/><transform name=\"to_world\">"
+        "<scale value=\"2\"/><translate value=\"-1\"/></transform></volume>";
+    char text[8192], path[128];
+    int used = (int)(strstr(HEAD, "<volume") - HEAD);
+    memcpy(text, HEAD, (size_t)used);
+    used += snprintf(text + used, sizeof text - (size_t)used, grid, "sigma_s");
+    used += snprintf(text + used, sizeof text - (size_t)used, grid, "sigma_a");
+    used += snprintf(text + used, sizeof text - (size_t)used, "%s", strstr(HEAD, "</medium>"));
+    for (int i = 0; i < VIEWS; i++) {
+        used += snprintf(text + used, sizeof text - (size_t)used, SENSOR, i ? "4, 0, 0.5" : "0, -4, 0");
+    }
+    snprintf(text + used, sizeof text - (size_t)used, "</scene>");
+    path_of(f, "pair.xml", path);
+    assert_int_equal(write_text(f, "pair.xml", text), REY_OK);
+}
+
+// Two grids whose sum is an extinction grow together, or not at all.
+static void test_pair(void **state) {
+    Fixture *f = *state;
+    const char *sets[] = {"scene=pair.xml", "iterations=25", "parameters=[{name: air.interior_medium.sigma_s.data}]"};
+    char job[128], folder[128];
+    FitResult result;
+    write_pair(f);
+    path_of(f, "job.yaml", job);
+    path_of(f, "p", folder);
+    FitDef def = {.job_path = job, .overrides = sets, .override_count = COUNT_OF(sets), .output = folder};
+    assert_int_equal(rey_fit(f->ctx, &def, &result), REY_ERROR_PARAM);
+    assert_non_null(strstr(rey_error(f->ctx), "would leave the other one of sigma_s and sigma_a behind"));
+    rey_fit_result_free(&result);
+    sets[2] = "parameters=[{name: air.interior_medium.sigma_*.data, parameterisation: softplus}]";
+    if (rey_fit(f->ctx, &def, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    assert_int_equal(result.rows.count, 2);
+    rey_scene *scene = NULL;
+    assert_int_equal(rey_scene_load(f->ctx, result.scene, NULL, 0, &scene), REY_OK);
+    for (int i = 0; i < 2; i++) {
+        const FitRow *row = &ARRAY_AT(result.rows, FitRow, i);
+        assert_int_equal(row->count, FINE * FINE * FINE);
+        assert_memory_equal(rey_param_values(scene, rey_param_find(scene, row->name)), row->found,
+                            (size_t)row->count * sizeof(float));
+    }
+    rey_scene_destroy(scene);
+    rey_fit_result_free(&result);
+}
+
 static void test_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
@@ -301,6 +350,7 @@ int main(void) {
         cmocka_unit_test(test_fit_grows),
         cmocka_unit_test(test_held_out_does_not_count),
         cmocka_unit_test(test_carving),
+        cmocka_unit_test(test_pair),
         cmocka_unit_test(test_errors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

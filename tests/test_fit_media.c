@@ -45,10 +45,22 @@ static const char *const JOB =
     "  - {name: box.interior_medium.phase_function.weights, parameterisation: simplex}\n"
     "image_every: 0\nreport_spp: 4\ntruth: {scene: truth.xml}\n";
 
+// The scene with what scatters and what absorbs in the place of what the fog's extinction is told by.
+static int write_pair(const Fixture *f) {
+    const char *first = strstr(SCENE, "<rgb name=\"sigma_t\" value=\"$sigma_t\"/>"), *rest = strstr(SCENE, "<float name=\"scale\"");
+    char text[8192];
+    if (!first || !rest) {
+        return -1;
+    }
+    snprintf(text, sizeof text, "%.*s<rgb name=\"sigma_s\" value=\"0.45\"/><rgb name=\"sigma_a\" value=\"0.45\"/>%s",
+             (int)(first - SCENE), SCENE, rest);
+    return write_text(f, "pair.xml", text);
+}
+
 static int set_up(void **state) {
     Fixture *f = *state = fixture_make();
-    return !f || write_text(f, "scene.xml", SCENE) || write_text(f, "truth.xml", TRUTH) || write_text(f, "job.yaml", JOB) ||
-           write_targets_of_truth(f, 2, SIZE, 4096);
+    return !f || write_text(f, "scene.xml", SCENE) || write_pair(f) || write_text(f, "truth.xml", TRUTH) ||
+           write_text(f, "job.yaml", JOB) || write_targets_of_truth(f, 2, SIZE, 4096);
 }
 
 static rey_result run_fit(Fixture *f, const char *out, const char *extra, FitResult *result) {
@@ -116,6 +128,23 @@ static void test_known_g(void **state) {
     rey_fit_result_free(&result);
 }
 
+// A medium that has these coefficients itself moves along the same variables.
+static void test_pair(void **state) {
+    Fixture *f = *state;
+    FitResult result;
+    if (run_fit(f, "c", "scene=pair.xml", &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    assert_int_equal(result.rows.count, 6);
+    expect_close(&result, "fog.sigma_a", 0.1);
+    expect_close(&result, "fog.reduced_sigma_s", 0.1);
+    const FitRow *absorption = row_of(&result, "fog.sigma_a"), *own = row_of(&result, "fog.sigma_a.value.value");
+    assert_float_equal((double)absorption->truth[0], 0.1, 1e-5);
+    assert_float_equal((double)absorption->start[0], 0.45, 1e-5);
+    assert_memory_equal(absorption->found, own->found, 3 * sizeof(float));
+    rey_fit_result_free(&result);
+}
+
 static void test_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
@@ -141,6 +170,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fit_media),
         cmocka_unit_test(test_known_g),
+        cmocka_unit_test(test_pair),
         cmocka_unit_test(test_errors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -36,6 +36,12 @@ static const char *const SCENE =
     "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/><transform name=\"to_world\"><lookat origin=\"0, 0.5, 5\" "
     "target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer "
     "name=\"height\" value=\"8\"/><rfilter type=\"box\"/></film></sensor></scene>";
+// What estimates are of has a ball more, written with what scatters and what absorbs.
+static const char *const BALL =
+    "<scene version=\"3.0.0\"><medium type=\"homogeneous\" id=\"mist\"><rgb name=\"sigma_s\" value=\"2, 1, 1.5\"/><float "
+    "name=\"sigma_a\" value=\"0.6\"/></medium><shape type=\"sphere\"><point name=\"center\" value=\"0, 1.5, 0.5\"/><float "
+    "name=\"radius\" value=\"0.6\"/><bsdf type=\"null\"/><ref name=\"interior\" id=\"mist\"/></shape>"
+    "<include filename=\"scene.xml\"/></scene>";
 static const char *const TRUTH =
     "<scene version=\"3.0.0\"><default name=\"sigma_t\" value=\"0.55, 0.6, 0.75\"/><default name=\"albedo\" "
     "value=\"0.85\"/><default name=\"g\" value=\"0.5\"/><include filename=\"scene.xml\"/></scene>";
@@ -53,8 +59,10 @@ static const struct {
                 {"fog.albedo.value.value", 1.15},
                 {"fog.phase_function.g.value", 1.6},
                 {"floor.reflectance.value", 0.8},
+                {"mist.sigma_s.value", 1.2},
+                {"mist.sigma_a.value", 0.75},
                 {"air.interior_medium.sigma_t.data", 0.75}};
-enum { UNKNOWN_COUNT = COUNT_OF(UNKNOWNS), HOMOGENEOUS = 4, MOST_VALUES = 128 };
+enum { UNKNOWN_COUNT = COUNT_OF(UNKNOWNS), HOMOGENEOUS = 6, MOST_VALUES = 128 };
 
 static int set_up(void **state) {
     Fixture *f = *state = fixture_make();
@@ -68,8 +76,8 @@ static int set_up(void **state) {
         return 1;
     }
     path_of(f, "air.vol", path);
-    return rey_vol_write(f->ctx, path, &vol) || write_text(f, "scene.xml", SCENE) || write_text(f, "truth.xml", TRUTH) ||
-           write_text(f, "job.yaml", JOB) || write_targets_of_truth(f, 1, SIZE, 4096);
+    return rey_vol_write(f->ctx, path, &vol) || write_text(f, "scene.xml", SCENE) || write_text(f, "ball.xml", BALL) ||
+           write_text(f, "truth.xml", TRUTH) || write_text(f, "job.yaml", JOB) || write_targets_of_truth(f, 1, SIZE, 4096);
 }
 
 /* ---- estimates ----------------------------------------------------------------------------------------- */
@@ -101,7 +109,7 @@ static Pair pair_open(const Fixture *f, int lanes, int threads, const char *inte
     const rey_define define = {"integrator", integrator};
     def.lanes = lanes;
     def.threads = threads;
-    path_of(f, "scene.xml", path);
+    path_of(f, "ball.xml", path);
     assert_int_equal(rey_context_create(&def, &p.ctx), REY_OK);
     assert_int_equal(rey_scene_load(p.ctx, path, &define, 1, &p.recorded), REY_OK);
     assert_int_equal(rey_scene_load(p.ctx, path, &define, 1, &p.moved), REY_OK);

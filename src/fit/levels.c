@@ -31,6 +31,33 @@ rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *vi
     return REY_OK;
 }
 
+static bool is_unknown(const Fit *fit, int32_t texture) {
+    for (size_t k = 0; k < fit->unknowns.items.count; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        if (p->param >= 0 && ARRAY_AT(fit->scene->params, Param, p->param).texture == texture) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Whether a grid's sum with another one is an extinction, and that one would keep its resolution.
+static bool leaves_behind(const Fit *fit, const Unknown *p) {
+    const SceneView *view = &fit->scene->view;
+    int32_t texture = ARRAY_AT(fit->scene->params, Param, p->param).texture;
+    for (int64_t i = 0; i < view->media_count; i++) {
+        const MediumNode *medium = view->media + i;
+        for (int k = 0; k < 2 && medium->sigma_s >= 0; k++) {
+            const VolumeNode *own = view->volumes + (k ? medium->sigma_a : medium->sigma_s);
+            const VolumeNode *other = view->volumes + (k ? medium->sigma_s : medium->sigma_a);
+            if (own->texture == texture && other->kind == VOLUME_GRID && !is_unknown(fit, other->texture)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 rey_result rey_levels_check_grids(Fit *fit) {
     bool grids = false, levels = false;
     JobPlace at = {0};
@@ -41,6 +68,11 @@ rey_result rey_levels_check_grids(Fit *fit) {
     for (size_t k = 0; k < fit->unknowns.items.count && levels; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
         grids = grids || p->grid.nx;
+        if (p->grid.nx && leaves_behind(fit, p)) {
+            return rey_job_fail_at(&fit->job, at, REY_ERROR_PARAM,
+                                   "levels with a 'resolution' would leave the other one of sigma_s and sigma_a behind %s: "
+                                   "expected both among the 'parameters'", p->name);
+        }
         for (int i = -1; i < fit->job.level_count && p->grid.nx; i++) {
             int resolution = i < 0 ? 0 : fit->job.levels[i].resolution;
             int64_t count = rey_voxels_count(resolution > 0 ? rey_voxels_resized(p->grid, resolution) : p->grid);

@@ -6,12 +6,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// Of one medium, with channels of sigma_t and albedo side by side (arrays of voxels, too), and one g.
+// Of one medium, with channels of its two coefficients side by side (arrays of voxels, too), and one g. It has sigma_t and albedo,
+// or sigma_a and sigma_s themselves.
 //   variables: log sigma_a, log sigma_s', atanh g
 typedef struct Scattering {
-    const char *name;           // the medium's
-    int64_t count;              // of sigma_t and of albedo
-    int64_t sigma_t, albedo, g; // where they begin among all numbers; g < 0: it is known
+    const char *name;          // the medium's
+    int64_t count;             // of each coefficient
+    int64_t first, second, g;  // where sigma_t (or sigma_a), albedo (or sigma_s) and g begin among all numbers; g < 0: it is known
+    bool apart;                // sigma_a and sigma_s
     double known_g;
 } Scattering;
 
@@ -21,5 +23,5 @@ void rey_scattering_follow(const Scattering *s, const double *variable, float *v
 // Replaces the gradient in the values by that in the variables.
 void rey_scattering_gradient(const Scattering *s, const double *variable, double *gradient);
 
-// Absorption and reduced scattering, in the units of sigma_t.
-void rey_scattering_coefficients(double sigma_t, double albedo, double g, double *absorption, double *reduced);
+// Absorption and reduced scattering of sigma_t and albedo (apart: of sigma_a and sigma_s), in the units of sigma_t.
+void rey_scattering_coefficients(bool apart, double first, double second, double g, double *absorption, double *reduced);

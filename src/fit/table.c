@@ -39,8 +39,8 @@ static float *medium_values(rey_context *ctx, const Scattering *s, const float *
     double g = s->g < 0 ? s->known_g : (double)values[s->g];
     for (int64_t i = 0; i < s->count && out; i++) {
         double coefficients[MEDIUM_ROWS];
-        rey_scattering_coefficients((double)values[s->sigma_t + i], (double)values[s->albedo + i], g, &coefficients[ABSORPTION],
-                                    &coefficients[REDUCED]);
+        rey_scattering_coefficients(s->apart, (double)values[s->first + i], (double)values[s->second + i], g,
+                                    &coefficients[ABSORPTION], &coefficients[REDUCED]);
         out[i] = (float)coefficients[which];
     }
     return out;
@@ -202,10 +202,13 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
     for (size_t k = 0; k < fit->unknowns.media.count; k++) {
         const Scattering *s = &ARRAY_AT(fit->unknowns.media, Scattering, k);
         size_t length = strlen(s->name);
-        const float *sigma_t = values_of(truth, s->name, "sigma_t.value.value", row->count);
-        const float *albedo = values_of(truth, s->name, "albedo.value.value", row->count);
+        const float *first = values_of(truth, s->name, "sigma_t.value.value", row->count);
+        const float *second = values_of(truth, s->name, "albedo.value.value", row->count);
         const float *g = values_of(truth, s->name, "phase_function.g.value", 1);
-        if (strncmp(row->name, s->name, length) || row->name[length] != '.' || !sigma_t || !albedo) {
+        const bool apart = !first; // whatever the fitted scene has
+        first = apart ? values_of(truth, s->name, "sigma_a.value.value", row->count) : first;
+        second = apart ? values_of(truth, s->name, "sigma_s.value.value", row->count) : second;
+        if (strncmp(row->name, s->name, length) || row->name[length] != '.' || !first || !second) {
             continue;
         }
         int which = !strcmp(row->name + length + 1, medium_rows[REDUCED]);
@@ -215,8 +218,8 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
         }
         for (int64_t i = 0; i < row->count; i++) {
             double coefficients[MEDIUM_ROWS];
-            rey_scattering_coefficients((double)sigma_t[i], (double)albedo[i], g ? (double)*g : 0, &coefficients[ABSORPTION],
-                                        &coefficients[REDUCED]);
+            rey_scattering_coefficients(apart, (double)first[i], (double)second[i], g ? (double)*g : 0,
+                                        &coefficients[ABSORPTION], &coefficients[REDUCED]);
             row->truth[i] = (float)coefficients[which];
         }
         row->error = worst_error(row);
@@ -228,7 +231,7 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
 // The truth has nothing to compare a row with: so many numbers, 0 = none of this name.
 static void note_uncompared(const Fit *fit, const FitRow *row, int64_t count) {
     char words[512];
-    if (rey_param_find(fit->scene, row->name) < 0) {
+    if (rey_param_find(fit->scene, row->name) < 0 || !fit->def->note) {
         return; // exposures are no parameters of scenes
     }
     if (count) {

@@ -287,17 +287,21 @@ static rey_result match_exposures(Job *job, int index, Array *owners, Unknowns *
     return result;
 }
 
-// What a medium's parameter is to scattering.
-enum { SCATTERING_SIGMA_T, SCATTERING_ALBEDO, SCATTERING_G, SCATTERING_ROLES };
-static int scattering_role(const char *medium, const char *name) {
+// What a medium's parameter is to scattering: sigma_t or sigma_a, albedo or sigma_s, g. *apart: whether it is one of sigma_a and
+// sigma_s, which stand in two rows of the names.
+enum { SCATTERING_FIRST, SCATTERING_SECOND, SCATTERING_G, SCATTERING_ROLES };
+static int scattering_role(const char *medium, const char *name, bool *apart) {
     size_t length = strlen(medium);
     if (strncmp(name, medium, length) || name[length] != '.') {
         return -1;
     }
     static const char *const endings[][SCATTERING_ROLES] = {{"sigma_t.value.value", "albedo.value.value", "phase_function.g.value"},
-                                                            {"sigma_t.data", "albedo.data", "phase_function.g.value"}};
-    for (int i = 0; i < 2 * SCATTERING_ROLES; i++) {
+                                                            {"sigma_t.data", "albedo.data", "phase_function.g.value"},
+                                                            {"sigma_a.value.value", "sigma_s.value.value", ""},
+                                                            {"sigma_a.data", "sigma_s.data", ""}};
+    for (int i = 0; i < COUNT_OF(endings) * SCATTERING_ROLES; i++) {
         if (!strcmp(name + length + 1, endings[i / SCATTERING_ROLES][i % SCATTERING_ROLES])) {
+            *apart = *apart || i / SCATTERING_ROLES >= 2;
             return i % SCATTERING_ROLES;
         }
     }
@@ -311,7 +315,7 @@ static rey_result match_medium(Job *job, rey_scene *scene, int index, Array *own
     for (int i = 0; i < rey_param_count(scene); i++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(scene, i, &info);
-        int role = result ? -1 : scattering_role(p->name, info.name);
+        int role = result ? -1 : scattering_role(p->name, info.name, &s.apart);
         if (role == SCATTERING_G && p->known_g) {
             s.known_g = (double)rey_param_values(scene, i)[0];
         } else if (role >= 0) {
@@ -323,13 +327,13 @@ static rey_result match_medium(Job *job, rey_scene *scene, int index, Array *own
             return result;
         }
     }
-    if (offsets[SCATTERING_SIGMA_T] < 0 || counts[SCATTERING_SIGMA_T] != counts[SCATTERING_ALBEDO]) {
+    if (offsets[SCATTERING_FIRST] < 0 || counts[SCATTERING_FIRST] != counts[SCATTERING_SECOND]) {
         return fail_key(job, p, "name", p->name, "parameterisation scattering is for media, such as NAME.interior_medium, whose "
-                                        "sigma_t and albedo have as many numbers");
+                                        "sigma_t and albedo, or sigma_s and sigma_a, have as many numbers");
     }
-    s.count = counts[SCATTERING_SIGMA_T];
-    s.sigma_t = offsets[SCATTERING_SIGMA_T];
-    s.albedo = offsets[SCATTERING_ALBEDO];
+    s.count = counts[SCATTERING_FIRST];
+    s.first = offsets[SCATTERING_FIRST];
+    s.second = offsets[SCATTERING_SECOND];
     s.g = offsets[SCATTERING_G];
     Scattering *kept = rey_array_push(job->ctx, &u->media, sizeof *kept, 1);
     if (!kept) {
