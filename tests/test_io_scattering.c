@@ -2,6 +2,7 @@
 // named, that the extinction follows them, and that a saved scene shows the same picture to the bit.
 #include "io/vol.h"
 #include "render/update.h"
+#include "scene/absent.h"
 #include "folder.h"
 
 #include <setjmp.h>
@@ -191,7 +192,18 @@ static void test_parameters(void **state) {
     }
     // One place has one parameter.
     assert_int_equal(find(scene, "fog.sigma_s.to_world"), find(scene, "fog.sigma_a.to_world"));
-    assert_true(rey_param_find(scene, "fog.sigma_t.data") < 0 && rey_param_find(scene, "ink.albedo") < 0);
+    // What a medium does not have is named.
+    static const char *const absent[] = {"fog.sigma_t.data", "ink.albedo"};
+    char text[ABSENT_BYTES];
+    for (int i = 0; i < COUNT_OF(absent); i++) {
+        assert_true(rey_param_find(scene, absent[i]) < 0);
+        rey_param_absent(scene, absent[i], text);
+        assert_string_equal(text, ": this medium is written with sigma_s and sigma_a");
+    }
+    rey_scene_destroy(scene);
+    scene = must_load(*state, HOMO("<float name='sigma_t' value='1'/>"));
+    rey_param_absent(scene, "fog.sigma_s.value", text);
+    assert_string_equal(text, ": this medium is written with sigma_t and albedo");
     rey_scene_destroy(scene);
 }
 

@@ -42,6 +42,23 @@ static const char *reason(const ShapeRecord *shape, const char *leaf) {
     return strcmp(leaf, "faces") == 0 ? "which vertices a triangle joins is no number that could change a little" : NULL;
 }
 
+// Of a medium's coefficients: a medium has two of four. Null where that is not why.
+static const char *other_coefficients(const rey_scene *scene, const char *name) {
+    static const char *const words[] = {".sigma_t", ".albedo", ".sigma_s", ".sigma_a"};
+    static const char *const leaves[] = {"value", "data"};
+    for (int i = 0; i < COUNT_OF(words); i++) {
+        const char *at = strstr(name, words[i]);
+        for (int k = 0; k < COUNT_OF(leaves) && at; k++) {
+            char other[1024];
+            snprintf(other, sizeof other, "%.*s%s.%s", (int)(at - name), name, words[i < 2 ? 2 : 0], leaves[k]);
+            if (rey_param_find(scene, other) >= 0) {
+                return i < 2 ? "this medium is written with sigma_s and sigma_a" : "this medium is written with sigma_t and albedo";
+            }
+        }
+    }
+    return NULL;
+}
+
 // A parameter of an object that is named alone, null where there is none.
 static const char *first_below(const rey_scene *scene, const char *object) {
     size_t length = strlen(object);
@@ -60,7 +77,8 @@ void rey_param_absent(const rey_scene *scene, const char *name, char text[ABSENT
     const char *dot = strrchr(name, '.');
     snprintf(object, sizeof object, "%.*s", dot ? (int)(dot - name) : 0, name);
     const ShapeRecord *shape = dot ? shape_named(scene, object) : NULL;
-    const char *why = shape ? reason(shape, dot + 1) : NULL, *nearest = why ? NULL : rey_param_nearest(scene, name);
+    const char *why = shape ? reason(shape, dot + 1) : other_coefficients(scene, name);
+    const char *nearest = why ? NULL : rey_param_nearest(scene, name);
     const char *below = why || nearest ? NULL : first_below(scene, name);
     text[0] = 0;
     if (below) {
