@@ -323,9 +323,10 @@ static void path_forward(Tracer *t, int32_t *begin) {
             return;
         }
         const bool legs = scene->has_media && t->rungs; // the number of vertices counts
-        if (legs) {
+        const bool there = t->placed && bounce == t->first_bounce;
+        if (legs && !there) {
             legs_stage(t, bounce);
-        } else if (!t->placed || bounce > t->first_bounce) {
+        } else if (!there) {
             trace_stage(t, bounce);
         }
         if (scene->has_media) {

@@ -105,18 +105,10 @@ static rey_result check_meetings(rey_scene *scene, int term) {
     return result;
 }
 
-// Where surfaces move in media: curves where shading normals turn away, as collisions see them.
+// Where surfaces move in media: what is not known of what collisions see.
 static rey_result check_rides(rey_scene *scene, int term) {
     const SceneView *view = &scene->view;
     char name[OBJECT_NAME];
-    for (int64_t i = 0; i < view->shapes_count; i++) {
-        const ShapeRecord *shape = view->shapes + i;
-        bool solid = !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
-        if (solid && shape->kind == SHAPE_MESH && (shape->flags & SHAPE_HAS_NORMALS)) {
-            rey_name_shape(scene, (int32_t)i, name);
-            return refuse(scene, term, "where, in participating media, normals of vertices turn away from what sees them", name);
-        }
-    }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
         if (rey_bsdf_turns(view->bsdfs[i].kind)) {
             rey_name_bsdf(scene, (int32_t)i, name);
@@ -242,7 +234,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_TERMINATOR] = 4, [BOUNDARY_HORIZON] = 4, [BOUNDARY_MEETING] = 4,
                                                   [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
                                                   [BOUNDARY_LINES] = 1, [BOUNDARY_RIDING] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
-                                                  [BOUNDARY_CHAINED_HORIZON] = 4};
+                                                  [BOUNDARY_CHAINED_HORIZON] = 4, [BOUNDARY_RIDING_TERMINATOR] = 4,
+                                                  [BOUNDARY_RIDING_HORIZON] = 4};
     int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -279,9 +272,9 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
         result = plan->films ? REY_OK : REY_ERROR_MEMORY;
     }
     // In media only edges are known; what else there is does not depend on lights, and is refused where surfaces move.
-    bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || (rides && kind == BOUNDARY_PRIMARY);
-    bool riding = kind == BOUNDARY_RIDING;
-    int32_t edge_count = (riding ? rides : !r->scene->view.has_media || known) ? plan->job.edge_count : 0;
+    bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || !r->scene->view.has_media;
+    known |= rides && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_HORIZON);
+    int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
     }

@@ -219,6 +219,10 @@ static const Motion motions[] = {
     {"ride_glow.xml", "ball.to_world", SHIFT, {1, 0.3f, -0.4f}, 0.03, 2},
     {"ride_glow.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.05, 1},
     {"ride_glow.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 1},
+    {"ride_smooth.xml", "dome.positions", SHEAR, {0, 0, 0}, 0.02, 4},
+    {"ride_smooth.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
+    {"ride_light.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 2},
+    {"ride_lamp.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 1},
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }
@@ -414,8 +418,7 @@ static void test_modes(void **state) {
         if (!(fabs(forward - reverse) <= 2e-5 * size + least)) {
             fail_msg("%s of %s: forward %.9g, reverse %.9g", rey_term_name(term), m->param, forward, reverse);
         }
-        sizes[0] = term == REY_TERM_INTERIOR ? size : sizes[0];
-        sizes[1] = term == REY_TERM_INTERIOR ? 0 : sizes[1] + size;
+        sizes[term != REY_TERM_INTERIOR] += size;
     }
     test_named(room, m, param, tangent);
     room_close(room);

@@ -9,7 +9,8 @@
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
 // along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); the planes
 // at which maps cut light off (turning.h); lines of textures that move over their surfaces (lines.h); and edges as collisions see
-// them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains.
+// them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains, RIDING_TERMINATOR and
+// RIDING_HORIZON those that collisions see or light.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -23,6 +24,8 @@ enum {
     BOUNDARY_CHAINED_TERMINATOR,
     BOUNDARY_CHAINED_HORIZON,
     BOUNDARY_RIDING,
+    BOUNDARY_RIDING_TERMINATOR,
+    BOUNDARY_RIDING_HORIZON,
     BOUNDARY_KINDS
 };
 
@@ -52,12 +55,17 @@ typedef struct BoundaryJob {
 // looks along it; those whose segments keep their directions, as pieces of chains or because they begin one; and those of them
 // that compare what is seen on both sides of edges.
 static inline bool boundary_is_terminator(int32_t kind) {
-    return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR;
+    return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_RIDING_TERMINATOR;
 }
-static inline bool boundary_is_horizon(int32_t kind) { return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON; }
+static inline bool boundary_is_horizon(int32_t kind) {
+    return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON || kind == BOUNDARY_RIDING_HORIZON;
+}
+static inline bool boundary_is_riding(int32_t kind) {
+    return kind == BOUNDARY_RIDING || kind == BOUNDARY_RIDING_TERMINATOR || kind == BOUNDARY_RIDING_HORIZON;
+}
 static inline bool boundary_is_chained(int32_t kind) {
-    return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING || kind == BOUNDARY_CHAINED_TERMINATOR ||
-           kind == BOUNDARY_CHAINED_HORIZON;
+    return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON ||
+           boundary_is_riding(kind);
 }
 static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
 

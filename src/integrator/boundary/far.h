@@ -128,7 +128,7 @@ KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
     Mask lit = mi_eq(kind, i_set(1)), full = mi_eq(i_gather(q->full, slot), i_set(1));
     Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), far_emitted(in, slot));
     Spec all = spec_sub(far_reflected(in, slot, bounce), emitted), chain = far_chain(in, slot, bounce);
-    if (in->b->kind != BOUNDARY_CHAINED_HORIZON) { // whose samples are of one side
+    if (!boundary_is_horizon(in->b->kind)) { // whose samples are of one side
         all = spec_sub(all, far_reflected(in, other, bounce));
         chain = spec_sub(chain, far_chain(in, other, bounce));
     }

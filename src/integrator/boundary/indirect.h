@@ -229,7 +229,7 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     Segments *q = &in->q;
     // Collisions near the camera count one over the square of their distance.
     const Vec3 *focus = in->pinhole->parallel ? NULL : &in->pinhole->origin;
-    t->focus = in->b->kind == BOUNDARY_INDIRECT && t->job->rides ? NULL : focus; // near points that ride are surfaces'
+    t->focus = t->job->rides && !boundary_is_chained(in->b->kind) ? NULL : focus; // their near points are surfaces'
     if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_MEETING) {

@@ -13,6 +13,7 @@
 //   dI += integral dA_x dphi f |n_g . v| (dv / dw) F' L W                              horizon, -L from below
 // Cut: maps without a shadowing function scatter what comes from one side of the plane of the surface's own shading normal n
 // only, f with the cosine of the map's normal: as the horizon, f on either side.
+// In media, what collisions see and send keeps its direction as along chains, and what surfaces do comes through the air.
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
 #pragma once
 
@@ -106,16 +107,45 @@ static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Tu
     out->m = m & m_gt(probability, f_set(0)) & m_finite(out->weight) & m_gt(out->weight, f_set(0));
 }
 
+// In media, where the particles' flights from x have ended, and the medium of x; horizons, whose particles begin there: what is lit
+// through. Returns the lanes whose segments are this kind's: those of collisions keep their directions.
+static Mask turning_fly(Tracer *t, const Turning *s, const Ray *ray, int32_t kind, Int number, Segments *q, Hit *end) {
+    Int around = medium_around(t, ray->o, ray->d, s->m);
+    Leg leg = {.near = s->hit, .air = i_set(-1), .around = around, .weight = spec_set(f_set(1)), .m = s->m};
+    Mask m = s->m;
+    if (boundary_is_terminator(kind)) {
+        SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+        leg = leg_trace(t, *ray, ray->o, around, leg.weight, &key, m);
+        *end = leg.near;
+        m = leg.m & (mi_lt(leg.air, i_set(0)) ^ m_set(boundary_is_riding(kind)));
+    } else if (kind == BOUNDARY_HORIZON) {
+        t->job->rays += m_count(m);
+        *end = trace_solid(t->scene, ray, m);
+        m = m & (mi_lt(i_set(-1), end->shape) | m_set(t->scene->environment >= 0));
+    }
+    segment_keep_leg(around, &leg, q, m);
+    return m;
+}
+
 // Finds where the segments end and keeps those that do.
-static void turning_trace(Tracer *t, const Turning *s, bool horizon, Int number, Segments *q) {
+static void turning_trace(Tracer *t, const Turning *s, int32_t kind, Int number, Segments *q) {
+    const bool horizon = !boundary_is_terminator(kind);
     Float step = (1.0f + f_max(f_max(f_abs(s->p.x), f_abs(s->p.y)), f_abs(s->p.z))) * 9e-5f;
     // Where both normals are the same, what comes from above n is above the surface.
     Float up = v3_dot(s->ng, s->d);
     up = f_select(m_gt(f_abs(up), f_set(horizon ? 1e-4f : 0)), up, s->factor);
     Ray ray = {v3_madd(s->p, f_copysign(step, up), s->ng), s->d, f_set(INFINITY)};
-    t->job->rays += m_count(s->m);
-    Hit end = trace_closest(t->scene, &ray, s->m, false);
-    Mask met = mi_lt(i_set(-1), end.shape), m = s->m & (horizon ? met | m_set(t->scene->environment >= 0) : met);
+    Hit end = {i_set(-1), i_set(0), f_set(0), f_set(0), s->p, i_set(0)};
+    Mask m = s->m, met;
+    if (t->scene->has_media) {
+        m = turning_fly(t, s, &ray, kind, number, q, &end);
+        met = mi_lt(i_set(-1), end.shape);
+    } else {
+        t->job->rays += m_count(m);
+        end = trace_closest(t->scene, &ray, m, false);
+        met = mi_lt(i_set(-1), end.shape);
+        m = m & (horizon ? met | m_set(t->scene->environment >= 0) : met);
+    }
     if (!m_any(m)) {
         return;
     }
@@ -149,7 +179,7 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {
-            turning_trace(t, &s, !boundary_is_terminator(b->kind), i_iota() + i, q);
+            turning_trace(t, &s, b->kind, i_iota() + i, q);
         }
     }
 }
@@ -166,6 +196,9 @@ static void turning_start(Tracer *t, const Segments *q, int32_t half) {
             Ray ray = {v3_sub(hit.p, to), to, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
             hit_store(t, side * half + k, &hit);
+            if (t->scene->has_media) {
+                i_store(t->ws.paths[0].medium + (side * half + k), i_gather(q->medium, at));
+            }
         }
     }
     t->active = 2 * half;
