@@ -220,9 +220,13 @@ void cli_specs_free(Session *session, Specs *specs);
 typedef enum ImageFormat { IMAGE_EXR, IMAGE_PNG, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
 ImageFormat cli_image_format(const char *path); // "-" is EXR on standard output, /dev/null takes it too
 
-// Reads an RGB image of any format that the library knows; *rgb is freed with rey_free. Words in the context on
-// failure.
-rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb);
+// Reads an RGB image of any format that the library knows; *rgb is freed with rey_free. *file, which may be
+// null: how it holds them. Words in the context on failure.
+typedef struct ImageFile {
+    bool encoded;     // as integers in sRGB
+    bool translucent; // divided by an alpha, which is left out
+} ImageFile;
+rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb, ImageFile *file);
 // Writes height x width x 3 floats by the ending of path. signed_values: PNG becomes blue-white-red over
 // [-scale, scale], and *scale (may be null) tells the scale.
 rey_result cli_write_image(rey_context *ctx, const char *path, const float *image, int width, int height,

@@ -82,10 +82,23 @@ static void print_json(const Difference *d, int width, int height) {
     json_end(&json);
 }
 
+// A file of 8 bits ends where its encoding does, which is a difference from one of floats that no rendering makes.
+static void note_clipping(const Options *o, const float *image, int64_t count, int linear) {
+    int64_t outside = 0;
+    for (int64_t i = 0; i < count; i++) {
+        outside += image[i] < 0 || image[i] > 1;
+    }
+    if (outside > 0) {
+        cli_note("%lld of %lld numbers of %s lie outside of 0 to 1, to which %s is clipped", (long long)outside, (long long)count,
+                 o->files[linear], o->files[1 - linear]);
+    }
+}
+
 static int compare_files(const Options *o, rey_context *ctx, float *images[2]) {
     int width[2] = {0}, height[2] = {0};
+    ImageFile kinds[2] = {{0}};
     for (int i = 0; i < 2; i++) {
-        rey_result result = cli_read_image(ctx, o->files[i], &width[i], &height[i], &images[i]);
+        rey_result result = cli_read_image(ctx, o->files[i], &width[i], &height[i], &images[i], &kinds[i]);
         if (result) {
             return cli_report_failure(o, ctx, result);
         }
@@ -103,6 +116,14 @@ static int compare_files(const Options *o, rey_context *ctx, float *images[2]) {
         cli_note("%lld of %lld numbers of %s and %lld of %s are not finite: the pictures differ there",
                  (long long)d.nonfinite_a, (long long)width[0] * height[0] * 3, o->files[0], (long long)d.nonfinite_b,
                  o->files[1]);
+    }
+    for (int i = 0; i < 2; i++) {
+        if (kinds[i].translucent) {
+            cli_note("the colours of %s are divided by its alpha, which is left out", o->files[i]);
+        }
+        if (kinds[1 - i].encoded && !kinds[i].encoded) {
+            note_clipping(o, images[i], (int64_t)width[0] * height[0] * 3, i);
+        }
     }
     int status = cli_finish_output();
     return status ? status : d.nonfinite_a || d.nonfinite_b ? EXIT_FAILED : EXIT_OK;

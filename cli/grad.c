@@ -226,7 +226,7 @@ static rey_result read_adjoint(Session *s, float **adjoint) {
         return *adjoint ? REY_OK : REY_ERROR_MEMORY;
     }
     int width, height;
-    rey_result result = cli_read_image(s->ctx, text, &width, &height, adjoint);
+    rey_result result = cli_read_image(s->ctx, text, &width, &height, adjoint, NULL);
     if (!result && (width != s->width || height != s->height)) {
         return rey_fail(s->ctx, REY_ERROR_ARGUMENT, "%s: the adjoint is %d x %d pixels, the picture %d x %d", text,
                         width, height, s->width, s->height);

@@ -25,11 +25,14 @@ ImageFormat cli_image_format(const char *path) {
     return IMAGE_UNKNOWN;
 }
 
-rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb) {
+rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb, ImageFile *file) {
     rey_image image = {0};
     rey_result result = rey_image_read(ctx, path, &image);
     result = result ? result : rey_image_to_rgb(ctx, &image);
     if (!result) {
+        if (file) {
+            *file = (ImageFile){image.srgb, image.translucent};
+        }
         if (image.srgb) {
             rey_image_decode_srgb(&image);
         }

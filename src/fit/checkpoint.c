@@ -173,7 +173,8 @@ static rey_result read_header(rey_context *ctx, const char *path, const unsigned
                               CheckpointHeader *header) {
     uint64_t hash;
     if (size < sizeof *header + sizeof hash || memcmp(bytes, MAGIC, sizeof MAGIC)) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a checkpoint of this version", path);
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: no checkpoint that this version of reynolds writes; --overwrite starts anew",
+                        path);
     }
     memcpy(header, bytes, sizeof *header);
     memcpy(&hash, bytes + size - sizeof hash, sizeof hash);

@@ -85,6 +85,7 @@ typedef struct FitView {
     double mask_sum, weight;
     int full_width, full_height;
     float *full_target, *full_mask;
+    bool translucent; // the target's colours are divided by an alpha (rey_image)
     int32_t *silhouette; // of the full size (carve.h), null = none
     SensorRecord full_sensor;
 } FitView;

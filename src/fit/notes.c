@@ -4,6 +4,7 @@
 #include "render/used.h"
 #include "scene/names.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -63,9 +64,48 @@ static void note_black(const Fit *fit) {
     }
 }
 
+// Numbers of a target that no photograph has, or that alone decide the loss. Held-out views are looked at as well: the report
+// judges by them.
+static void note_target(const Fit *fit, int number) {
+    static const double most_share = 0.9; // of the sum of squares
+    const FitView *view = fit->views + number;
+    int64_t count = (int64_t)view->full_width * view->full_height * 3, negative = 0, largest = 0;
+    double squares = 0;
+    for (int64_t i = 0; i < count; i++) {
+        if (!view->full_mask || view->full_mask[i / 3] > 0) {
+            double value = (double)view->full_target[i];
+            negative += value < 0;
+            squares += value * value;
+            largest = fabs(value) > fabs((double)view->full_target[largest]) ? i : largest;
+        }
+    }
+    const char *name = fit->job.views[number].target;
+    double top = (double)view->full_target[largest];
+    char words[1024];
+    if (negative > 0) {
+        snprintf(words, sizeof words, "view %d: %lld of the %lld numbers of %.500s are negative, which no light is", number,
+                 (long long)negative, (long long)count, name);
+        fit->def->note(fit->def->user, words);
+    }
+    if (count > 3 && top * top > most_share * squares) {
+        snprintf(words, sizeof words, "view %d: %.500s is %g at pixel %d, %d, and next to nothing elsewhere: this number alone "
+                                      "decides an 'l2' loss; a mask leaves it out", number, name, top,
+                 (int)(largest / 3 % view->full_width), (int)(largest / 3 / view->full_width));
+        fit->def->note(fit->def->user, words);
+    }
+    if (view->translucent) {
+        snprintf(words, sizeof words, "view %d: the colours of %.500s are divided by its alpha, which is left out; an EXR holds "
+                                      "what a camera sees", number, name);
+        fit->def->note(fit->def->user, words);
+    }
+}
+
 rey_result rey_fit_notes(const Fit *fit) {
     if (!fit->def->note) {
         return REY_OK;
+    }
+    for (int v = 0; v < fit->job.view_count; v++) {
+        note_target(fit, v);
     }
     for (size_t k = 0; k < fit->unknowns.items.count; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);

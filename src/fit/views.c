@@ -102,6 +102,7 @@ static rey_result load_view(Fit *fit, const JobView *job_view, FitView *view) {
     }
     if (!result) {
         view->full_target = image.data; // from here on the view's
+        view->translucent = image.translucent;
         image.data = NULL;
         result = keep_full(fit, job_view, view);
         fit->largest = floats > fit->largest ? floats : fit->largest;

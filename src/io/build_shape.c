@@ -7,6 +7,7 @@
 #include "shape/shape.h"
 #include "shape/update.h"
 
+#include <math.h>
 #include <string.h>
 
 static const char *const moving_why = "moving geometry moves silhouettes, seen by the camera and by other path vertices";
@@ -196,6 +197,22 @@ static rey_result posed_fold(Builder *b, rey_xml_node *node, const PosedPlugin *
     return REY_OK;
 }
 
+// Spheres stay round, with the radius that the x axis gets.
+static rey_result note_stretched(Builder *b, rey_xml_node *node, const double m[16]) {
+    double length[3], shear = 0;
+    for (int k = 0; k < 3; k++) {
+        int j = (k + 1) % 3;
+        length[k] = sqrt(m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k]);
+        shear = fmax(shear, fabs(m[k] * m[j] + m[4 + k] * m[4 + j] + m[8 + k] * m[8 + j]));
+    }
+    double unequal = fmax(fabs(length[1] - length[0]), fabs(length[2] - length[0]));
+    if (unequal <= 1e-4 * length[0] && shear <= 1e-4 * length[0] * length[0]) {
+        return REY_OK;
+    }
+    return rey_scene_add_note(b->scene, "warning: %s:%d: to_world stretches or shears this sphere, which stays round, of radius "
+                              "%g; an <instance> of it can be stretched", node->at.file, node->at.line, length[0]);
+}
+
 static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const char *path, ShapeRecord *shape) {
     double m[16];
     const PosedPlugin *plugin = posed_plugin(node->type);
@@ -210,6 +227,9 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     TRY(build_pose(b, m, path, pose, &shape->to_world));
     if (!plugin) {
         return build_posed_mesh(b, strcmp(node->type, "cube") == 0, id, path, shape);
+    }
+    if (plugin->kind == SHAPE_SPHERE) {
+        TRY(note_stretched(b, node, m));
     }
     shape->kind = plugin->kind;
     if (plugin->kind == SHAPE_SPHERE && rey_matrix_determinant(m) < 0) {

@@ -9,6 +9,7 @@ typedef struct rey_image {
     int width, height, channels; // channels: 1 or 3 (alpha is dropped); EXR files without colours: as many as they have
     float *data;                 // width x height x channels
     bool srgb;                   // integers of an sRGB-encoded file, scaled to [0, 1] and not decoded yet
+    bool translucent;            // of a PNG with an alpha below 1 somewhere, by which its colours are divided
 } rey_image;
 
 // Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, BMP (uncompressed), Radiance

@@ -1,5 +1,6 @@
 // mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
 #include "bsdf/table.h"
+#include "emitter/table.h"
 #include "io/build.h"
 #include "io/lenient.h"
 #include "io/load.h"
@@ -263,6 +264,19 @@ static rey_result name_aliases(Builder *b) {
     return REY_OK;
 }
 
+// An area light among the scene's own objects is there for shapes to refer to.
+static rey_result note_loose_light(Builder *b, const rey_xml_node *node) {
+    int kind = node->tag == REY_XML_EMITTER ? rey_emitter_kind_find(node->type) : -1;
+    bool loose = kind >= 0 && rey_emitter_kinds[kind].form == EMITTER_IS_SURFACE;
+    for (size_t i = 0; i < b->scene->build.emitters.count && loose; i++) {
+        const EmitterRecord *e = &ARRAY_AT(b->scene->build.emitters, EmitterRecord, i);
+        loose = e->kind != kind || e->slot[0] != node->built;
+    }
+    return loose ? rey_scene_add_note(b->scene, "warning: %s:%d: this '%s' light belongs to no shape and lights nothing: expected "
+                                      "within a <shape>, or a <ref> to it there", node->at.file, node->at.line, node->type)
+                 : REY_OK;
+}
+
 static rey_result build_scene(Builder *b) {
     rey_xml_node *root = rey_xml_root(b->source->document);
     int counts[REY_XML_TAG_COUNT] = {0};
@@ -274,6 +288,9 @@ static rey_result build_scene(Builder *b) {
         Snapshot s = build_snapshot(b);
         rey_xml_child *child = &root->children[i];
         TRY(build_forgive(b, &s, child, "", build_child(b, child, counts), NULL));
+    }
+    for (int i = 0; i < root->child_count; i++) {
+        TRY(note_loose_light(b, root->children[i].node));
     }
     TRY(replace_integrator(b, root));
     const char *note;

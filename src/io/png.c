@@ -39,6 +39,20 @@ static void on_read(png_structp png, png_bytep out, size_t count) {
     r->at += count;
 }
 
+// channels: of a pixel in the file, one more than in the picture where there is alpha, which is looked at and dropped.
+static void take_samples(const unsigned char *pixels, bool wide, int channels, rey_image *out) {
+    int64_t count = (int64_t)out->width * out->height * channels;
+    float *to = out->data;
+    for (int64_t i = 0; i < count; i++) {
+        float sample = wide ? (float)(pixels[2 * i] << 8 | pixels[2 * i + 1]) / 65535.0f : (float)pixels[i] / 255.0f;
+        if (i % channels < out->channels) {
+            *to++ = sample;
+        } else {
+            out->translucent |= sample < 1;
+        }
+    }
+}
+
 // Everything between the signature and the samples, 8 or 16 bits of each, most significant byte first.
 static rey_result read_samples(Reader *r, png_structp png, png_infop info, rey_image *out) {
     double gamma;
@@ -54,7 +68,6 @@ static rey_result read_samples(Reader *r, png_structp png, png_infop info, rey_i
     }
     out->srgb = !(png_get_gAMA(png, info, &gamma) && gamma == 1);
     png_set_expand(png);
-    png_set_strip_alpha(png);
     int passes = png_set_interlace_handling(png);
     png_read_update_info(png, info);
     size_t row = png_get_rowbytes(png, info);
@@ -69,12 +82,7 @@ static rey_result read_samples(Reader *r, png_structp png, png_infop info, rey_i
         }
     }
     png_read_end(png, NULL);
-    int64_t count = width * height * out->channels;
-    bool wide = png_get_bit_depth(png, info) == 16;
-    for (int64_t i = 0; i < count; i++) {
-        out->data[i] = wide ? (float)(r->pixels[2 * i] << 8 | r->pixels[2 * i + 1]) / 65535.0f
-                            : (float)r->pixels[i] / 255.0f;
-    }
+    take_samples(r->pixels, png_get_bit_depth(png, info) == 16, png_get_channels(png, info), out);
     return REY_OK;
 }
 

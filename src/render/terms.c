@@ -241,6 +241,22 @@ static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int c
     return wrong ? rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the term '%s' does not exist yet", rey_term_name(bit)) : REY_OK;
 }
 
+// Where two indices of refraction agree there is no interface, and on either side of that a reflection begins at grazing angles.
+static const char *gap_of_index(const SceneView *view, const Param *p) {
+    for (int64_t i = 0; i < view->bsdfs_count && p->texture >= 0; i++) {
+        const BsdfNode *bsdf = view->bsdfs + i;
+        const BsdfKind *kind = rey_bsdf_kinds + bsdf->kind;
+        for (int k = 0; k < kind->param_count; k++) {
+            bool index = kind->params[k].type == PARAM_IOR || kind->params[k].type == PARAM_SMOOTH_IOR;
+            if (index && bsdf->slot[k] == p->texture && view->theta[view->textures[p->texture].theta] == 1) {
+                return "int_ior and ext_ior agree, so that there is no interface, on either side of that a reflection begins at "
+                       "grazing angles, and the slopes differ. Where the two differ by a thousandth, it exists";
+            }
+        }
+    }
+    return NULL;
+}
+
 // What is not known of a parameter's derivative whatever terms are asked for, null where there is no such thing.
 static const char *find_gap(const SceneView *view, const rey_render_def *def, const Param *p, int terms, bool volumes) {
     const char *gap = rey_dropped_gap(view, p, terms);
@@ -248,6 +264,7 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
         return gap;
     }
     gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
+    gap = gap ? gap : gap_of_index(view, p);
     gap = gap ? gap : gap_in_media(view, p);
     bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                   (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));

@@ -214,6 +214,75 @@ static void attributes_are_looked_for(void **state) {
     expect_note(f, "render s.xml --spp 1 --json", "warning: s.xml:5: the texture of this bumpmap is constant and has no slope");
 }
 
+// An 8 x 8 picture of 0.25 with one number that is another one.
+static void write_picture(float odd) {
+    float numbers[8 * 8 * 3];
+    FILE *file = fopen("odd.pfm", "wb");
+    assert_non_null(file);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        numbers[i] = i == 3 * (8 * 2 + 5) ? odd : 0.25f; // in the third row from below
+    }
+    assert_true(fprintf(file, "PF\n8 8\n-1.0\n") > 0 && fwrite(numbers, sizeof numbers, 1, file) == 1);
+    assert_int_equal(fclose(file), 0);
+}
+
+// Pictures of which numbers are lost, or are no picture's.
+static void odd_pictures_are_told(void **state) {
+    Fixture *f = *state;
+    write_scene();
+    write_words("job.yaml", "scene: two.xml\nviews: [{target: odd.pfm}]\niterations: 1\nspp: 2\nreport_spp: 0\n"
+                            "parameters: [grey.reflectance.value]\n");
+    write_picture(0.5f);
+    expect_note(f, "fit job.yaml --overwrite --json", NULL);
+    write_picture(-1);
+    expect_note(f, "fit job.yaml --overwrite --json", "view 0: 1 of the 192 numbers of odd.pfm are negative");
+    write_picture(1e9f);
+    expect_note(f, "fit job.yaml --overwrite --json", "view 0: odd.pfm is 1e+09 at pixel 5, 5, and next to nothing elsewhere");
+    write_words("clear.xml",
+                "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
+                "<integer name='width' value='8'/><integer name='height' value='8'/><string name='pixel_format' value='rgba'/>\n"
+                "</film><transform name='to_world'><lookat origin='0,0,9' target='0,0,0' up='0,1,0'/></transform></sensor>\n"
+                "<emitter type='point'><point name='position' x='1' y='2' z='5'/></emitter><shape type='sphere'/></scene>\n");
+    expect(f, 0, "render clear.xml -o clear.png --spp 4");
+    expect_note(f, "fit job.yaml --overwrite --json --set views.0.target=clear.png",
+                "view 0: the colours of clear.png are divided by its alpha");
+    expect(f, 0, "render two.xml -o plain.png --spp 4");
+    expect_words(f, 0, "compare plain.png clear.png", "the colours of clear.png are divided by its alpha, which is left out");
+    expect_words(f, 0, "compare plain.png odd.pfm",
+                 "1 of 192 numbers of odd.pfm lie outside of 0 to 1, to which plain.png is clipped");
+    write_picture(0.5f);
+    expect(f, 0, "compare plain.png odd.pfm");
+    assert_null(strstr(f->words, "clipped"));
+}
+
+// What a scene says and does not mean.
+static void odd_scenes_are_told(void **state) {
+    Fixture *f = *state;
+    static const char head[] = "<scene version='3.0.0'><integrator type='path'/><emitter type='%s'/><sensor type='perspective'>\n"
+                               "<film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/></film>"
+                               "</sensor>\n<emitter type='area' id='lamp'/>\n<shape type='sphere'><transform name='to_world'>"
+                               "<scale value='%s'/></transform>%s</shape></scene>\n";
+    static const char *const cases[][4] = {
+        {"constant", "2", "<ref id='lamp'/>", NULL},
+        {"constant", "2", "", "warning: odd.xml:3: this 'area' light belongs to no shape and lights nothing"},
+        {"area", "2", "<ref id='lamp'/>", "warning: odd.xml:1: this 'area' light belongs to no shape and lights nothing"},
+        {"constant", "2 3 2", "<ref id='lamp'/>", "warning: odd.xml:4: to_world stretches or shears this sphere, which stays"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[2048];
+        snprintf(text, sizeof text, head, cases[i][0], cases[i][1], cases[i][2]);
+        write_words("odd.xml", text);
+        expect_note(f, "render odd.xml --spp 1 --json", cases[i][3]);
+    }
+    // Glass in what is as dense.
+    write_words("odd.xml", "<scene version='3.0.0'><integrator type='path'/><emitter type='constant'/>\n"
+                           "<sensor type='perspective'/><shape type='sphere' id='ball'>\n"
+                           "<bsdf type='roughplastic'><string name='int_ior' value='water'/>\n"
+                           "<string name='ext_ior' value='water'/></bsdf></shape></scene>\n");
+    expect_words(f, 1, "grad odd.xml --param ball.bsdf.eta.value --spp 1",
+                 "int_ior and ext_ior agree, so that there is no interface");
+}
+
 // What stands at the wrong place of the command line is told with the right one.
 static void misplaced_words_are_told(void **state) {
     Fixture *f = *state;
@@ -247,6 +316,8 @@ int main(void) {
         cmocka_unit_test(names_are_told),
         cmocka_unit_test(loads_are_told),
         cmocka_unit_test(attributes_are_looked_for),
+        cmocka_unit_test(odd_pictures_are_told),
+        cmocka_unit_test(odd_scenes_are_told),
         cmocka_unit_test(misplaced_words_are_told),
     };
     return cmocka_run_group_tests_name("cli_notes", tests, make_folder, remove_folder);

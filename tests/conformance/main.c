@@ -47,7 +47,7 @@ rey_result suite_load(Suite *suite, const char *path, const char *integrator, in
 
 rey_result suite_read_image(Suite *suite, const char *path, int width, int height, float **rgb) {
     int w, h;
-    rey_result result = cli_read_image(suite->ctx, path, &w, &h, rgb);
+    rey_result result = cli_read_image(suite->ctx, path, &w, &h, rgb, NULL);
     if (!result && (w != width || h != height)) {
         rey_free(suite->ctx, *rgb);
         *rgb = NULL;
