@@ -4,7 +4,7 @@ PREFIX ?= /usr/local
 CONFORMANCE ?=
 JOBS ?= $(shell nproc)
 PACKAGES = gcc g++ make cmake pkg-config libembree-dev libexpat1-dev libopenexr-dev libpng-dev libjpeg62-turbo-dev \
-           zlib1g-dev libyaml-dev libsuitesparse-dev libblosc-dev libcmocka-dev python3
+           zlib1g-dev libyaml-dev libsuitesparse-dev libblosc-dev libnanovdb-dev libcmocka-dev python3
 
 .PHONY: all setup demo test test-slow conformance bench bench-large bench-peer check fuzz sanitize tsan install clean
 

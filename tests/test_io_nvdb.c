@@ -87,7 +87,7 @@ static unsigned char *make_plain(rey_context *ctx, size_t *size) {
     sample_path("float", path);
     assert_int_equal(rey_file_read(ctx, path, &packed, &packed_size), REY_OK);
     assert_int_equal(rey_nvdb_open(ctx, "packed", packed, packed_size, &nvdb), REY_OK);
-    size_t grid = nvdb.size + (size_t)(nvdb.tree - nvdb.own), head = RECORDS + 8; // "density" and its end
+    size_t grid = nvdb.size, head = RECORDS + 8; // "density" and its end
     unsigned char *plain = malloc(head + grid);
     assert_non_null(plain);
     memcpy(plain, packed, head);
@@ -231,7 +231,6 @@ static void test_refused(void **state) {
                  {ROOT + 20, 1048577, "v: 283115250 voxels in a grid of"},
                  {ROOT + 12, 0x7fffffff, "v: the box of the grid has"},
                  {ROOT + 24, UINT32_MAX, "v: a node of the grid lies outside"},
-                 {ROOT + 28, 0x7fc00000, "v: a voxel is not finite"},
                  {ROOT + 64 + 8, 0x70000000, "v: a node of the grid lies outside"}};
     float values[NX * NY * NZ];
     size_t size;
@@ -249,6 +248,15 @@ static void test_refused(void **state) {
         memcpy(plain + cases[i].at, before, 4);
     }
     assert_int_equal(read_bytes(*state, plain, size, values), REY_OK);
+    // Without the root's tiles there is the background alone.
+    const float background = 2, strange = NAN;
+    memset(plain + ROOT + 24, 0, 4);
+    memcpy(plain + ROOT + 28, &background, 4);
+    assert_int_equal(read_bytes(*state, plain, size, values), REY_OK);
+    assert_true(values[0] == 2 && values[NX * NY * NZ - 1] == 2);
+    memcpy(plain + ROOT + 28, &strange, 4);
+    assert_int_equal(read_bytes(*state, plain, size, values), REY_ERROR_FORMAT);
+    assert_string_equal(rey_error(*state), "v: a voxel is not finite");
     free(plain);
 }
 

@@ -1,4 +1,5 @@
-// nvdb.c: NanoVDB files. Offsets are those of the format's version 32; each is checked against the size before it is read.
+// nvdb.c: NanoVDB files. Records and compression are read here, trees by PNanoVDB.h, the format's own header in plain C, through
+// a buffer that checks every read against the size.
 #include "io/nvdb.h"
 
 #include <blosc.h>
@@ -7,48 +8,50 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { FILE_HEADER = 16, GRID_RECORD = 176, CODEC_NONE = 0, CODEC_ZIP = 1, CODEC_BLOSC = 2 };
-enum { GRID_SIZE = 672, GRID_MATRIX = 296 + 88, GRID_OFFSET = 296 + 232, GRID_TYPE = 636 };
-enum { TYPE_FLOAT = 1, TYPE_DOUBLE, TYPE_VEC3F = 6, TYPE_FP4 = 13, TYPE_FP8, TYPE_FP16, TYPE_FPN };
-enum { ROOT_TILES = 24, TILE_SIZE = 32, TILE_CHILD = 8, LEAF_MINIMUM = 80, LEAF_QUANTUM = 84 };
-enum { MOST_RATIO = 1032, MOST_VOXELS_PER_BYTE = 256 }; // of zlib, more than of LZ4; of trees whose large nodes are constant
+// What the header reads from: an offset counts from the beginning of the grid. It writes nothing here, though later versions of it
+// have functions that would.
+typedef struct pnanovdb_buf_t {
+    const unsigned char *bytes;
+    uint64_t size;
+    bool *outside; // set where something is read that the grid does not have, which is 0 then
+} pnanovdb_buf_t;
+typedef uint32_t pnanovdb_grid_type_t;
 
-// What depends on the size of a value: the root's own size and where its background begins, a tile's value, what an inner
-// node holds for one child, and where a leaf's voxels begin.
-typedef struct Layout {
-    uint32_t root, background, tile_value, entry, leaf_table;
-} Layout;
-
-static Layout layout_of(uint32_t type) {
-    return type == TYPE_VEC3F    ? (Layout){96, 28, 20, 16, 128}
-           : type == TYPE_DOUBLE ? (Layout){96, 32, 24, 8, 128}
-                                 : (Layout){64, 28, 20, 8, 96};
+static inline void read_bytes(pnanovdb_buf_t buf, uint64_t at, void *to, size_t count) {
+    if (at <= buf.size && buf.size - at >= count) {
+        memcpy(to, buf.bytes + at, count);
+    } else {
+        *buf.outside = true;
+    }
 }
 
-// Inner nodes, from below.
-static const struct {
-    int bits, side;             // nodes along an axis, as a power of two; voxels along the side of one
-    uint32_t child_mask, table; // offsets
-} levels[] = {{4, 8, 544, 1088}, {5, 128, 4128, 8256}};
+static inline uint32_t pnanovdb_buf_read_uint32(pnanovdb_buf_t buf, uint64_t at) {
+    uint32_t value = 0;
+    read_bytes(buf, at, &value, sizeof value);
+    return value;
+}
+
+static inline uint64_t pnanovdb_buf_read_uint64(pnanovdb_buf_t buf, uint64_t at) {
+    uint64_t value = 0;
+    read_bytes(buf, at, &value, sizeof value);
+    return value;
+}
+
+#define pnanovdb_buf_write_uint32(buf, at, value) ((void)0)
+#define pnanovdb_buf_write_uint64(buf, at, value) ((void)0)
+#define PNANOVDB_C
+#define PNANOVDB_BUF_CUSTOM
+#define PNANOVDB_GRID_TYPE_GET(type, name) pnanovdb_grid_type_constants[type].name
+#include <nanovdb/PNanoVDB.h>
+
+enum { FILE_HEADER = 16, GRID_RECORD = 176, NAME_SIZE = 136, CODEC_NONE = 0, CODEC_ZIP = 1, CODEC_BLOSC = 2, MAJOR = 32 };
+enum { MOST_RATIO = 1032, MOST_VOXELS_PER_BYTE = 256 }; // of zlib, more than of LZ4; of trees whose large nodes are constant
 
 static uint64_t load(const unsigned char *at, int bytes) {
     uint64_t value = 0;
     for (int i = 0; i < bytes; i++) {
         value |= (uint64_t)at[i] << (8 * i);
     }
-    return value;
-}
-
-static float as_float(uint32_t bits) {
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-static double load_double(const unsigned char *at) {
-    uint64_t bits = load(at, 8);
-    double value;
-    memcpy(&value, &bits, sizeof value);
     return value;
 }
 
@@ -99,15 +102,15 @@ static rey_result uncompress_grid(rey_context *ctx, const char *name, int codec,
 }
 
 // The first grid's bytes.
-static rey_result find_grid(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_nvdb *out,
-                            const unsigned char **grid, size_t *grid_size) {
+static rey_result find_grid(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_nvdb *out) {
     if (size < FILE_HEADER + GRID_RECORD || !rey_nvdb_known(bytes, size)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a NanoVDB file of at least %d bytes", name, FILE_HEADER + GRID_RECORD);
     }
-    uint64_t major = load(bytes + 8, 4) >> 21, grids = load(bytes + 12, 2), codec = load(bytes + 14, 2), at = FILE_HEADER;
-    if (major != 32 || grids < 1) {
-        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: version %d with %d grids, expected version 32 with at least one", name,
-                        (int)major, (int)grids);
+    uint64_t grids = load(bytes + 12, 2), codec = load(bytes + 14, 2), at = FILE_HEADER;
+    uint32_t major = pnanovdb_version_get_major((uint32_t)load(bytes + 8, 4));
+    if (major != MAJOR || grids < 1) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: version %d with %d grids, expected version %d with at least one", name,
+                        (int)major, (int)grids, MAJOR);
     }
     if (codec > CODEC_BLOSC) {
         return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the grid is compressed in way %d, expected none (0), zip (1) or "
@@ -115,29 +118,41 @@ static rey_result find_grid(rey_context *ctx, const char *name, const unsigned c
     }
     uint64_t whole = load(bytes + FILE_HEADER, 8);
     for (uint64_t i = 0; i < grids && at <= size; i++) { // records and names
-        at = at + GRID_RECORD <= size ? at + GRID_RECORD + load(bytes + at + 136, 4) : size + 1;
+        at = at + GRID_RECORD <= size ? at + GRID_RECORD + load(bytes + at + NAME_SIZE, 4) : size + 1;
     }
     if (at > size) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside the records of its grids", name);
     }
-    *grid = bytes + at;
-    *grid_size = size - (size_t)at;
+    out->grid = bytes + at;
+    out->size = size - (size_t)at;
     if (codec != CODEC_NONE) {
-        rey_result result = uncompress_grid(ctx, name, (int)codec, bytes + at, size - (size_t)at, whole, out);
-        *grid = out->own;
-        *grid_size = (size_t)whole;
+        rey_result result = uncompress_grid(ctx, name, (int)codec, out->grid, out->size, whole, out);
+        out->grid = out->own;
+        out->size = (size_t)whole;
         return result;
     }
     return REY_OK;
 }
 
+static pnanovdb_buf_t buffer_of(const rey_nvdb *nvdb, bool *outside) {
+    *outside = false;
+    return (pnanovdb_buf_t){nvdb->grid, nvdb->size, outside};
+}
+
+static pnanovdb_root_handle_t root_of(pnanovdb_buf_t buf) {
+    const pnanovdb_grid_handle_t grid = {{0}};
+    return pnanovdb_tree_get_root(buf, pnanovdb_grid_get_tree(buf, grid));
+}
+
 // Where the box of voxels lies; voxel (i, j, k) is the cube around that point.
-static void place(const unsigned char *grid, rey_nvdb *out) {
+static void place(pnanovdb_buf_t buf, rey_nvdb *out) {
+    const pnanovdb_grid_handle_t grid = {{0}};
+    const pnanovdb_map_handle_t map = pnanovdb_grid_get_map(buf, grid);
     const int32_t n[3] = {out->nx, out->ny, out->nz};
     out->placed = true;
-    for (int row = 0; row < 3; row++) {
-        for (int k = 0; k < 3; k++) {
-            double m = load_double(grid + GRID_MATRIX + 8 * (3 * row + k)), t = load_double(grid + GRID_OFFSET + 8 * row);
+    for (uint32_t row = 0; row < 3; row++) {
+        for (uint32_t k = 0; k < 3; k++) {
+            double m = pnanovdb_map_get_matd(buf, map, 3 * row + k), t = pnanovdb_map_get_vecd(buf, map, row);
             if (row == k) {
                 out->box[row] = (float)(m * ((double)out->low[row] - 0.5) + t);
                 out->box[3 + row] = (float)(m * ((double)out->low[row] + n[row] - 0.5) + t);
@@ -147,48 +162,51 @@ static void place(const unsigned char *grid, rey_nvdb *out) {
     }
 }
 
-static rey_result read_tree(rey_context *ctx, const char *name, const unsigned char *grid, size_t size, rey_nvdb *out) {
-    uint64_t type = size >= GRID_SIZE + 64 ? load(grid + GRID_TYPE, 4) : 0,
-             root = size >= GRID_SIZE + 64 ? load(grid + GRID_SIZE + 24, 8) : 0;
-    if (size < GRID_SIZE + 64 || memcmp(grid, "NanoVDB", 7) != 0 || root > size - GRID_SIZE || size - GRID_SIZE - root < 96) {
+static bool is_packed(uint32_t type) { return type >= PNANOVDB_GRID_TYPE_FP4 && type <= PNANOVDB_GRID_TYPE_FPN; }
+
+static rey_result read_grid(rey_context *ctx, const char *name, rey_nvdb *out) {
+    bool outside;
+    const pnanovdb_buf_t buf = buffer_of(out, &outside);
+    const pnanovdb_grid_handle_t grid = {{0}};
+    const pnanovdb_root_handle_t root = root_of(buf);
+    const pnanovdb_coord_t first = pnanovdb_root_get_bbox_min(buf, root), last = pnanovdb_root_get_bbox_max(buf, root);
+    out->type = pnanovdb_grid_get_grid_type(buf, grid);
+    if (outside || !rey_nvdb_known(out->grid, out->size)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends inside its grid", name);
     }
-    if (type != TYPE_FLOAT && type != TYPE_DOUBLE && type != TYPE_VEC3F && !(type >= TYPE_FP4 && type <= TYPE_FPN)) {
+    bool vectors = out->type == PNANOVDB_GRID_TYPE_VEC3F;
+    if (out->type != PNANOVDB_GRID_TYPE_FLOAT && out->type != PNANOVDB_GRID_TYPE_DOUBLE && !vectors && !is_packed(out->type)) {
         return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: the voxels are of type %d, expected float (1), double (2), three "
-                                                    "floats (6) or packed floats (13 to 16)", name, (int)type);
+                                                    "floats (6) or packed floats (13 to 16)", name, (int)out->type);
     }
-    out->tree = grid + GRID_SIZE + root; // the root; nodes are found from there
-    out->size = size - GRID_SIZE - (size_t)root;
-    out->type = (uint32_t)type;
-    out->channels = type == TYPE_VEC3F ? 3 : 1;
+    out->channels = vectors ? 3 : 1;
+    const int32_t low[3] = {first.x, first.y, first.z}, high[3] = {last.x, last.y, last.z};
     int64_t n[3], count = out->channels;
     for (int k = 0; k < 3; k++) {
-        out->low[k] = (int32_t)load(out->tree + 4 * k, 4);
-        n[k] = (int32_t)load(out->tree + 12 + 4 * k, 4) - out->low[k] + 1;
+        out->low[k] = low[k];
+        n[k] = (int64_t)high[k] - low[k] + 1;
         if (n[k] < 1 || n[k] > 1 << 20 || count > INT32_MAX / n[k]) {
             return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the box of the grid has %lld voxels along axis %d, expected 1 or more "
                                                    "and at most %d in all", name, (long long)n[k], k, INT32_MAX);
         }
         count *= n[k];
     }
-    if ((uint64_t)count / MOST_VOXELS_PER_BYTE > size) {
+    if ((uint64_t)count / MOST_VOXELS_PER_BYTE > out->size) {
         return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: %lld voxels in a grid of %zu bytes, expected at most %d for each byte",
-                        name, (long long)count, size, MOST_VOXELS_PER_BYTE);
+                        name, (long long)count, out->size, MOST_VOXELS_PER_BYTE);
     }
     out->nx = (int32_t)n[0];
     out->ny = (int32_t)n[1];
     out->nz = (int32_t)n[2];
-    place(grid, out);
+    place(buf, out);
     return REY_OK;
 }
 
 rey_result rey_nvdb_open(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_nvdb *out) {
-    const unsigned char *grid = NULL;
-    size_t grid_size = 0;
     *out = (rey_nvdb){0};
-    rey_result result = find_grid(ctx, name, bytes, size, out, &grid, &grid_size);
+    rey_result result = find_grid(ctx, name, bytes, size, out);
     if (result == REY_OK) {
-        result = read_tree(ctx, name, grid, grid_size, out);
+        result = read_grid(ctx, name, out);
     }
     if (result != REY_OK) {
         rey_nvdb_free(ctx, out);
@@ -198,167 +216,150 @@ rey_result rey_nvdb_open(rey_context *ctx, const char *name, const unsigned char
 
 // ---- voxels ------------------------------------------------------------------------------------------------------
 
+enum { LEAF, LOWER, UPPER, ROOT }; // levels of nodes
+static const int sides[] = {8, 128, 4096}; // of the cube of voxels that a node below the root stands for
+
+typedef struct Box {
+    int64_t low[3], high[3]; // voxels, without those at `high`
+} Box;
+
 typedef struct Walk {
     const rey_nvdb *nvdb;
-    Layout layout;
+    pnanovdb_buf_t buf;
     float *values;
-    uint64_t filled;      // voxels that have a value; nodes that overlap are an error
-    bool outside, strange; // an offset leads out of the grid, or there and back again; a value is not finite
+    bool strange; // a value is not finite
 } Walk;
 
-// The bytes at an offset from the root; zeros where there are none.
-static const unsigned char *bytes_at(Walk *w, uint64_t at, size_t count) {
-    static const unsigned char zeros[16] = {0};
-    if (at > w->nvdb->size || w->nvdb->size - (size_t)at < count) {
-        w->outside = true;
-        return zeros;
-    }
-    return w->nvdb->tree + at;
-}
-
-static uint32_t word_at(Walk *w, uint64_t at) { return (uint32_t)load(bytes_at(w, at, 4), 4); }
-
-// Number n of those that begin at an offset.
-static float number_at(Walk *w, uint64_t at, uint64_t n) {
-    return w->nvdb->type == TYPE_DOUBLE ? (float)load_double(bytes_at(w, at + 8 * n, 8)) : as_float(word_at(w, at + 4 * n));
-}
-
-static void put(Walk *w, int64_t voxel, int channel, float value) {
-    w->strange = w->strange || !isfinite(value);
-    w->values[voxel * w->nvdb->channels + channel] = value;
-}
-
-// The part of a cube of voxels that lies in the box; false where there is none.
-static bool clip(const rey_nvdb *v, const int64_t origin[3], int64_t side, int64_t low[3], int64_t high[3]) {
-    const int64_t n[3] = {v->nx, v->ny, v->nz};
-    for (int k = 0; k < 3; k++) {
-        low[k] = origin[k] > v->low[k] ? origin[k] - v->low[k] : 0;
-        high[k] = origin[k] + side - v->low[k] < n[k] ? origin[k] + side - v->low[k] : n[k];
-        if (low[k] >= high[k]) {
-            return false;
-        }
-    }
-    return true;
-}
-
-// Counts the voxels of a part that gets its values now.
-static bool claim(Walk *w, const int64_t low[3], const int64_t high[3]) {
-    uint64_t all = (uint64_t)w->nvdb->nx * (uint64_t)w->nvdb->ny * (uint64_t)w->nvdb->nz;
-    w->filled += (uint64_t)(high[0] - low[0]) * (uint64_t)(high[1] - low[1]) * (uint64_t)(high[2] - low[2]);
-    w->outside = w->outside || w->filled > all;
-    return !w->outside;
-}
-
-// One value from low to high.
-static void fill_box(Walk *w, const int64_t low[3], const int64_t high[3], uint64_t value_at) {
+static void put(Walk *w, int64_t x, int64_t y, int64_t z, int channel, float value) {
     const rey_nvdb *v = w->nvdb;
+    int64_t voxel = ((z - v->low[2]) * v->ny + y - v->low[1]) * v->nx + x - v->low[0];
+    w->strange = w->strange || !isfinite(value);
+    w->values[voxel * v->channels + channel] = value;
+}
+
+// Number n of those that begin at an address.
+static float number_at(const Walk *w, pnanovdb_address_t at, uint32_t n) {
+    return w->nvdb->type == PNANOVDB_GRID_TYPE_DOUBLE ? (float)pnanovdb_read_double(w->buf, at)
+                                                      : pnanovdb_read_float(w->buf, pnanovdb_address_offset(at, 4 * n));
+}
+
+// One value in all of a box.
+static void fill(Walk *w, const Box *box, pnanovdb_address_t at) {
     float value[3];
-    for (int c = 0; c < v->channels; c++) {
-        value[c] = number_at(w, value_at, (uint64_t)c);
+    for (int c = 0; c < w->nvdb->channels; c++) {
+        value[c] = number_at(w, at, (uint32_t)c);
     }
-    for (int64_t z = low[2]; z < high[2]; z++) {
-        for (int64_t y = low[1]; y < high[1]; y++) {
-            for (int64_t x = low[0]; x < high[0]; x++) {
-                for (int c = 0; c < v->channels; c++) {
-                    put(w, (z * v->ny + y) * v->nx + x, c, value[c]);
+    for (int64_t z = box->low[2]; z < box->high[2]; z++) {
+        for (int64_t y = box->low[1]; y < box->high[1]; y++) {
+            for (int64_t x = box->low[0]; x < box->high[0]; x++) {
+                for (int c = 0; c < w->nvdb->channels; c++) {
+                    put(w, x, y, z, c, value[c]);
                 }
             }
         }
     }
 }
 
-static void fill(Walk *w, const int64_t origin[3], int64_t side, uint64_t value_at) {
-    int64_t low[3], high[3];
-    if (clip(w->nvdb, origin, side, low, high) && claim(w, low, high)) {
-        fill_box(w, low, high, value_at);
+static float packed_value(const Walk *w, pnanovdb_leaf_handle_t leaf, const pnanovdb_coord_t *ijk) {
+    pnanovdb_address_t table = pnanovdb_leaf_get_table_address(w->nvdb->type, w->buf, leaf, 0);
+    switch (w->nvdb->type) {
+    case PNANOVDB_GRID_TYPE_FP4:
+        return pnanovdb_leaf_fp4_read_float(w->buf, table, ijk);
+    case PNANOVDB_GRID_TYPE_FP8:
+        return pnanovdb_leaf_fp8_read_float(w->buf, table, ijk);
+    case PNANOVDB_GRID_TYPE_FP16:
+        return pnanovdb_leaf_fp16_read_float(w->buf, table, ijk);
+    default:
+        return pnanovdb_leaf_fpn_read_float(w->buf, table, ijk);
     }
 }
 
-// Bits of a packed voxel, 0 where voxels are floats.
-static uint32_t leaf_bits(Walk *w, uint64_t at) {
-    uint32_t type = w->nvdb->type;
-    uint32_t power = type == TYPE_FPN ? word_at(w, at + 12) >> 29 : type - TYPE_FP4 + 2;
-    w->outside = w->outside || (type >= TYPE_FP4 && power > 4);
-    return type < TYPE_FP4 || w->outside ? 0 : 1u << power;
-}
-
-static float leaf_value(Walk *w, uint64_t at, uint32_t bits, uint32_t n, int channel) {
-    uint32_t channels = (uint32_t)w->nvdb->channels;
-    if (bits == 0) {
-        return number_at(w, at + w->layout.leaf_table, n * channels + (uint32_t)channel);
-    }
-    float minimum = as_float(word_at(w, at + LEAF_MINIMUM)), quantum = as_float(word_at(w, at + LEAF_QUANTUM));
-    uint32_t word = word_at(w, at + w->layout.leaf_table + 4 * (uint64_t)(n * bits / 32));
-    uint32_t code = word >> (n * bits % 32) & ((1u << bits) - 1);
-    return minimum + quantum * (float)code;
-}
-
-static void read_leaf(Walk *w, uint64_t at, const int64_t origin[3]) {
-    const rey_nvdb *v = w->nvdb;
-    int64_t low[3], high[3];
-    uint32_t bits = leaf_bits(w, at);
-    if (!clip(v, origin, 8, low, high) || !claim(w, low, high)) {
+static void read_leaf(Walk *w, pnanovdb_leaf_handle_t leaf, const Box *box) {
+    enum { MOST_POWER = 4 }; // of the bits of a voxel, which the leaf itself says
+    const uint32_t type = w->nvdb->type;
+    if (type == PNANOVDB_GRID_TYPE_FPN && pnanovdb_leaf_get_bbox_dif_and_flags(w->buf, leaf) >> 29 > MOST_POWER) {
+        *w->buf.outside = true;
         return;
     }
-    for (int64_t z = low[2]; z < high[2]; z++) {
-        for (int64_t y = low[1]; y < high[1]; y++) {
-            for (int64_t x = low[0]; x < high[0]; x++) {
-                int64_t i = x + v->low[0] - origin[0], j = y + v->low[1] - origin[1], k = z + v->low[2] - origin[2];
-                for (int c = 0; c < v->channels; c++) {
-                    put(w, (z * v->ny + y) * v->nx + x, c, leaf_value(w, at, bits, (uint32_t)(i << 6 | j << 3 | k), c));
+    for (int64_t z = box->low[2]; z < box->high[2]; z++) {
+        for (int64_t y = box->low[1]; y < box->high[1]; y++) {
+            for (int64_t x = box->low[0]; x < box->high[0]; x++) {
+                const pnanovdb_coord_t ijk = {(int32_t)x, (int32_t)y, (int32_t)z};
+                for (int c = 0; c < w->nvdb->channels; c++) {
+                    pnanovdb_address_t at = pnanovdb_leaf_get_value_address(type, w->buf, leaf, &ijk); // of what is not packed
+                    put(w, x, y, z, c, is_packed(type) ? packed_value(w, leaf, &ijk) : number_at(w, at, (uint32_t)c));
                 }
             }
         }
     }
 }
 
-static void read_node(Walk *w, uint64_t at, int level, const int64_t origin[3]) {
-    const int bits = levels[level].bits, side = levels[level].side;
-    int64_t low[3], high[3];
-    for (int32_t n = 0; n < 1 << (3 * bits) && !w->outside; n++) {
-        const int32_t mask = (1 << bits) - 1;
-        const int64_t corner[3] = {origin[0] + (int64_t)(n >> (2 * bits)) * side, origin[1] + (int64_t)(n >> bits & mask) * side,
-                                   origin[2] + (int64_t)(n & mask) * side};
-        if (!clip(w->nvdb, corner, side, low, high)) {
-            continue;
-        }
-        uint64_t entry = at + levels[level].table + w->layout.entry * (uint64_t)n;
-        bool inner = word_at(w, at + levels[level].child_mask + 4 * (uint64_t)(n / 32)) >> (n % 32) & 1;
-        uint64_t child = at + load(bytes_at(w, entry, 8), 8); // wraps round where it leads backwards
-        if (!inner) {
-            fill(w, corner, side, entry);
-        } else if (level > 0) {
-            read_node(w, child, level - 1, corner);
-        } else {
-            read_leaf(w, child, corner);
+// The child of a node in which a voxel lies; where there is none, false and the address of the value that it has.
+static bool find_child(const Walk *w, int level, pnanovdb_address_t node, const pnanovdb_coord_t *ijk, pnanovdb_address_t *out) {
+    const uint32_t type = w->nvdb->type;
+    if (level == ROOT) {
+        const pnanovdb_root_handle_t root = {node};
+        const pnanovdb_root_tile_handle_t tile = pnanovdb_root_find_tile(type, w->buf, root, ijk);
+        bool none = pnanovdb_address_is_null(tile.address), inner = !none && pnanovdb_root_tile_get_child(w->buf, tile) != 0;
+        *out = none    ? pnanovdb_address_offset(node, PNANOVDB_GRID_TYPE_GET(type, root_off_background))
+               : inner ? pnanovdb_root_get_child(type, w->buf, root, tile).address
+                       : pnanovdb_root_tile_get_value_address(type, w->buf, tile);
+        return inner;
+    }
+    if (level == UPPER) {
+        const pnanovdb_upper_handle_t upper = {node};
+        const uint32_t n = pnanovdb_upper_coord_to_offset(ijk);
+        bool inner = pnanovdb_upper_get_child_mask(w->buf, upper, n);
+        *out = inner ? pnanovdb_upper_get_child(type, w->buf, upper, n).address
+                     : pnanovdb_upper_get_table_address(type, w->buf, upper, n);
+        return inner;
+    }
+    const pnanovdb_lower_handle_t lower = {node};
+    const uint32_t n = pnanovdb_lower_coord_to_offset(ijk);
+    bool inner = pnanovdb_lower_get_child_mask(w->buf, lower, n);
+    *out = inner ? pnanovdb_lower_get_child(type, w->buf, lower, n).address
+                 : pnanovdb_lower_get_table_address(type, w->buf, lower, n);
+    return inner;
+}
+
+static int64_t lesser(int64_t a, int64_t b) { return a < b ? a : b; }
+
+// The first voxel behind one along an axis that belongs to another child.
+static int64_t child_end(int64_t voxel, int level) { return (voxel & -(int64_t)sides[level - 1]) + sides[level - 1]; }
+
+static void read_node(Walk *w, int level, pnanovdb_address_t node, const Box *box) {
+    Box part;
+    for (part.low[2] = box->low[2]; part.low[2] < box->high[2]; part.low[2] = part.high[2]) {
+        part.high[2] = lesser(child_end(part.low[2], level), box->high[2]);
+        for (part.low[1] = box->low[1]; part.low[1] < box->high[1]; part.low[1] = part.high[1]) {
+            part.high[1] = lesser(child_end(part.low[1], level), box->high[1]);
+            for (part.low[0] = box->low[0]; part.low[0] < box->high[0] && !*w->buf.outside; part.low[0] = part.high[0]) {
+                part.high[0] = lesser(child_end(part.low[0], level), box->high[0]);
+                const pnanovdb_coord_t ijk = {(int32_t)part.low[0], (int32_t)part.low[1], (int32_t)part.low[2]};
+                pnanovdb_address_t at;
+                if (!find_child(w, level, node, &ijk, &at)) {
+                    fill(w, &part, at);
+                } else if (level == LOWER) {
+                    read_leaf(w, (pnanovdb_leaf_handle_t){at}, &part);
+                } else {
+                    read_node(w, level - 1, at, &part);
+                }
+            }
         }
     }
 }
 
-// The number of bits 0 to 20, 21 to 41 or 42 to 62, times the side of an upper node.
-static int64_t key_corner(uint64_t key, int shift) { return (int64_t)(int32_t)((uint32_t)(key >> shift & 0xfffff) << 12); }
-
 rey_result rey_nvdb_read(rey_context *ctx, const char *name, const rey_nvdb *nvdb, float *values) {
-    enum { UPPER_SIDE = 4096 };
-    Walk w = {.nvdb = nvdb, .layout = layout_of(nvdb->type), .values = values};
-    uint64_t tiles = word_at(&w, ROOT_TILES);
-    w.outside = w.outside || tiles > nvdb->size / TILE_SIZE;
-    fill_box(&w, (int64_t[3]){0}, (int64_t[3]){nvdb->nx, nvdb->ny, nvdb->nz}, w.layout.background);
-    for (uint64_t i = 0; i < tiles && !w.outside; i++) {
-        uint64_t tile = w.layout.root + TILE_SIZE * i, key = load(bytes_at(&w, tile, 8), 8);
-        uint64_t child = load(bytes_at(&w, tile + TILE_CHILD, 8), 8);
-        const int64_t origin[3] = {key_corner(key, 42), key_corner(key, 21), key_corner(key, 0)};
-        int64_t low[3], high[3];
-        if (!clip(nvdb, origin, UPPER_SIDE, low, high)) {
-            continue;
-        }
-        if (child) {
-            read_node(&w, child, COUNT_OF(levels) - 1, origin);
-        } else {
-            fill(&w, origin, UPPER_SIDE, tile + w.layout.tile_value);
-        }
+    bool outside;
+    Walk w = {.nvdb = nvdb, .buf = buffer_of(nvdb, &outside), .values = values};
+    const Box all = {{nvdb->low[0], nvdb->low[1], nvdb->low[2]},
+                     {nvdb->low[0] + nvdb->nx, nvdb->low[1] + nvdb->ny, nvdb->low[2] + nvdb->nz}};
+    const pnanovdb_root_handle_t root = root_of(w.buf);
+    outside = pnanovdb_root_get_tile_count(w.buf, root) > nvdb->size / PNANOVDB_GRID_TYPE_GET(nvdb->type, root_tile_size);
+    if (!outside) {
+        read_node(&w, ROOT, root.address, &all);
     }
-    return w.outside   ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a node of the grid lies outside of the file, or over another", name)
+    return outside     ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a node of the grid lies outside of the file", name)
            : w.strange ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a voxel is not finite", name)
                        : REY_OK;
 }

@@ -11,7 +11,7 @@ typedef struct rey_nvdb {
     float box[6];                 // corners in the world
     uint32_t type;
     int64_t low[3];               // first voxel
-    const unsigned char *tree;    // with all that follows
+    const unsigned char *grid;    // its bytes
     size_t size;
     unsigned char *own;           // what was uncompressed
 } rey_nvdb;
