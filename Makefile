@@ -35,6 +35,7 @@ conformance: all
 
 bench: all
 	@python3 bench/bench.py --reynolds $(BUILD)/bin/reynolds
+	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS) tracking > /dev/null && $(BUILD)/bin/tracking $(BUILD)/bench
 
 # A few minutes and 8 GB: meshes, pictures, forests and fog of the largest kind.
 bench-large: all

@@ -17,7 +17,7 @@ import scenes
 REPEATS = 3
 SPP = 16
 FOLDER = "build/bench"
-ROWS = ("primal", "equal_error", "gradients", "albedos", "cold", "loading")
+ROWS = ("primal", "volpathmis", "equal_error", "gradients", "albedos", "density", "cold", "loading")
 parser = argparse.ArgumentParser()
 parser.add_argument("--rows", default=",".join(ROWS))
 parser.add_argument("reynolds", nargs="?", default="build/bin/reynolds")
@@ -48,6 +48,10 @@ print(time.time() - start)
 
 def reynolds(*arguments):
     return json.loads(subprocess.run([REYNOLDS, *arguments, "--json"], check=True, capture_output=True, text=True).stdout)
+
+
+def reynolds_value(path, name):
+    return next(p["value"] for p in reynolds("params", path)["parameters"] if p["name"] == name)
 
 
 def defines(scene):
@@ -99,8 +103,8 @@ class Pair:
         ratio = "%.2f" % (ours / theirs) if self.same else "differs"
         print(ROW % (self.name, what, "%.2f" % theirs, "%.2f" % ours, ratio), flush=True)
 
-    def render(self, spp, seed):
-        image = self.mi.render(self.loaded, spp=spp, seed=seed)
+    def render(self, spp, seed, **more):
+        image = self.mi.render(self.loaded, spp=spp, seed=seed, **more)
         self.dr.eval(image)
         self.dr.sync_thread()
         return image
@@ -119,14 +123,22 @@ class Pair:
                                        for _ in range(REPEATS))
             self.row("loading [1/s], %s, %.0f and %.0f ms" % (variant[:4], 1e3 * theirs, 1e3 * mine), 1 / theirs, 1 / mine)
 
-    def primal(self):
+    def primal(self, what="primal", **integrator):
         rate = 0
         for spp in (SPP, 4 * SPP):
-            rate = max(rate, self.pixels * spp / best(lambda s: self.render(spp, s)) / 1e6)
+            rate = max(rate, self.pixels * spp / best(lambda s: self.render(spp, s, **integrator)) / 1e6)
             self.dr.flush_malloc_cache()
         mine = statistics.median(self.pixels * SPP / self.ours(SPP, s)[0]["seconds"] / 1e6 for s in range(REPEATS))
-        self.same = agree(self.ours(64, 9)[1], np.array(self.render(64, 9))[..., :3])
-        self.row("primal [Mpaths/s]", rate, mine)
+        self.same = agree(self.ours(64, 9)[1], np.array(self.render(64, 9, **integrator))[..., :3])
+        self.row(what + " [Mpaths/s]", rate, mine)
+
+    def integrator(self, kind):
+        return self.mi.load_dict({"type": kind, "max_depth": self.scene.depth, "rr_depth": self.scene.rr_depth})
+
+    def volpathmis(self):
+        """The peer's other integrator of media; ours is the same for both names."""
+        if self.name == "cloud":
+            self.primal("primal, volpathmis", integrator=self.integrator("volpathmis"))
 
     def equal_error(self):
         reference = sum(self.ours(256, s, "--sampler", "sobol")[1] for s in (101, 102)) / 2
@@ -142,12 +154,44 @@ class Pair:
         if self.name == "box+70k":
             self.gradients([c + ".reflectance.value" for c in ("white", "red", "green")], "three albedos: ")
 
+    def density(self):
+        """Variance times time of the derivative by a factor on the cloud's density, in reverse mode, over independent seeds. The
+        peer has it as the gradient of all voxels times the voxels."""
+        if self.name != "cloud":
+            return
+        spp, seeds, voxels = 4, 12, "air.interior_medium.sigma_t.data"
+        parameters = self.mi.traverse(self.loaded)
+        values = np.array(parameters[voxels], dtype=float).ravel()
+        integrator = self.integrator("prbvolpath")
+        ones = self.dr.ones(self.mi.TensorXf, (self.scene.size, self.scene.size, 3))
+        self.dr.enable_grad(parameters[voxels])
+        parameters.update()
+        theirs, seconds = [], []
+        for seed in range(seeds + 1):
+            start = time.time()
+            integrator.render_backward(self.loaded, parameters, ones, seed=seed, spp=spp)
+            gradient = np.array(self.dr.grad(parameters[voxels]), dtype=float)
+            seconds.append(time.time() - start)
+            theirs.append(gradient.ravel() @ values)
+            self.dr.set_grad(parameters[voxels], 0)
+        self.dr.disable_grad(parameters[voxels])
+        name = "air.interior_medium.scale.value"
+        results = [reynolds("grad", self.scene.path, "--param", name, "--mode", "reverse", "--adjoint", "1", "--spp", str(spp),
+                            "--seed", str(seed)) for seed in range(4 * seeds)]
+        scale = reynolds_value(self.scene.path, name)
+        mine = [scale * r["value"] for r in results]
+        print(ROW % (self.name, "derivative by overall density", "%.0f" % np.mean(theirs[1:]), "%.0f" % np.mean(mine),
+                     "+- %.0f %.0f" % tuple(np.std(x, ddof=1) / len(x) ** 0.5 for x in (theirs[1:], mine))))
+        time_of_ours = statistics.median(r["seconds"] for r in results)
+        costs = (np.var(theirs[1:], ddof=1) * min(seconds[1:]), np.var(mine, ddof=1) * time_of_ours)
+        self.row("its 1 / (relative variance x time)", *(np.mean(mine) ** 2 / c for c in costs))
+
     def gradients(self, of=None, prefix=""):
         mi, dr = self.mi, self.dr
         parameters = mi.traverse(self.loaded)
         keys = [k for k in of or self.scene.parameters if k in parameters]
         kind = "ptracer" if self.name == "particles" else "prbvolpath" if self.name in ("cloud", "fog") else "prb"
-        integrator = mi.load_dict({"type": kind, "max_depth": self.scene.depth, "rr_depth": self.scene.rr_depth})
+        integrator = self.integrator(kind)
         for k in keys:
             dr.enable_grad(parameters[k])
         parameters.update()

@@ -8,8 +8,11 @@
 typedef struct MajorantWalk {
     Vec3 o, d;        // in the space of sigma_t; d has the length that world distances give it
     Float t, end;     // where the walk stands and where it leaves the medium [world distance]
-    Int cell[3];
+    Int at;           // number of the cell
+    Int ahead[3];     // how many cells lie before the walk along each axis
     Float next[3], step[3]; // distances at which cells end along each axis, and between such ends
+    Int stride[3];    // between the numbers of cells that follow each other along an axis
+    Int cell[3];      // where it repeats: x, y and z of the cell, counted on beyond the grid
     Float majorant;   // of the cell that the walk stands in
     Float least;      // bounds of cells count as at least this much
     Mask m;           // lanes that are still inside
@@ -97,15 +100,21 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
     medium_span(scene, medium, sigma_t, o, d, &w.t, &w.end);
     w.m = m & m_lt(w.t, w.end);
     w.t = f_select(w.m, w.t, f_set(0));
+    w.at = i_set(medium->table);
+    int32_t size = 1;
     for (int k = 0; k < 3; k++) {
         Mask up = m_gt(v[k], f_set(0)), still = m_lt(f_abs(v[k]), f_set(1e-12f)) | m_set(!medium->bounded);
         Float rcp = 1.0f / f_select(still, f_set(1), v[k]);
         Float at = f_clamp((p[k] + w.t * v[k]) * (real)n[k], f_set(0), f_set((real)n[k]));
-        w.cell[k] = i_min(i_from_f(at), i_set(n[k] - 1));
-        Float border = f_from_i(w.cell[k] + i_select(up, i_set(1), i_set(0))) * (1 / (real)n[k]);
-        Mask last = mi_eq(w.cell[k], i_select(up, i_set(n[k] - 1), i_set(0))); // it reaches as far as the medium
+        Int cell = i_min(i_from_f(at), i_set(n[k] - 1));
+        Float border = f_from_i(cell + i_select(up, i_set(1), i_set(0))) * (1 / (real)n[k]);
+        w.ahead[k] = i_select(up, n[k] - 1 - cell, cell);
+        Mask last = mi_eq(w.ahead[k], i_set(0)); // it reaches as far as the medium
         w.next[k] = f_select(still | last, f_set(INFINITY), (border - p[k]) * rcp);
         w.step[k] = f_select(still, f_set(INFINITY), f_abs(rcp) * (1 / (real)n[k]));
+        w.at = w.at + cell * size;
+        w.stride[k] = i_select(up, i_set(size), i_set(-size));
+        size *= n[k];
     }
     if (w.wrap != WRAP_CLAMP) {
         majorant_start_repeated(medium, &w);
@@ -113,41 +122,44 @@ KFN MajorantWalk majorant_start(const SceneView *scene, const MediumNode *medium
     return w;
 }
 
-// One cell on: along the axis whose border comes first. Lanes of m that leave the medium leave the walk.
-KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
+// One cell on where cells repeat: along the axis whose border comes first.
+static NOINLINE void majorant_step_repeated(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
     const int32_t n[3] = {medium->nx, medium->ny, medium->nz};
     const Float p[3] = {w->o.x, w->o.y, w->o.z}, v[3] = {w->d.x, w->d.y, w->d.z};
     Mask left = m;
     for (int k = 0; k < 3; k++) {
         Mask mine = left & m_le(w->next[k], border);
-        Mask up = m_gt(v[k], f_set(0));
-        Int cell = i_select(mine, w->cell[k] + i_select(up, i_set(1), i_set(-1)), w->cell[k]);
-        if (w->wrap != WRAP_CLAMP) {
-            w->cell[k] = cell;
-            w->next[k] = f_select(mine, majorant_border(w, k, p[k], v[k], n[k]), w->next[k]);
-            left = left & ~mine;
-            continue;
-        }
-        w->cell[k] = i_max(i_min(cell, i_set(n[k] - 1)), i_set(0));
-        Mask last = mi_eq(w->cell[k], i_select(up, i_set(n[k] - 1), i_set(0)));
-        w->next[k] = f_select(mine, f_select(last, f_set(INFINITY), w->next[k] + w->step[k]), w->next[k]);
+        w->cell[k] = i_select(mine, w->cell[k] + i_select(m_gt(v[k], f_set(0)), i_set(1), i_set(-1)), w->cell[k]);
+        w->next[k] = f_select(mine, majorant_border(w, k, p[k], v[k], n[k]), w->next[k]);
         left = left & ~mine;
+    }
+}
+
+// One cell on, along all axes whose border comes first. Lanes of m that leave the medium leave the walk.
+KFN void majorant_step(const MediumNode *medium, MajorantWalk *w, Float border, Mask m) {
+    if (w->wrap != WRAP_CLAMP) {
+        majorant_step_repeated(medium, w, border, m);
+    } else {
+        for (int k = 0; k < 3; k++) {
+            Mask mine = m & m_le(w->next[k], border) & mi_lt(i_set(0), w->ahead[k]);
+            w->at = w->at + (mine & w->stride[k]);
+            w->ahead[k] = w->ahead[k] + mine;
+            Float next = f_select(mi_lt(i_set(0), w->ahead[k]), w->next[k] + w->step[k], f_set(INFINITY));
+            w->next[k] = f_select(mine, next, w->next[k]);
+        }
     }
     w->m = w->m & ~(m & m_ge(w->t, w->end));
 }
 
 // The bound of the cell that the walk stands in.
 KFN Float majorant_here(const SceneView *scene, const MediumNode *medium, const MajorantWalk *w) {
-    Int x = w->cell[0], y = w->cell[1], z = w->cell[2];
-    if (w->wrap != WRAP_CLAMP) {
-        x = texture_wrap(x, medium->nx, w->wrap);
-        y = texture_wrap(y, medium->ny, w->wrap);
-        z = texture_wrap(z, medium->nz, w->wrap);
+    if (w->wrap == WRAP_CLAMP) {
+        return f_max(table_at(scene, w->at), w->least);
     }
+    Int x = texture_wrap(w->cell[0], medium->nx, w->wrap), y = texture_wrap(w->cell[1], medium->ny, w->wrap);
+    Int z = texture_wrap(w->cell[2], medium->nz, w->wrap);
     Int cell = (z * medium->ny + y) * medium->nx + x;
-    if (w->wrap != WRAP_CLAMP) {
-        cell = i_select(w->coarse, i_set(medium->nx * medium->ny * medium->nz), cell); // that of all cells
-    }
+    cell = i_select(w->coarse, i_set(medium->nx * medium->ny * medium->nz), cell); // that of all cells
     return f_max(table_at(scene, cell + medium->table), w->least);
 }
 
@@ -165,8 +177,10 @@ KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, Majoran
         depth = depth - through;
         found = found | here;
         left = left & ~here;
-        majorant_step(medium, w, border, left);
-        left = left & w->m;
+        if (m_any(left)) {
+            majorant_step(medium, w, border, left);
+            left = left & w->m;
+        }
     }
     return found;
 }
