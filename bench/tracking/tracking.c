@@ -100,7 +100,8 @@ static void measure(const SceneView *view, const MediumNode *medium, bool throug
     for (int k = 0; k < WIDTHS; k++) {
         TrackingCount count = {0};
         widths[k].count(view, medium, through, RAYS, &count);
-        double n = (double)count.rays, rays = 1e-6 * n / best[k], lookups = (double)count.lookups / n, cells = (double)count.cells / n;
+        double n = (double)count.rays, rays = 1e-6 * n / best[k];
+        double lookups = (double)count.lookups / n, cells = (double)count.cells / n;
         printf("%-10s %-11s %5d %8.2f %10.1f %8.1f %11.2f %9.2f %8.4f %8.2f\n", through ? "ratio" : "delta", bounds,
                widths[k].lanes, rays, rays * lookups, rays * cells, lookups, cells, count.passed / n, best[0] / best[k]);
     }
