@@ -188,9 +188,7 @@ KFN void envmap_adj(const SceneView *scene, const Light *l, TexCoord uv, Float d
         // L = scale sum_k w_k texel_k
         Float w = footprint_weight(&f, k);
         Int at = f.at[k] * t->channels + sink->texture_at[image];
-        for (int c = 0; c < SPEC_N; c++) {
-            sink_add(sink, at + c, w * scale * dl.c[c], m);
-        }
+        sink_add_spec(sink, at, spec_scale(dl, w * scale), m);
     }
     light_real_adj(scene, l, SLOT(Envmap, scale), spec_dot(dl, envmap_image(scene, l, &f)), sink, m);
     if (move) {
@@ -318,9 +316,7 @@ KFN void envmap_pdf_adj(const SceneView *scene, const EmitterRecord *e, Vec3 d, 
         Float w = footprint_weight(&f, k) * cell.scale * factor * dpdf, y = luminance(bitmap_texel(scene, t, f.at[k]));
         Spec dtexel = luminance_adj(f_zero_unless(m_ge(y, f_set(0)), w));
         Int at = f.at[k] * t->channels + sink->texture_at[image];
-        for (int c = 0; c < SPEC_N; c++) {
-            sink_add(sink, at + c, dtexel.c[c], m);
-        }
+        sink_add_spec(sink, at, dtexel, m);
         share = share + w * f_max(y, f_set(0));
     }
     sink_add_uniform(sink, sink->sky_at, -share, m);

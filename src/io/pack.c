@@ -92,7 +92,4 @@ void rey_pack_levels(float *levels) {
         levels[LEVELS_BYTE + i] = (float)i / 255.0f;
         levels[LEVELS_SRGB + i] = rey_srgb_decode(levels[LEVELS_BYTE + i]);
     }
-    for (int i = 0; i < 32; i++) {
-        levels[LEVELS_HALF + i] = ldexpf(1, (i ? i : 1) - 25);
-    }
 }

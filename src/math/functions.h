@@ -20,6 +20,7 @@
 #ifdef REAL_DOUBLE
 
 KFN Float f_exp(Float x) { return exp(x); }
+KFN Float f_ldexp(Float x, Int n) { return ldexp(x, n); }
 KFN Float f_log(Float x) { return log(x); }
 KFN void f_sincos(Float x, Float *s, Float *c) {
     *s = sin(x);
@@ -47,6 +48,9 @@ KFN Float f_from_bits(Int bits) { return (Float)bits; }
 KFN Int f_to_bits(Float x) { return (Int)x; }
 #endif
 
+// x 2^n where 2^n is a normal number.
+KFN Float f_ldexp(Float x, Int n) { return x * f_from_bits((n + 127) << 23); }
+
 // e^x: 2 ulp for |x| < 87; 0 below, saturated near 2^127 above.
 KFN Float f_exp(Float x) {
     Mask underflow = m_lt(x, f_set(-87.0f));
@@ -59,7 +63,7 @@ KFN Float f_exp(Float x) {
     p = p * r + 1.6666665459e-1f;
     p = p * r + 5.0000001201e-1f;
     p = p * r * r + r + 1.0f;
-    return f_zero_unless(~underflow, p * f_from_bits((i_from_f(n) + 127) << 23));
+    return f_zero_unless(~underflow, f_ldexp(p, i_from_f(n)));
 }
 
 // ln x: 2 ulp for normal x > 0; about -87.3 for zero, denormal and negative x.

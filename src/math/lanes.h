@@ -231,6 +231,22 @@ KFN Float f_gather(const float *base, Int index) { return (Float)_mm512_i32gathe
 KFN Int i_gather(const int32_t *base, Int index) { return (Int)_mm512_i32gather_epi32((SimdI)index, base, 4); }
 #endif
 
+// Four bytes from byte `index` on, and two halves from half `index` on, which up to three bytes behind them must be readable.
+#if LANES == 1
+KFN Int i_gather_bytes(const void *base, Int index) {
+    Int word;
+    memcpy(&word, (const char *)base + index, sizeof word);
+    return word;
+}
+KFN Int i_gather_halves(const void *base, Int index) { return i_gather_bytes((const char *)base + index, index); }
+#elif LANES == 8
+KFN Int i_gather_bytes(const void *base, Int index) { return (Int)_mm256_i32gather_epi32(base, (SimdI)index, 1); }
+KFN Int i_gather_halves(const void *base, Int index) { return (Int)_mm256_i32gather_epi32(base, (SimdI)index, 2); }
+#else
+KFN Int i_gather_bytes(const void *base, Int index) { return (Int)_mm512_i32gather_epi32((SimdI)index, base, 1); }
+KFN Int i_gather_halves(const void *base, Int index) { return (Int)_mm512_i32gather_epi32((SimdI)index, base, 2); }
+#endif
+
 // Do all lanes have the same number?
 KFN bool i_uniform(Int x) { return m_all(mi_eq(x, i_set(i_lane(x, 0)))); }
 // i_gather where they often do.
@@ -368,6 +384,16 @@ KFN void f_scatter_add_doubles(double *base, Int index, Float x, Float y, Mask m
         double *p = base + i_lane(index, lane);
         p[0] += (double)f_lane(x, lane);
         p[1] += (double)f_lane(y, lane);
+    }
+}
+// And for three in a row, which gain x[0], x[1] and x[2].
+KFN void f_scatter_add_double3(double *base, Int index, const Float x[3], Mask m) {
+    for (uint32_t bits = m_bits(m); bits; bits &= bits - 1) {
+        int lane = __builtin_ctz(bits);
+        double *p = base + i_lane(index, lane);
+        p[0] += (double)f_lane(x[0], lane);
+        p[1] += (double)f_lane(x[1], lane);
+        p[2] += (double)f_lane(x[2], lane);
     }
 }
 // Sum over the lanes of m, in double and in lane order.

@@ -57,3 +57,22 @@ KFN void sink_add(Sink *s, Int at, Float d, Mask m) {
 #endif
     }
 }
+
+// sink_add of the three entries from `at` on.
+KFN void sink_add3(Sink *s, Int at, const Float d[3], Mask m) {
+    if (s->gradient) {
+        f_scatter_add_double3(s->gradient, at, d, m);
+    } else {
+        for (int k = 0; k < 3; k++) {
+            sink_add(s, at + k, d[k], m);
+        }
+    }
+}
+KFN void sink_add_v3(Sink *s, Int at, Vec3 d, Mask m) {
+    const Float each[3] = {d.x, d.y, d.z};
+    sink_add3(s, at, each, m);
+}
+KFN void sink_add_spec(Sink *s, Int at, Spec d, Mask m) {
+    static_assert(SPEC_N == 3, "a colour is three numbers in a row");
+    sink_add3(s, at, d.c, m);
+}

@@ -1,6 +1,8 @@
 // texels.c: packed textures, and what becomes of them when somebody changes them.
 #include "scene/texels.h"
 
+#include <math.h>
+
 int rey_texel_bytes(int32_t storage) { return storage == TEXELS_FLOAT ? 4 : storage == TEXELS_HALF ? 2 : 1; }
 
 static int64_t number_count(const TextureNode *t) { return (int64_t)t->width * t->height * t->channels; }
@@ -28,9 +30,9 @@ rey_result rey_texels_place(rey_scene *scene, int64_t *numbers) {
     return REY_OK;
 }
 
-static float half_value(const float *levels, uint32_t bits) {
-    uint32_t exponent = bits >> 10 & 31;
-    float value = (float)((bits & 1023) + (exponent ? 1024 : 0)) * levels[LEVELS_HALF + exponent];
+static float half_value(uint32_t bits) {
+    int exponent = bits >> 10 & 31;
+    float value = ldexpf((float)((bits & 1023) + (exponent ? 1024 : 0)), (exponent ? exponent : 1) - 25);
     return bits >> 15 ? -value : value;
 }
 
@@ -41,7 +43,7 @@ float rey_texel(const SceneView *view, const TextureNode *t, int64_t i) {
     const int bytes = rey_texel_bytes(t->storage);
     const unsigned char *at = (const unsigned char *)view->texels + (t->texels + i) * bytes;
     if (t->storage == TEXELS_HALF) {
-        return half_value(view->levels, (uint32_t)at[0] | (uint32_t)at[1] << 8);
+        return half_value((uint32_t)at[0] | (uint32_t)at[1] << 8);
     }
     return view->levels[(t->storage == TEXELS_SRGB ? LEVELS_SRGB : LEVELS_BYTE) + at[0]];
 }

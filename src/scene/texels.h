@@ -4,9 +4,8 @@
 
 #include "scene/scene.h"
 
-// What `levels` holds: the numbers of bytes, of bytes that are encoded as sRGB, and by the exponent of a half what a unit of its
-// mantissa is.
-enum { LEVELS_BYTE = 0, LEVELS_SRGB = 256, LEVELS_HALF = 512, LEVELS_COUNT = 544 };
+// What `levels` holds: the numbers of bytes, and of bytes that are encoded as sRGB.
+enum { LEVELS_BYTE = 0, LEVELS_SRGB = 256, LEVELS_COUNT = 512 };
 
 // Bytes of one number.
 int rey_texel_bytes(int32_t storage);

@@ -74,7 +74,9 @@ KFN Float footprint_weight(const Footprint *f, int corner) {
     return (corner & 1 ? f->fx : 1.0f - f->fx) * (corner & 2 ? f->fy : 1.0f - f->fy);
 }
 
-KFN Float level_at(const SceneView *scene, Int index) {
+// The number that a byte of a packed bitmap stands for.
+KFN Float byte_number(const SceneView *scene, const TextureNode *t, Int byte) {
+    Int index = byte + (t->storage == TEXELS_SRGB ? LEVELS_SRGB : LEVELS_BYTE);
 #ifdef REAL_DOUBLE
     return (Float)scene->levels[index];
 #else
@@ -82,17 +84,37 @@ KFN Float level_at(const SceneView *scene, Int index) {
 #endif
 }
 
+// The number of the low 16 bits, a binary16: a sign, 5 bits of exponent, 10 of mantissa; below 2^-14 without a leading one.
+KFN Float half_number(Int half) {
+    Int exponent = half >> 10 & 31, least = i_min(exponent, i_set(1));
+    // Exponents 0 and 1 stand for the same power.
+    Float value = f_ldexp(f_from_i((half & 1023) + (least << 10)), exponent - least - 24);
+    return f_select(mi_eq(half & 0x8000, i_set(0)), value, -value);
+}
+
 // Number `index` of a packed bitmap.
 static NOINLINE Float packed_texel(const SceneView *scene, const TextureNode *t, Int index) {
     Int n = index + t->texels;
+    return t->storage == TEXELS_HALF ? half_number(i_gather_halves(scene->texels, n))
+                                     : byte_number(scene, t, i_gather_bytes(scene->texels, n) & 255);
+}
+
+// And that with the two behind it.
+static NOINLINE Spec packed_colour(const SceneView *scene, const TextureNode *t, Int index) {
+    Int n = index + t->texels;
+    Spec s;
     if (t->storage == TEXELS_HALF) {
-        Int half = i_gather(scene->texels, n >> 1) >> ((n & 1) << 4), exponent = half >> 10 & 31;
-        Int mantissa = (half & 1023) + (i_min(exponent, i_set(1)) << 10);
-        Float value = f_from_i(mantissa) * level_at(scene, exponent + LEVELS_HALF);
-        return f_select(mi_eq(half & 0x8000, i_set(0)), value, -value);
+        Int two = i_gather_halves(scene->texels, n);
+        s.c[0] = half_number(two);
+        s.c[1] = half_number(two >> 16);
+        s.c[2] = half_number(i_gather_halves(scene->texels, n + 2));
+        return s;
     }
-    Int byte = i_gather(scene->texels, n >> 2) >> ((n & 3) << 3) & 255;
-    return level_at(scene, byte + (t->storage == TEXELS_SRGB ? LEVELS_SRGB : LEVELS_BYTE));
+    Int bytes = i_gather_bytes(scene->texels, n);
+    for (int c = 0; c < SPEC_N; c++) {
+        s.c[c] = byte_number(scene, t, bytes >> (8 * c) & 255);
+    }
+    return s;
 }
 
 KFN Float texel_number(const SceneView *scene, const TextureNode *t, Int index) {
@@ -104,16 +126,13 @@ KFN Spec bitmap_texel(const SceneView *scene, const TextureNode *t, Int at) {
     if (t->channels == 1) {
         return spec_set(texel_number(scene, t, index));
     }
-    Spec s;
     if (t->storage == TEXELS_FLOAT) {
         static_assert(SPEC_N == 3, "colours are read as three numbers");
+        Spec s;
         f_gather3(scene->theta, index + t->theta, s.c);
         return s;
     }
-    for (int c = 0; c < SPEC_N; c++) {
-        s.c[c] = packed_texel(scene, t, index + c);
-    }
-    return s;
+    return packed_colour(scene, t, index);
 }
 
 KFN Spec bitmap_eval(const SceneView *scene, const TextureNode *t, Vec2 uv) {
@@ -140,9 +159,7 @@ KFN void bitmap_adj(const SceneView *scene, int32_t id, Vec2 uv, Spec d, Vec2 *d
             if (t->channels == 1) {
                 sink_add(sink, at, w * spec_sum(d), m);
             } else {
-                for (int c = 0; c < SPEC_N; c++) {
-                    sink_add(sink, at + c, w * d.c[c], m);
-                }
+                sink_add_spec(sink, at, spec_scale(d, w), m);
             }
         }
     }

@@ -63,9 +63,7 @@ KFN void mesh_normals_add(const Hit *hit, const Corners *c, Vec3 dsum, Sink *sin
     begin = i_max(begin, i_set(0));
     for (int k = 0; k < 3; k++) {
         Int at = i_select(m, begin + c->i[k] * 3, i_set(0));
-        sink_add(sink, at, w[k] * dsum.x, m);
-        sink_add(sink, at + 1, w[k] * dsum.y, m);
-        sink_add(sink, at + 2, w[k] * dsum.z, m);
+        sink_add_v3(sink, at, v3_scale(dsum, w[k]), m);
     }
 }
 

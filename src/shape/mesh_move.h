@@ -59,9 +59,7 @@ KFN void mesh_points_add(const Hit *hit, const Corners *c, Vec3 dp, Vec3 de1, Ve
     begin = i_max(begin, i_set(0));
     for (int k = 0; k < 3 && m_any(m); k++) {
         Int at = i_select(m, begin + c->i[k] * 3, i_set(0));
-        sink_add(sink, at, d[k].x, m);
-        sink_add(sink, at + 1, d[k].y, m);
-        sink_add(sink, at + 2, d[k].z, m);
+        sink_add_v3(sink, at, d[k], m);
     }
 }
 

@@ -315,7 +315,5 @@ static void crossing_line_adj(const BoundaryJob *b, const Crossing *c, Float wor
     m = m & mi_lt(i_set(-1), at);
     at = i_select(m, at, i_set(0));
     Float d = f_zero_unless(m, -worth * v3_dot(c->n, c->rise)) * STEP_FLOAT(b, step, scale);
-    sink_add(sink, at, d * c->uv.x, m);
-    sink_add(sink, at + 1, d * c->uv.y, m);
-    sink_add(sink, at + 2, d, m);
+    sink_add_v3(sink, at, v3(d * c->uv.x, d * c->uv.y, d), m);
 }

@@ -331,9 +331,7 @@ static void edge_line_adj(const BoundaryJob *b, const EdgePoint *e, Float df, Si
     }
     Int line = i_select(m, e->line, i_set(0)), at = i_select(m, MARK_INT(b, line, at), i_set(0));
     Float d = f_zero_unless(m, df) * MARK_FLOAT(b, line, scale);
-    sink_add(sink, at, d * e->uv.x, m);
-    sink_add(sink, at + 1, d * e->uv.y, m);
-    sink_add(sink, at + 2, d, m);
+    sink_add_v3(sink, at, v3(d * e->uv.x, d * e->uv.y, d), m);
 }
 
 // A point of a random edge; u in the unit square.

@@ -89,9 +89,7 @@ static void lines_move_adj(const Segments *q, bool forward, int32_t k, Sink *sin
     m = m & m_finite(worth);
     Int at = i_select(m, i_load(q->source + k), i_set(0));
     Vec3 rate = v3_select(m, v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), v3_zero());
-    sink_add(sink, at, rate.x, m);
-    sink_add(sink, at + 1, rate.y, m);
-    sink_add(sink, at + 2, rate.z, m);
+    sink_add_v3(sink, at, rate, m);
     if (forward) {
         f_store(q->seen + k, sink->derivative);
         f_store(q->unseen + k, sink->derivative);
