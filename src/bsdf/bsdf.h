@@ -76,7 +76,7 @@ KFN real bsdf_floor(const BsdfCall *call, const BsdfNode *node) {
     KFN Record prefix##_fetch(const BsdfCall *call) {                                                                  \
         const BsdfNode *node = call->scene->bsdfs + call->node;                                                        \
         int slot = 0, config = 0;                                                                                      \
-        Record record = {.floor = bsdf_floor(call, node)};                                                             \
+        Record record = {.floor = bsdf_floor(call, node), .rim = call->rim};                                           \
         record.table = node->table >= 0 ? call->scene->tables + node->table : NULL;                                    \
         PARAMS(FETCH_FIELD) CONFIG(FETCH_CONFIG) UNUSED(slot), UNUSED(config);                                         \
         return record;                                                                                                 \

@@ -17,7 +17,12 @@ typedef struct BsdfCall {
     real floor; // see KIND_RECORD
     const BsdfSurface *surface;
     BsdfSurface *dsurface; // its adjoint, null = not asked for
+    real rim;              // see KIND_RECORD
 } BsdfCall;
+
+KFN BsdfCall bsdf_call(const SceneView *scene, int32_t node, TexCoord uv, real floor) {
+    return (BsdfCall){.scene = scene, .node = node, .uv = uv, .floor = floor};
+}
 
 static NOINLINE Spec bsdf_eval(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);
 static NOINLINE Float bsdf_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe);
@@ -38,7 +43,7 @@ KFN Mask share_inside(Float share) { return m_ge(share, f_set(-1e-5f)) & m_le(sh
 // The same call as pictures make it.
 KFN BsdfCall bsdf_picture(const BsdfCall *call) {
     BsdfCall c = *call;
-    c.floor = 0;
+    c.floor = c.rim = 0;
     return c;
 }
 

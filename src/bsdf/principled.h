@@ -13,6 +13,7 @@
 
 #include "bsdf/critical.h"
 #include "bsdf/principled_lobes.h"
+#include "bsdf/rim.h"
 
 #define PRINCIPLED_PARAMS(P)                                                                                           \
     P(SPEC, base_color, 0.5f, 0, 1, "colour", "")                                                                      \
@@ -187,6 +188,11 @@ KFN Float principled_share(const Principled *p, Mask front, Float fresnel) {
     return f_select(m_lt(fresnel, f_set(1)), f_clamp(q, f_set(p->floor), f_set(1 - p->floor)), f_set(1));
 }
 
+// Of the end of the refraction, which only counts where something is refracted.
+KFN Float principled_rim(const Principled *p, const Microfacet *mf, Vec3 wi, Float e) {
+    return f_zero_unless(m_ne((1.0f - p->metallic) * p->spec_trans, f_set(0)), rim_share(mf, wi, e, p->rim));
+}
+
 KFN Float principled_pdf(const Principled *p, Vec3 wi, Vec3 wo, Int lobe) {
     PrincipledTerms t = principled_terms(p, wi, wo, lobe);
     PrincipledChoice c = principled_choice(p, wi);
@@ -202,17 +208,22 @@ KFN Float principled_pdf(const Principled *p, Vec3 wi, Vec3 wo, Int lobe) {
     }
     pdf = f_zero_unless(principled_visible(&t, wi, wo), pdf);
     pdf = pdf + f_zero_unless(principled_upper(&t), c.lobes[PRINCIPLED_DIFFUSE] * wo.z * INV_PI);
-    return f_zero_unless(t.counts & c.any, pdf);
+    pdf = f_zero_unless(t.counts & c.any, pdf);
+    return p->rim > 0 ? rim_pdf(principled_rim(p, &t.mf, wi, t.e), lobe, pdf) : pdf;
 }
 
 KFN BsdfSample principled_sample(const Principled *p, Vec3 wi, Float u1, Vec2 u2) {
     PrincipledChoice c = principled_choice(p, wi);
-    Mask front = m_gt(wi.z, f_set(0));
+    Mask front = m_gt(wi.z, f_set(0)), rim = m_set(false);
     Microfacet mf = principled_facets(p->roughness, p->anisotropic);
+    Float eta = principled_eta(p), e = f_select(front, eta, 1.0f / eta);
+    if (p->rim > 0) {
+        rim = rim_choose(principled_rim(p, &mf, wi, e), &u1);
+    }
     // [0, main): the main lobe, with a random number of its own; then the clearcoat; then diffuse
     Float main = c.lobes[PRINCIPLED_MAIN], coat = main + c.lobes[PRINCIPLED_COAT];
-    Float inner = f_min(u1 * f_safe_rcp(main), f_set(0.99999994f)), eta = principled_eta(p);
-    Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), f_select(front, eta, 1.0f / eta), p->floor, &inner, u2);
+    Float inner = f_min(u1 * f_safe_rcp(main), f_set(0.99999994f));
+    Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), e, p->floor, &inner, u2);
     Float cos_t, eta_it, eta_ti, fresnel = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);
     Mask refracts = m_lt(u1, main) & m_ge(inner, principled_share(p, front, fresnel));
     Mask coated = m_ge(u1, main) & m_lt(u1, coat), diffuse = m_ge(u1, coat) & m_ge(u1, main);
@@ -225,5 +236,7 @@ KFN BsdfSample principled_sample(const Principled *p, Vec3 wi, Float u1, Vec2 u2
                 c.any;
     wo = v3_select(diffuse, warp_cosine_hemisphere(u2), wo);
     wo = v3_select(good | (diffuse & c.any), wo, v3(wo.x, wo.y, f_set(0)));
-    return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(refracts, eta_it, f_set(1))};
+    wo = v3_select(rim, rim_direction(wi, e, u2.x), wo);
+    return (BsdfSample){wo, i_select(rim, i_set(LOBE_RIM), i_set(LOBE_SMOOTH)),
+                        f_select(rim, e, f_select(refracts, eta_it, f_set(1)))};
 }

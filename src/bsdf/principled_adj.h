@@ -114,9 +114,22 @@ KFN void principled_terms_adj(const Principled *p, const PrincipledTerms *t, Vec
     principled_eta_adj(p, back->eta + f_select(t->front, de, -de * t->e * t->e), &dp->specular);
 }
 
+// Adjoint where the refraction ends.
+KFN void principled_rim_adj(const Principled *p, const PrincipledTerms *t, Vec3 wi, Vec3 wo, Spec df, Principled *dp, Vec3 *dwi,
+                            Vec3 *dwo) {
+    // f = sqrt(base) bsdf f_+ H(s g), e = eta, or 1 / eta from the back
+    Float dvalue = spec_dot(df, principled_root(p->base_color)) * t->bsdf * rim_value(&t->mf, wi, wo, t->eta, t->e);
+    Float de = rim_adj(wi, wo, t->e, dvalue, dwi, dwo);
+    principled_eta_adj(p, f_select(t->front, de, -de * t->e * t->e), &dp->specular);
+}
+
 KFN void principled_adj(const Principled *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Principled *dp, Vec3 *dwi,
                         Vec3 *dwo) {
     PrincipledTerms t = principled_terms(p, wi, wo, lobe);
+    Mask rim = mi_eq(lobe, i_set(LOBE_RIM));
+    if (m_any(rim)) {
+        principled_rim_adj(p, &t, wi, wo, spec_zero_unless(rim, df), dp, dwi, dwo);
+    }
     Float d = microfacet_D(&t.mf, t.m), gi = smith_G1(&t.mf, wi, t.m), go = smith_G1(&t.mf, wo, t.m), dg = d * gi * go;
     df = spec_zero_unless(t.counts, df);
     PrincipledBack back = {.m = v3_zero()};

@@ -4,16 +4,19 @@
 #include "scene/kind.h"
 #include "scene/texture_gradient.h"
 
-// Reflections and refractions of the two functions of a blend may go different ways. Their lobes carry, above the two
+// Reflections, refractions and rims of the two functions of a blend may go different ways. Their lobes carry, above the three
 // bits of the list above, one bit per blend on the way to the function that they belong to, the outermost blend lowest.
-KFN Mask lobe_is_shared(Int lobe) { return mi_eq(lobe, i_set(LOBE_SMOOTH)) | mi_eq(lobe & 3, i_set(LOBE_NULL)); }
+KFN Mask lobe_is(Int lobe, int kind) { return mi_eq(lobe & 7, i_set(kind)); }
+KFN Mask lobe_is_shared(Int lobe) { return mi_eq(lobe, i_set(LOBE_SMOOTH)) | lobe_is(lobe, LOBE_NULL); }
 KFN Int lobe_from_child(Int lobe, int child) {
-    return i_select(lobe_is_shared(lobe), lobe, (lobe & 3) | ((lobe >> 2) * 2 + child) * 4);
+    return i_select(lobe_is_shared(lobe), lobe, (lobe & 7) | ((lobe >> 3) * 2 + child) * 8);
 }
-KFN Int lobe_to_child(Int lobe) { return (lobe & 3) | (lobe >> 3) * 4; }
+KFN Int lobe_to_child(Int lobe) { return (lobe & 7) | (lobe >> 4) * 8; }
 // Reflections and refractions: their directions follow from wi.
-KFN Mask lobe_turns(Int lobe) { return mi_eq(lobe & 3, i_set(LOBE_REFLECT)) | mi_eq(lobe & 3, i_set(LOBE_TRANSMIT)); }
-KFN Mask lobe_in_child(Int lobe, int child) { return lobe_is_shared(lobe) | mi_eq(lobe >> 2 & 1, i_set(child)); }
+KFN Mask lobe_turns(Int lobe) { return lobe_is(lobe, LOBE_REFLECT) | lobe_is(lobe, LOBE_TRANSMIT); }
+KFN Mask lobe_in_child(Int lobe, int child) { return lobe_is_shared(lobe) | mi_eq(lobe >> 3 & 1, i_set(child)); }
+// Directions out of many, so that the next vertex may lie wherever they lead.
+KFN Mask lobe_spreads(Int lobe) { return lobe_is(lobe, LOBE_SMOOTH) | lobe_is(lobe, LOBE_RIM); }
 
 typedef struct BsdfSample {
     Vec3 wo;
@@ -39,11 +42,12 @@ typedef struct BsdfSample {
 #define RECORD_CONFIG(field, value, choices, text) int32_t field;
 
 // A record also knows its derived table and the smallest probability with which a lobe is to be selected: 0 for
-// pictures, positive for derivatives, which can be non-zero where a lobe's own weight is 0.
+// pictures, positive for derivatives, which can be non-zero where a lobe's own weight is 0; and that of the directions along
+// which its value jumps, if it does (rim.h).
 #define KIND_RECORD(Type, PARAMS, CONFIG)                                                                              \
     typedef struct Type {                                                                                              \
         PARAMS(RECORD_FIELD) CONFIG(RECORD_CONFIG) const float *table;                                                 \
-        real floor;                                                                                                    \
+        real floor, rim;                                                                                               \
     } Type;
 
 #define NO_CONFIG(C)

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "bsdf/critical.h"
+#include "bsdf/rim.h"
 #include "bsdf/roughconductor.h"
 
 #define ROUGHDIELECTRIC_PARAMS(P)                                                                                      \
@@ -82,23 +83,30 @@ KFN Float roughdielectric_pdf(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lo
     Float choice = roughdielectric_probability(p, t.fresnel);
     Float reflected = choice * f_safe_rcp(4.0f * f_abs(t.b));
     Float refracted = (1.0f - choice) * f_abs(t.b) * t.e * t.e * f_safe_rcp(t.q * t.q);
-    return f_zero_unless(t.counts & roughdielectric_visible(&t, wi, wo),
-                         interface_pdf(&mf, up, t.m, t.e, p->floor) * f_select(t.reflects, reflected, refracted));
+    Float pdf = f_zero_unless(t.counts & roughdielectric_visible(&t, wi, wo),
+                              interface_pdf(&mf, up, t.m, t.e, p->floor) * f_select(t.reflects, reflected, refracted));
+    return p->rim > 0 ? rim_pdf(rim_share(&mf, wi, t.e, p->rim), lobe, pdf) : pdf;
 }
 
 KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u1, Vec2 u2) {
     Microfacet mf = roughdielectric_facets(p);
     Float eta = roughdielectric_eta(p), e = f_select(m_gt(wi.z, f_set(0)), eta, 1.0f / eta);
+    Mask rim = m_set(false);
+    if (p->rim > 0) {
+        rim = rim_choose(rim_share(&mf, wi, e, p->rim), &u1);
+    }
     Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), e, p->floor, &u1, u2);
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);
-    Mask reflects = m_lt(u1, roughdielectric_probability(p, f));
+    Mask reflects = m_lt(u1, roughdielectric_probability(p, f)) & ~rim;
     Vec3 wo = v3_select(reflects, reflect(wi, m), refract(wi, m, cos_t, eta_ti));
     // A reflected direction below the surface, or a refracted one above it, has no density there; nor has a facet seen
     // from its back, which sampling of all normals can give.
     Mask right_side = (reflects ^ m_le(wi.z * wo.z, f_set(0))) & m_gt(v3_dot(wi, m) * wi.z, f_set(0)) &
                       m_gt(m.z, f_set(0));
     wo = v3_select(right_side, wo, v3(wo.x, wo.y, f_set(0)));
-    return (BsdfSample){wo, i_set(LOBE_SMOOTH), f_select(reflects, f_set(1), eta_it)};
+    wo = v3_select(rim, rim_direction(wi, e, u2.x), wo);
+    Float onward = f_select(rim, e, f_select(reflects, f_set(1), eta_it));
+    return (BsdfSample){wo, i_select(rim, i_set(LOBE_RIM), i_set(LOBE_SMOOTH)), onward};
 }
 
 // Adjoints of what eval and pdf share.
@@ -124,9 +132,23 @@ KFN void roughdielectric_terms_adj(const RoughDielectricTerms *t, Vec3 wi, Vec3 
     dp->eta = dp->eta + f_zero_unless(t->counts, f_select(m_gt(wi.z, f_set(0)), de, -de * t->e * t->e));
 }
 
+// Adjoint on the rim.
+KFN void roughdielectric_rim_adj(const RoughDielectric *p, const Microfacet *mf, Vec3 wi, Vec3 wo, Spec df, RoughDielectric *dp,
+                                 Vec3 *dwi, Vec3 *dwo) {
+    Mask front = m_gt(wi.z, f_set(0));
+    Float eta = roughdielectric_eta(p), e = f_select(front, eta, 1.0f / eta);
+    // f = colour f_+ H(s g), e = eta, or 1 / eta from inside
+    Float de = rim_adj(wi, wo, e, spec_dot(df, p->specular_transmittance) * rim_value(mf, wi, wo, eta, e), dwi, dwo);
+    dp->eta = dp->eta + f_select(front, de, -de * e * e);
+}
+
 KFN void roughdielectric_adj(const RoughDielectric *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, RoughDielectric *dp,
                              Vec3 *dwi, Vec3 *dwo) {
     Microfacet mf = roughdielectric_facets(p);
+    Mask rim = mi_eq(lobe, i_set(LOBE_RIM));
+    if (m_any(rim)) {
+        roughdielectric_rim_adj(p, &mf, wi, wo, spec_zero_unless(rim, df), dp, dwi, dwo);
+    }
     RoughDielectricTerms t = roughdielectric_terms(p, wi, wo, lobe);
     Float d = microfacet_D(&mf, t.m), gi = smith_G1(&mf, wi, t.m), go = smith_G1(&mf, wo, t.m);
     Float rcp_ci = f_safe_rcp(wi.z);

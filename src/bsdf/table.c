@@ -60,6 +60,21 @@ bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
 bool rey_bsdf_tints(int kind) { return kind == BSDF_THINDIELECTRIC; }
 
+// Whether a number is 0 everywhere.
+static bool is_none(const SceneView *view, int32_t texture) {
+    const TextureNode *t = texture >= 0 ? view->textures + texture : NULL;
+    return t && t->kind == TEXTURE_CONSTANT && view->theta[t->theta] == 0;
+}
+
+bool rey_bsdf_ends(const SceneView *view, const BsdfNode *node) {
+    const BsdfKind *kind = rey_bsdf_kinds + node->kind;
+    bool ends = node->kind == BSDF_ROUGHDIELECTRIC && node->config[0] == 1;
+    for (int k = 0; k < kind->param_count && node->kind == BSDF_PRINCIPLED; k++) {
+        ends |= strcmp(kind->params[k].name, "spec_trans") == 0 && !is_none(view, node->slot[k]);
+    }
+    return ends;
+}
+
 bool rey_bsdf_turns(int kind) { return kind == BSDF_NORMALMAP || kind == BSDF_BUMPMAP; }
 
 // Of TURNED_CONFIG the second switch.
@@ -71,9 +86,8 @@ bool rey_bsdf_oriented(const SceneView *view, const BsdfNode *node) {
     for (int k = 0; k < kind->param_count; k++) {
         const ParamDesc *p = kind->params + k;
         const TextureNode *t = node->slot[k] >= 0 ? view->textures + node->slot[k] : NULL;
-        bool none = t && t->kind == TEXTURE_CONSTANT && view->theta[t->theta] == 0;
         oriented |= p->type == PARAM_ALPHA_V && node->slot[k] != node->slot[k - 1]; // "alpha" fills both
-        oriented |= t && !none && strcmp(p->name, "anisotropic") == 0;
+        oriented |= t && !is_none(view, node->slot[k]) && strcmp(p->name, "anisotropic") == 0;
     }
     return oriented;
 }

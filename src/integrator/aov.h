@@ -47,7 +47,7 @@ KFN void aov_store_2(Tracer *t, int32_t row, Int slot, Vec2 v, Mask m) {
 }
 
 KFN Vec3 aov_albedo(const Tracer *t, const Group *group, const Vertex *v, const Interaction *si) {
-    BsdfCall call = {t->scene, group->bsdf, texcoord(si->uv, &v->hit), 0, NULL, NULL};
+    BsdfCall call = bsdf_call(t->scene, group->bsdf, texcoord(si->uv, &v->hit), 0);
     BsdfSurface surface;
     Vec3 dp_dv;
     if (t->scene->bsdfs[group->bsdf].surface) {

@@ -203,7 +203,7 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     Paths *next = &t->ws.paths[1 - t->current];
     Vec3 o = interaction_offset(&at->si, w.d);
     if (t->scene->has_media) {
-        Mask passed = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+        Mask passed = lobe_is(w.sample.lobe, LOBE_NULL);
         o = v3_select(passed, interaction_behind(&at->si, w.d), o);
         Int medium = medium_behind(at->group, at->si.ng, w.d, at->v.medium), through = medium;
         through = medium_passed(t, at->group, &at->si, &at->v.hit, w.d, at->v.medium, m & passed);
@@ -221,7 +221,7 @@ KFN void landing_look(const Tracer *t, const Group *group, Landing *at) {
     at->si = shape_interaction(scene, group->shape_kind, group->shape_flags, &at->v.hit);
     at->wl = frame_to_local(&at->si.sh, v3_neg(at->v.d));
     at->cosine = f_abs(v3_dot(at->si.ng, at->v.d));
-    at->call = (BsdfCall){scene, group->bsdf, texcoord(at->si.uv, &at->v.hit), t->floor, NULL, NULL};
+    at->call = bsdf_call(scene, group->bsdf, texcoord(at->si.uv, &at->v.hit), t->floor);
     if (scene->bsdfs[group->bsdf].surface) {
         find_surface(scene, group, &at->v.hit, &at->surface, &at->dp_dv);
         at->call.surface = &at->surface;

@@ -122,7 +122,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         w.m = w.m & split.scatter;
     }
     w.eta2 = real_gather(p->eta2, v->at) * w.sample.eta * w.sample.eta;
-    w.passed = m_set(scene->through) & mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+    w.passed = m_set(scene->through) & lobe_is(w.sample.lobe, LOBE_NULL);
     w.depth = v->depth + i_select(w.passed, i_set(0), i_set(1));
     if (scene->through && scene->max_depth >= 0) {
         w.m = w.m & mi_lt(w.depth, i_set(scene->max_depth));
@@ -140,7 +140,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     }
     append_paths(t, v, si->p, o, &w, medium, next_count);
     if (keeps_coverage(t)) {
-        Mask passes = mi_eq(w.sample.lobe & 3, i_set(LOBE_NULL));
+        Mask passes = lobe_is(w.sample.lobe, LOBE_NULL);
         cover(t, v->slot, scene->solid ? v->m : v->m & ~passes);
     }
     if (record >= 0) {
@@ -218,7 +218,8 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         return next_count;
     }
     SampleKey key = slot_key(t, v.slot);
-    BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor, NULL, NULL};
+    BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &v.hit), t->floor);
+    call.rim = t->floor;
     BsdfSurface surface;
     Vec3 dp_dv;
     if (scene->bsdfs[group->bsdf].surface) {

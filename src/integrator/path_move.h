@@ -180,7 +180,7 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     const Workspace *ws = &t->ws;
     const Records *r = &ws->records;
     Int next = i_gather(ws->next, s->slot);
-    Mask spread = s->scattered & mi_eq(s->lobe, i_set(LOBE_SMOOTH)), attached = spread & mi_lt(i_set(-1), next);
+    Mask spread = s->scattered & lobe_spreads(s->lobe), attached = spread & mi_lt(i_set(-1), next);
     // A chain that begins here, or a ray to a collision, moves with this vertex, in its fixed direction.
     Vec3 drag = v3_select(spread, rows_gather(&ws->drag, channel, s->slot), v3_zero());
     if (!m_any(attached)) {
@@ -238,7 +238,7 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, Spec
     const Workspace *ws = &t->ws;
     SurfaceSweep chain = *s;
     chain.m = s->scattered & s->chained;
-    Mask passes = chain.m & mi_eq(s->lobe & 3, i_set(LOBE_NULL)), turns = chain.m & ~passes;
+    Mask passes = chain.m & lobe_is(s->lobe, LOBE_NULL), turns = chain.m & ~passes;
     Vec3 drag = rows_gather(&ws->drag, channel, s->slot), turn = rows_gather(&ws->turn, channel, s->slot);
     // The ray's position at the next vertex is p + distance d'; behind an environment there is none.
     Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, s->slot);

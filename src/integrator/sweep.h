@@ -52,7 +52,7 @@ typedef struct SurfaceSweep {
 // Lanes whose path goes on along a direction that follows from how it came. Where shadow rays pass surfaces, so does
 // the segment between two vertices that scatter.
 KFN Mask chain_lanes(const Tracer *t, Int lobe, Mask slides) {
-    return lobe_turns(lobe) | (mi_eq(lobe & 3, i_set(LOBE_NULL)) & (slides | m_set(!t->scene->through)));
+    return lobe_turns(lobe) | (lobe_is(lobe, LOBE_NULL) & (slides | m_set(!t->scene->through)));
 }
 
 KFN Hit surface_hit(const Records *r, int32_t at) {
@@ -109,7 +109,7 @@ KFN void surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec 
         s->wl = frame_to_local(&s->si.sh, s->light_d);
         s->wo = frame_to_local(&s->si.sh, s->wo_d);
     }
-    s->call = (BsdfCall){t->scene, s->group->bsdf, texcoord(s->si.uv, NULL), t->floor, NULL, NULL};
+    s->call = bsdf_call(t->scene, s->group->bsdf, texcoord(s->si.uv, NULL), t->floor);
     s->emitter = s->group->emitter >= 0 ? t->scene->emitters + s->group->emitter : NULL;
 }
 

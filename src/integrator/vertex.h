@@ -218,7 +218,8 @@ KFN void onward_weigh(const Tracer *t, const Vertex *v, Onward *w) {
     if (t->derivative) {
         // Paths of zero throughput go on: the derivative at the vertex that stopped them needs what lies behind it.
         Float before = real_gather(t->ws.paths[t->current].roulette, v->at);
-        w->roulette = before * f_max(spec_max(weight), f_set(DERIVATIVE_FLOOR));
+        Float worth = f_select(lobe_is(w->sample.lobe, LOBE_RIM), f_set(1), spec_max(weight));
+        w->roulette = before * f_max(worth, f_set(DERIVATIVE_FLOOR));
         w->m = v->live ? w->m : w->m & m_gt(spec_max(weight), f_set(0));
     } else {
         w->m = w->m & m_gt(w->roulette, f_set(0));
@@ -249,7 +250,7 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
     Vec3 origin = p;
     Float density = f_select(mi_eq(w->sample.lobe, i_set(LOBE_SMOOTH)), w->pdf, f_set(PDF_DELTA));
     if (t->scene->hide_emitters && !t->scene->solid) {
-        Mask absent = mi_eq(w->sample.lobe & 3, i_set(LOBE_NULL)) & m_le(v->pdf, f_set(PDF_VIEWED));
+        Mask absent = lobe_is(w->sample.lobe, LOBE_NULL) & m_le(v->pdf, f_set(PDF_VIEWED));
         density = f_select(absent, f_set(PDF_VIEWED), density);
     }
     if (t->scene->through) {

@@ -85,7 +85,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         }
         Hit safe = walk_hit(hit, mine);
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
-        BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &safe), t->floor, NULL, NULL};
+        BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &safe), t->floor);
         Vec3 wo = frame_to_local(&si.sh, d);
         pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
         *o = v3_select(mine, medium ? interaction_behind(&si, d) : interaction_offset(&si, d), *o);

@@ -27,7 +27,7 @@ static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *
             }
             Hit hit = walk_hit(&walk->hit[i], mine);
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &hit);
-            BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &hit), t->floor, NULL, NULL};
+            BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &hit), t->floor);
             Vec3 wo = frame_to_local(&si.sh, walk->d), dwi = v3_zero(), dwo = v3_zero(), unused = v3_zero();
             Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
             bsdf_adj(&call, v3_neg(wo), wo, i_set(LOBE_NULL), spec_zero_unless(mine, dpass), sink, mine, &dwi, &dwo,

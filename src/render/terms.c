@@ -9,6 +9,7 @@
 #include "render/edge_on.h"
 #include "render/motion.h"
 #include "render/particles.h"
+#include "render/rims.h"
 #include "scene/sink.h"
 
 #include <stdio.h>
@@ -229,6 +230,15 @@ static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const
                : REY_OK;
 }
 
+static rey_result check_rims(rey_scene *scene, const Param *p) {
+    char object[OBJECT_NAME];
+    const char *gap = rey_rims_gap(scene, p, object);
+    return gap ? rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                          "the gradient of %s lacks a part of the term 'interior': the refraction of '%s' ends abruptly where its "
+                          "facets are seen edge-on, and %s. --terms interior gives the part that exists", p->name, object, gap)
+               : REY_OK;
+}
+
 // Terms that are asked for by name must exist.
 static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int chains, rey_selection selection) {
     int wrong = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains), bit = wrong & -wrong;
@@ -294,6 +304,10 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
         }
         result = check_edge_on(scene, scene->view.sensors + def->sensor, p);
+        if (result != REY_OK) {
+            return result;
+        }
+        result = def->terms ? REY_OK : check_rims(scene, p);
         if (result != REY_OK) {
             return result;
         }

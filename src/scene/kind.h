@@ -10,8 +10,8 @@
 #include "scene/scene.h"
 
 // Which part of a function a direction belongs to. Values of delta lobes are coefficients of the delta, their
-// densities discrete probabilities.
-enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL };
+// densities discrete probabilities. Along LOBE_RIM a smooth value jumps (bsdf/rim.h).
+enum { LOBE_SMOOTH, LOBE_REFLECT, LOBE_TRANSMIT, LOBE_NULL, LOBE_RIM };
 
 typedef enum ParamType {
     PARAM_SPEC,      // colour texture

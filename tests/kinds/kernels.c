@@ -120,7 +120,8 @@ static void run_eval(const KindCase *c, int n, const Query *q, double (*f)[3], d
         GATHER(uv.y, q[AT(lane)].uv[1]);
         Int lobe = gather_lobe(q, first, n);
         BsdfSurface surface = surface_make(c);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
+        BsdfCall call = bsdf_call(&view.scene, c->root, texcoord(uv, NULL), (real)c->floor);
+        call.surface = &surface;
         Spec value = bsdf_eval(&call, wi, wo, lobe);
         Float density = pdf ? bsdf_pdf(&call, wi, wo, lobe) : f_set(0);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
@@ -146,7 +147,8 @@ static void run_sample(const KindCase *c, int n, Draw *d) {
         GATHER(u2.x, d[AT(lane)].u2[0]);
         GATHER(u2.y, d[AT(lane)].u2[1]);
         BsdfSurface surface = surface_make(c);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
+        BsdfCall call = bsdf_call(&view.scene, c->root, texcoord(uv, NULL), (real)c->floor);
+        call.surface = &surface;
         BsdfSample s = bsdf_sample(&call, wi, u1, u2);
         for (int lane = 0; lane < LANES && first + lane < n; lane++) {
             Draw *to = d + first + lane;
@@ -178,7 +180,8 @@ static void run_adj(const KindCase *c, int n, const Query *q, Adjoint *a, double
         GATHER(uv.x, q[AT(lane)].uv[0]);
         GATHER(uv.y, q[AT(lane)].uv[1]);
         BsdfSurface surface = surface_make(c);
-        BsdfCall call = {&view.scene, c->root, texcoord(uv, NULL), (real)c->floor, &surface, NULL};
+        BsdfCall call = bsdf_call(&view.scene, c->root, texcoord(uv, NULL), (real)c->floor);
+        call.surface = &surface;
         Mask m = m_first_n(n - first);
         BsdfSurface ds = {f_set(0), f_set(0), f_set(0), v3_zero()};
         call.dsurface = &ds;

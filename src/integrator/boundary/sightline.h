@@ -40,7 +40,7 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         const Group *group = scene->groups + id;
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         Vec3 wi = frame_to_local(&si.sh, v3_neg(s->d[i])), dp_dv;
-        BsdfCall call = {scene, group->bsdf, texcoord(si.uv, &h), t->floor, NULL, NULL};
+        BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &h), t->floor);
         s->uv[i].x = f_select(mine, si.uv.x, s->uv[i].x);
         s->uv[i].y = f_select(mine, si.uv.y, s->uv[i].y);
         BsdfSurface surface;

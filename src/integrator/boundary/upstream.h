@@ -145,7 +145,7 @@ static Carried rays_turn_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 wo, I
         s.d = d;
         s.wi = frame_to_local(&s.si.sh, v3_neg(d));
         s.wo = frame_to_local(&s.si.sh, wo);
-        s.call = (BsdfCall){scene, s.group->bsdf, texcoord(s.si.uv, &s.hit), t->floor, NULL, NULL};
+        s.call = bsdf_call(scene, s.group->bsdf, texcoord(s.si.uv, &s.hit), t->floor);
         VertexAdj v;
         vertex_adj_clear(&v, true);
         if (scene->bsdfs[s.group->bsdf].surface) {
