@@ -92,6 +92,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     call.dsurface = call.surface && (sink->any_normals || sink->any_motion) ? &d.surface : NULL;
     bool uv_moves = vertex_uv_moves(s, sink);
     sink->at = uv_moves ? &d.at : NULL;
+    sink->point = sink->any_motion ? &d.point : NULL;
     if ((live & LIVE_EMISSION) || (uv_moves && s->emitter)) {
         // L += w_e Le
         LightMove seen = light_move_zero();
@@ -119,6 +120,7 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
         }
     }
     sink->at = NULL;
+    sink->point = NULL;
     if (sink->any_motion) {
         d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
         d.p = s->corner ? corner_move_adj(t, s, weight, sink) : s->dp;

@@ -21,6 +21,7 @@
 // what light samples and the rest of the path contribute; p: of its position, beside what these ask for.
 typedef struct VertexAdj {
     Vec3 p, wi, wo;
+    Vec3 point; // where volumes are read
     LightMove light;
     Frame frame;
     BsdfSurface surface;
@@ -217,7 +218,7 @@ static NOINLINE void vertex_place_adj(const Tracer *t, const SurfaceSweep *s, Ve
     }
     d.uv = v->uv;
     d.at = v->at;
-    d.p = dp;
+    d.p = v3_add(dp, v->point);
     if (m_any(slides)) {
         Slide slide[2];
         shape_slide(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit, &s->si, slide);
@@ -253,8 +254,10 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, Spec
     frame_to_world_adj(s->wo, sampled, &d.frame);
     Spec df = spec_zero_unless(chain.m, spec_scale(spec_mul(weight, s->suffix), s->scatter_weight));
     sink->at = &d.at;
+    sink->point = &d.point;
     bsdf_adj(&own, s->wi, s->wo, s->lobe, df, sink, chain.m, &d.wi, &dwo, &d.uv);
     sink->at = NULL;
+    sink->point = NULL;
     // A ray that passes stays the same line.
     v3_acc(&carried->drag, v3_select(passes, drag, v3_zero()));
     v3_acc(&carried->turn, v3_select(passes, dd, v3_zero()));

@@ -22,7 +22,7 @@ enum { BOUNDARY_SHARDS = 8, LEAST_SAMPLES = 1024 };
 // object: the one of the scene that it is about, null = none.
 static rey_result refuse(rey_scene *scene, int term, const char *what, const char *object) {
     return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the term '%s' does not know %s%s%s%s. --terms interior gives the part without", rey_term_name(term), what,
+                    "the term '%s' does not know %s%s%s%s. --terms interior gives the rest", rey_term_name(term), what,
                     object ? " ('" : "", object ? object : "", object ? "')" : "");
 }
 

@@ -177,16 +177,28 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     return NULL;
 }
 
-// Whether points of surfaces look up volumes: where points move, so does what they find.
-static bool surfaces_read_volumes(const SceneView *view) {
-    for (int64_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
+static bool reads_jumps(const SceneView *view, int32_t texture) {
+    if (texture < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + texture;
+    return (t->kind == TEXTURE_VOLUME && jumps(view->volumes + t->volume)) || reads_jumps(view, t->child[0]) ||
+           reads_jumps(view, t->child[1]);
+}
+
+// What is not known of points that move where surfaces have volumes as textures, null where all is.
+static const char *gap_of_lookups(const SceneView *view) {
+    for (int32_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
         for (int k = 0; k < MAX_SLOTS; k++) {
-            if (is_volume(view, view->bsdfs[i].slot[k])) {
-                return true;
+            if (reads_jumps(view, view->bsdfs[i].slot[k])) {
+                return "surfaces have volumes of filter_type=\"nearest\" as textures, and points that move pass jumps from voxel to voxel";
+            }
+            if (is_volume(view, view->bsdfs[i].slot[k]) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
+                return "surfaces that let a part of the light pass have volumes as textures, which rays that move pass elsewhere";
             }
         }
     }
-    return false;
+    return NULL;
 }
 
 // What the score function cannot do for a parameter's derivative, null where it can (REY_ESTIMATOR_SCORE).
@@ -268,7 +280,7 @@ static const char *gap_of_index(const SceneView *view, const Param *p) {
 }
 
 // What is not known of a parameter's derivative whatever terms are asked for, null where there is no such thing.
-static const char *find_gap(const SceneView *view, const rey_render_def *def, const Param *p, int terms, bool volumes) {
+static const char *find_gap(const SceneView *view, const rey_render_def *def, const Param *p, int terms, const char *lookups) {
     const char *gap = rey_dropped_gap(view, p, terms);
     if (gap) {
         return gap;
@@ -278,8 +290,7 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
     gap = gap ? gap : gap_in_media(view, p);
     bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                   (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));
-    bool elsewhere = volumes && points && !rey_moves_border(view, p);
-    return gap || !elsewhere ? gap : "surfaces have volumes as textures, which points that move look up elsewhere";
+    return gap || !points || rey_moves_border(view, p) ? gap : lookups;
 }
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
@@ -288,7 +299,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         return rey_fail(scene->ctx, REY_ERROR_ARGUMENT, "estimator = %d is none of REY_ESTIMATOR_*", def->estimator);
     }
     const int chains = rey_chains_known(&scene->view, scene->view.sensors + def->sensor) ? REY_TERM_SPECULAR : 0;
-    const bool volumes = surfaces_read_volumes(&scene->view);
+    const char *lookups = gap_of_lookups(&scene->view);
     for (int i = 0; i < selection.count; i++) {
         rey_param_info info;
         rey_result result = rey_param_get_info(scene, selection.params[i], &info);
@@ -299,7 +310,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
-        const char *gap = find_gap(&scene->view, def, p, info.terms, volumes);
+        const char *gap = find_gap(&scene->view, def, p, info.terms, lookups);
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
         }

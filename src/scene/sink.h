@@ -31,6 +31,7 @@ typedef struct Sink {
     bool any_sky;      // the density of the environment is asked for, which depends on
     int32_t sky_at;    // the logarithm of the sum of its table: kept here (emitter/envmap.h)
     Vec2 *at;          // gathers the adjoint of the barycentrics at which attributes are read; null = not asked for
+    Vec3 *point;       // the same of the points of the world at which textures read volumes
     bool watch_turned; // see PathJob
     int32_t faces;     // FACES_ bits
     Float derivative;          // forward: accumulates

@@ -194,7 +194,7 @@ KFN Spec luminance_adj(Float d) {
     return s;
 }
 
-// A field over space, looked up where the hit is; 0 where there is none. The point counts as fixed.
+// A field over space, looked up where the hit is; 0 where there is none.
 KFN Spec volume_texture_eval(const SceneView *scene, const TextureNode *t, const Hit *hit) {
     const VolumeNode *v = scene->volumes + t->volume;
     return hit ? volume_eval(scene, v, volume_to_local(scene, v, hit->p, 1)) : spec_zero();
@@ -204,6 +204,9 @@ KFN void volume_texture_adj(const SceneView *scene, int32_t id, const Hit *hit, 
     const VolumeNode *v = scene->volumes + scene->textures[id].volume;
     if (hit) {
         volume_world_adj(scene, v, hit->p, d, sink, m);
+    }
+    if (hit && sink->point && v->kind == VOLUME_GRID) {
+        v3_acc(sink->point, v3_select(m, volume_slope(scene, v, hit->p, d), v3_zero()));
     }
 }
 
@@ -265,7 +268,7 @@ KFN Float texture_eval_real(const SceneView *scene, int32_t id, TexCoord uv) {
 KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
     const TextureNode *t = scene->textures + id;
     return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD ||
-           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY || (t->kind == TEXTURE_VOLUME && sink->any_volumes);
+           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY || (t->kind == TEXTURE_VOLUME && (sink->any_volumes || sink->point));
 }
 
 KFN void blackbody_adj(const SceneView *scene, const TextureNode *t, Spec d, Sink *sink, Mask m) {

@@ -34,6 +34,8 @@ static const Motion motions[] = {
     {"boundary_bulb.xml", "camera.to_world", SHIFT, {0, 0.5f, 1}, 0.02, 1},
     {"boundary_sky.xml", "card.to_world", SHIFT, {1, 0, 0.5f}, 0.03, 4},
     {"boundary_sky.xml", "camera.to_world", SHIFT, {1, 0, 0}, 0.02, 1},
+    {"boundary_solid.xml", "ball.to_world", SHIFT, {1, 0.2f, -0.3f}, 0.03, 20},
+    {"boundary_solid.xml", "camera.to_world", SHIFT, {1, 0, 0.4f}, 0.02, 1},
     {"boundary_near.xml", "ball.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.02, 1},
     {"boundary_plan.xml", "tube.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1},
     {"boundary_plan.xml", "ball.to_world", GROW, {0.8f, -0.3f, 0.3f}, 0.02, 1},
@@ -226,9 +228,7 @@ static const Motion motions[] = {
 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }
-
-// Surfaces that move in media.
-static bool is_ride(const Motion *m) { return begins_with(m->room, "ride_"); }
+static bool is_ride(const Motion *m) { return begins_with(m->room, "ride_"); } // surfaces that move in media
 
 static void blocks_of(const float *image, double *blocks) {
     enum { WIDTH = SIZE / ACROSS };
