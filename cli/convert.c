@@ -2,6 +2,7 @@
 #include "cli.h"
 
 #include "io/file.h"
+#include "io/save.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -43,7 +44,7 @@ int cli_convert(int argc, char **argv) {
     }
     status = cli_session_open(&options, "convert", &session);
     if (!status) {
-        rey_result result = rey_scene_save(session.scene, options.files[1]);
+        rey_result result = rey_mitsuba_save_anew(session.scene, options.files[1]);
         if (result) {
             status = cli_report_failure(&options, session.ctx, result);
         } else if (options.json) {

@@ -7,6 +7,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 static rey_result write_node(Writer *w, int depth, const rey_xml_node *node, const char *slot);
 
@@ -123,11 +124,7 @@ static rey_result write_all(Writer *w, const char *path) {
     return w->failed ? REY_ERROR_MEMORY : rey_file_write(w->ctx, path, w->text.data, w->text.count);
 }
 
-rey_result rey_mitsuba_save(const rey_scene *scene, const char *path) {
-    return rey_mitsuba_save_parts(scene, path, (SavedParts){0});
-}
-
-rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, SavedParts parts) {
+static rey_result save(const rey_scene *scene, const char *path, SavedParts parts, bool keeps_files) {
     char folder[3800], stem[1000];
     const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
     const char *dot = strrchr(file, '.');
@@ -135,6 +132,7 @@ rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, Save
     snprintf(folder, sizeof folder, "%.*s%s", (int)(file - path), path, stem);
     Writer w = {.ctx = scene->ctx, .scene = scene, .source = scene->document, .folder = folder, .folder_name = stem};
     w.parts = parts;
+    w.keeps_files = keeps_files;
     rey_result result = write_all(&w, path);
     rey_save_free_files(&w);
     rey_array_free(w.ctx, &w.edits);
@@ -144,4 +142,16 @@ rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, Save
     rey_names_free(w.ctx, &w.paths);
     rey_array_free(w.ctx, &w.text);
     return result;
+}
+
+rey_result rey_mitsuba_save(const rey_scene *scene, const char *path) {
+    return save(scene, path, (SavedParts){0}, false);
+}
+
+rey_result rey_mitsuba_save_anew(const rey_scene *scene, const char *path) {
+    return save(scene, path, (SavedParts){0}, access(path, F_OK) != 0);
+}
+
+rey_result rey_mitsuba_save_parts(const rey_scene *scene, const char *path, SavedParts parts) {
+    return save(scene, path, parts, false);
 }

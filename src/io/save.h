@@ -6,6 +6,9 @@
 
 // Writes the scene with its current values to path, and its data files into a folder beside it.
 rey_result rey_mitsuba_save(const rey_scene *scene, const char *path);
+// The same, for a path that a user names: where there is no file yet, what lies in the folder beside it is somebody else's, and a
+// file of it that would be replaced is an error.
+rey_result rey_mitsuba_save_anew(const rey_scene *scene, const char *path);
 
 // A mesh that takes the place of a shape's, whose positions have been set; it has positions and faces alone.
 typedef struct SavedMesh {

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 static const char *file_name(const char *path) {
     const char *slash = strrchr(path, '/');
@@ -90,7 +91,17 @@ static rey_result list_file(Writer *w, const rey_xml_node *node) {
     return REY_OK;
 }
 
+// The path of a data file of this name; what is not the scene's to replace is left alone.
+static rey_result data_path(Writer *w, const char *name, char path[4096]) {
+    snprintf(path, 4096, "%s/%s", w->folder, name);
+    return !w->keeps_files || access(path, F_OK) != 0
+               ? REY_OK
+               : rey_fail(w->ctx, REY_ERROR_IO, "%s is there and would be replaced, and no scene that it belongs to: name "
+                          "another file for the scene, or move what lies in %s", path, w->folder);
+}
+
 rey_result rey_save_list_files(Writer *w) {
+    char path[4096];
     for (int i = 0; i < rey_xml_node_count(w->source->document); i++) {
         TRY(list_file(w, rey_xml_node_at(w->source->document, i)));
     }
@@ -98,7 +109,7 @@ rey_result rey_save_list_files(Writer *w) {
         DataFile *file = &ARRAY_AT(w->files, DataFile, i);
         if (!file->name) {
             file->name = free_name(w, file_name(file->source));
-            TRY(file->name ? REY_OK : REY_ERROR_MEMORY);
+            TRY(file->name ? data_path(w, file->name, path) : REY_ERROR_MEMORY);
         }
     }
     return REY_OK;
@@ -122,7 +133,7 @@ rey_result rey_save_copy_files(Writer *w) {
             continue;
         }
         TRY(make_folder(w));
-        snprintf(path, sizeof path, "%s/%s", w->folder, file->name);
+        TRY(data_path(w, file->name, path));
         rey_result result = rey_file_read(w->ctx, file->source, &bytes, &size);
         if (result == REY_OK) {
             result = rey_file_write(w->ctx, path, bytes, size);
@@ -149,7 +160,7 @@ rey_result rey_save_new_file(Writer *w, int depth, const char *kind, const char 
         snprintf(name, sizeof name, "%s_%d%s", kind, w->number++, ending);
     } while (is_taken(w, name));
     TRY(make_folder(w));
-    snprintf(path, 4096, "%s/%s", w->folder, name);
+    TRY(data_path(w, name, path));
     snprintf(full, sizeof full, "%s/%s", w->folder_name, name);
     rey_save_value(w, depth, "string", "filename", full);
     return REY_OK;

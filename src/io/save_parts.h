@@ -45,6 +45,7 @@ typedef struct Writer {
     Names paths;             // of nodes, by number
     int number;              // running number of the files that are written anew
     bool folder_made;
+    bool keeps_files;        // what lies in the folder is not to be replaced
     uint8_t *declared;       // per node: the file holds it where it was declared, or where it was first referred to
     bool failed;             // out of memory while writing text
 } Writer;
@@ -64,7 +65,8 @@ void rey_save_open(Writer *w, int depth, const rey_xml_node *node, const char *t
 
 // ---- data files (save_files.c) -----------------------------------------------------------------------------------
 
-// Lists the files that nodes name and no edit replaces, and gives each a name of its own in the folder.
+// Lists the files that nodes name and no edit replaces, and gives each a name of its own in the folder, where there may be none
+// of this name that is to be kept.
 rey_result rey_save_list_files(Writer *w);
 rey_result rey_save_copy_files(Writer *w);
 const char *rey_save_data_name(const Writer *w, const rey_xml_node *node); // null when the node names none

@@ -28,6 +28,25 @@ static void failures_of_convert(void **state) {
     assert_non_null(strstr(f->words, "no/such/folder.xml"));
 }
 
+// What lies in OUT_data without an OUT.xml is somebody else's; with one, it is what an earlier conversion wrote.
+static void files_of_others_are_kept(void **state) {
+    Fixture *f = *state;
+    expect(f, 0, "render %s --spp 1 -o tex.png");
+    write_words("painted.xml", "<scene version='3.0.0'><shape type='sphere'><bsdf type='diffuse'><texture type='bitmap' "
+                               "name='reflectance'><string name='filename' value='tex.png'/></texture></bsdf></shape></scene>");
+    assert_int_equal(system("mkdir k_data"), 0);
+    write_words("k_data/tex.png", "mine");
+    write_words("k_data/notes.txt", "mine, too");
+    expect_said(f, 1, "convert painted.xml k.xml", "k_data/tex.png is there");
+    assert_int_equal(system("grep -q mine k_data/tex.png && [ ! -e k.xml ]"), 0);
+    assert_int_equal(system("mv k_data/tex.png mine.png"), 0);
+    expect(f, 0, "convert painted.xml k.xml");
+    assert_int_equal(system("cmp -s tex.png k_data/tex.png"), 0);
+    write_words("k_data/tex.png", "old");
+    expect(f, 0, "convert painted.xml k.xml");
+    assert_int_equal(system("cmp -s tex.png k_data/tex.png && grep -q mine k_data/notes.txt"), 0);
+}
+
 static const char *const broken_scene =
     "<scene version='3.0.0'><integrator type='stokes'/><sensor type='perspective'><film type='hdrfilm'>"
     "<integer name='width' value='8'/><integer name='height' value='8'/></film><float name='zoom' value='2'/></sensor>"
@@ -78,6 +97,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(converted_scenes_render_the_same_bits),
         cmocka_unit_test(failures_of_convert),
+        cmocka_unit_test(files_of_others_are_kept),
         cmocka_unit_test(lenient_reading_lists_what_it_leaves_out),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
