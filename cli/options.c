@@ -150,6 +150,19 @@ static bool parse_set(Options *o, const char *value) {
     return true;
 }
 
+static bool parse_output(Options *o, const char *value) {
+    if (*value == '=') {
+        cli_usage_error(o, "-o%s: a name follows without '='", value);
+        return false;
+    }
+    if (o->output) {
+        cli_usage_error(o, "-o is given twice, with '%s' and '%s'", o->output, value);
+        return false;
+    }
+    o->output = value;
+    return true;
+}
+
 static bool parse_step(Options *o, const char *value) {
     char *end;
     o->step = strtod(value, &end);
@@ -202,11 +215,7 @@ static bool apply_option(Options *o, const OptionRow *row, const char *value) {
     bool known;
     switch (row->id) {
     case OPTION_OUTPUT:
-        o->output = value;
-        if (*value == '=') {
-            cli_usage_error(o, "-o%s: a name follows without '='", value);
-        }
-        return *value != '=';
+        return parse_output(o, value);
     case OPTION_SPP:
         return parse_count(o, "--spp", value, 1, MOST_SPP, &o->spp);
     case OPTION_SEED:

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
 static bool is_nonfinite(const char *text) {
     char *end;
@@ -30,6 +31,12 @@ static bool is_scene_name(const char *path) {
     return length > 4 && !strcasecmp(path + length - 4, ".xml");
 }
 
+// Whether a file that the subcommand reads is called "-".
+static bool reads_dash(const Options *o) {
+    bool second = o->command == COMMAND_COMPARE && o->file_count > 1;
+    return o->file_count > 0 && (!strcmp(o->files[0], "-") || (second && !strcmp(o->files[1], "-")));
+}
+
 // A name that -D gives twice, null when there is none.
 static const char *defined_twice(const Options *o) {
     for (int i = 0; i < o->define_count; i++) {
@@ -49,6 +56,10 @@ bool cli_options_required(const Options *o) {
         cli_usage_error(o, "-o: the name is empty");
     } else if (o->file_count < needed[c]) {
         cli_usage_error(o, "%s", missing_file(c, o->file_count));
+    } else if (reads_dash(o)) {
+        cli_usage_error(o, "'-': %s are read from files; standard input is /dev/stdin%s",
+                        c == COMMAND_COMPARE ? "pictures" : c == COMMAND_FIT ? "jobs" : "scenes",
+                        c == COMMAND_COMPARE ? "" : ", and paths inside it must then be absolute");
     } else if (o->all && o->param_count) {
         cli_usage_error(o, "--all and --param: give one of them");
     } else if ((c == COMMAND_GRAD || c == COMMAND_CHECK) && !o->param_count && !o->all) {
@@ -82,6 +93,8 @@ bool cli_options_required(const Options *o) {
         cli_usage_error(o, "-o OUT is missing");
     } else if (o->json && o->output && !strcmp(o->output, "-")) {
         cli_usage_error(o, "--json and -o - both want standard output");
+    } else if (o->output && !strcmp(o->output, "-") && isatty(STDOUT_FILENO)) {
+        cli_usage_error(o, "-o -: standard output is a terminal, and EXR files are binary; send it elsewhere, as with > out.exr");
     } else {
         return true;
     }

@@ -1,5 +1,8 @@
 // test_cli_words.c: what the command says where something is wrong or cannot be had.
+#define _GNU_SOURCE // posix_openpt
 #include "command.h"
+
+#include <fcntl.h>
 
 // A job in the test's folder for the scenes of the test jobs; lines follow it.
 static void write_job(Fixture *f, const char *lines) {
@@ -161,11 +164,38 @@ static void checks_show_their_rows(void **state) {
     expect_said(f, 2, "render %s -o=a.exr", "-o=a.exr: a name follows without '='");
 }
 
+// Where a result goes is said once, and no picture is written onto a terminal.
+static void outputs_are_plain(void **state) {
+    Fixture *f = *state;
+    expect_said(f, 2, "render %s -o x.exr -o y.exr", "-o is given twice, with 'x.exr' and 'y.exr'");
+    expect_said(f, 2, "fit job.yaml -o fit -o fit", "-o is given twice");
+    int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+    if (terminal < 0 || grantpt(terminal) || unlockpt(terminal)) {
+        return; // a machine without terminals
+    }
+    char command[1024];
+    snprintf(command, sizeof command, "'%s' render '%s' --spp 1 -o - >%s 2>words.txt", REYNOLDS_COMMAND, TEST_SCENE,
+             ptsname(terminal));
+    int status = system(command);
+    close(terminal);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 2);
+    assert_int_equal(system("grep -q 'standard output is a terminal' words.txt"), 0);
+}
+
+static void standard_input_has_a_name(void **state) {
+    Fixture *f = *state;
+    expect_said(f, 2, "render - -o x.exr", "'-': scenes are read from files; standard input is /dev/stdin");
+    expect_said(f, 2, "fit -", "'-': jobs are read from files; standard input is /dev/stdin");
+    expect_said(f, 2, "compare x.exr -", "'-': pictures are read from files; standard input is /dev/stdin");
+    expect(f, 0, "params /dev/stdin <%s");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refusals_are_the_same),       cmocka_unit_test(what_may_be_needed_is_told),
         cmocka_unit_test(fits_show_what_the_job_says), cmocka_unit_test(places_of_jobs_are_told),
         cmocka_unit_test(overrides_are_told),          cmocka_unit_test(checks_show_their_rows),
+        cmocka_unit_test(outputs_are_plain),           cmocka_unit_test(standard_input_has_a_name),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
