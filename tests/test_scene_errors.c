@@ -97,6 +97,8 @@ static void neighbours_are_named(void **state) {
         {"<bsdf type='roughconductor'><float name='alpa' value='1'/></bsdf>", "did you mean 'alpha'?"},
         {"<bsdf type='conductor'><string name='material' value='Agg'/></bsdf>", "did you mean 'Ag'?"},
         {"<bsdf type='dielectric'><string name='int_ior' value='bk8'/></bsdf>", "did you mean 'bk7'?"},
+        {"<bsdf type='dielectric'><string name='int_ior' value='glas'/></bsdf>", "did you mean 'acrylic glass'?"},
+        {"<bsdf type='dielectric'><string name='ext_ior' value='carbn dioxide'/></bsdf>", "did you mean 'carbon dioxide'?"},
         {"<bsdf type='diffuse'><rgb name='reflectanse' value='0.5'/></bsdf>", "did you mean 'reflectance'?"},
         {"<bsdf type='diffuse'><texture type='checkerboard' name='reflectanse'/></bsdf>", "did you mean 'reflectance'?"},
         {"<sensor type='perspective'><float name='fow' value='1'/></sensor>", "did you mean 'fov'?"},

@@ -249,6 +249,19 @@ int rey_edit_distance(const char *a, const char *b) {
     return row[nb];
 }
 
+// Of a name of several words, "acrylic glass", one may be meant: the distance to the nearest of them, or to the whole.
+static int name_distance(const char *word, const char *name) {
+    int nearest = rey_edit_distance(word, name);
+    for (const char *at = strchr(name, ' ') ? name : NULL; at; at = strchr(at, ' ')) {
+        char part[160];
+        at += *at == ' ';
+        snprintf(part, sizeof part, "%.*s", (int)strcspn(at, " "), at);
+        int distance = rey_edit_distance(word, part);
+        nearest = distance < nearest ? distance : nearest;
+    }
+    return nearest;
+}
+
 const char *rey_nearest_word(const char *word, const char *(*next)(void *user, int i), void *user) {
     const char *nearest = NULL;
     int limit = (int)strlen(word) / 2 + 1;
@@ -257,7 +270,7 @@ const char *rey_nearest_word(const char *word, const char *(*next)(void *user, i
         if (!candidate) {
             return nearest;
         }
-        int distance = rey_edit_distance(word, candidate);
+        int distance = name_distance(word, candidate);
         if (distance < limit) {
             limit = distance;
             nearest = candidate;
