@@ -126,6 +126,7 @@ typedef struct Session {
     Progress progress;
     char **notes;       // what cli_session_note said, for --json
     int note_count;
+    bool made_folder;   // the output's, which goes again if nothing was written into it
 } Session;
 
 // Creates the context only (context_open) or the context and the scene too, after a look at whether the output can be

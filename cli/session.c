@@ -181,7 +181,7 @@ int cli_context_open(const Options *options, Session *session) {
 }
 
 // Whether what comes out can be written, before the work.
-static rey_result check_output(const Session *s) {
+static rey_result check_output(Session *s) {
     const Options *o = s->options;
     char path[4096];
     if (!o->output || !strcmp(o->output, "-")) {
@@ -190,7 +190,8 @@ static rey_result check_output(const Session *s) {
     if (!o->reverse) {
         return rey_file_check_output(s->ctx, o->output);
     }
-    if (mkdir(o->output, 0777) && errno != EEXIST) {
+    s->made_folder = mkdir(o->output, 0777) == 0;
+    if (!s->made_folder && errno != EEXIST) {
         return rey_fail(s->ctx, REY_ERROR_IO, "%s: cannot make this folder: %s", o->output, strerror(errno));
     }
     snprintf(path, sizeof path, "%s/gradient.json", o->output);
@@ -312,6 +313,9 @@ int cli_session_open(const Options *options, const char *label, Session *session
 }
 
 void cli_session_close(Session *session) {
+    if (session->made_folder) {
+        rmdir(session->options->output); // fails, as it should, where there is anything in it
+    }
     rey_scene_destroy(session->scene);
     rey_context_destroy(session->ctx);
     for (int i = 0; i < session->note_count; i++) {
@@ -322,6 +326,7 @@ void cli_session_close(Session *session) {
     session->ctx = NULL;
     session->notes = NULL;
     session->note_count = 0;
+    session->made_folder = false;
 }
 
 void cli_list_add(char *text, size_t size, int *count, const char *name) {

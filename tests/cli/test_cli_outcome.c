@@ -213,6 +213,8 @@ static void terminations_are_interruptions(void **state) {
     (void)state;
     static const char *const calls[] = {"render '" TEST_SCENE "' -o slow.exr --spp 1000000",
                                         "grad '" TEST_SCENE "' --param red.reflectance.value -o slow.exr --spp 1000000",
+                                        "grad '" TEST_SCENE "' --param red.reflectance.value --mode reverse --adjoint 1 "
+                                        "-o slow.exr.d --spp 1000000",
                                         "check '" TEST_SCENE "' --param red.reflectance.value --spp 1000000"};
     for (size_t i = 0; i < sizeof calls / sizeof *calls; i++) {
         char command[1024];
@@ -221,7 +223,7 @@ static void terminations_are_interruptions(void **state) {
         int status = system(command);
         assert_true(WIFEXITED(status));
         assert_int_equal(WEXITSTATUS(status), 130);
-        assert_int_equal(system("grep -q 'reynolds: interrupted' words.txt && [ ! -e slow.exr ]"), 0);
+        assert_int_equal(system("grep -q 'reynolds: interrupted' words.txt && [ ! -e slow.exr ] && [ ! -e slow.exr.d ]"), 0);
     }
 }
 
