@@ -396,6 +396,16 @@ static void test_truncated(void **state) {
     rey_context_destroy(ctx);
 }
 
+// What is wrong in the middle of a whole file was not cut off.
+static void test_damaged(void **state) {
+    UNUSED(state);
+    rey_context *ctx = context();
+    make_sort(0);
+    memset(file.data + file.count - 2 * (8 + 12 * W), 0xff, 8); // number and size of the line before the last
+    expect_failure(ctx, "whole.picture", &file, file.count, ": damaged: ");
+    rey_context_destroy(ctx);
+}
+
 static void test_wrong_magic(void **state) {
     UNUSED(state);
     rey_context *ctx = context();
@@ -482,6 +492,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exr_types),   cmocka_unit_test(test_png_types), cmocka_unit_test(test_jpeg_types),
         cmocka_unit_test(test_raw_types),   cmocka_unit_test(test_round_trips), cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_damaged),
         cmocka_unit_test(test_wrong_magic), cmocka_unit_test(test_huge_counts),
         cmocka_unit_test(test_exr_barely_compressible), cmocka_unit_test(test_srgb_table)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,6 +14,7 @@ typedef struct Stream {
     const char *name;
     const unsigned char *in; // reading
     size_t size;
+    bool whole;              // nothing is cut off, although something is wrong
     Array out;               // writing
     char message[256];       // of the library, "" = none yet
 } Stream;
@@ -78,6 +79,9 @@ static rey_result failed(Stream *s, exr_result_t code) {
     if (code == EXR_ERR_FEATURE_NOT_IMPLEMENTED) {
         return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED, "%s: %s; expected channels of full resolution that are compressed "
                        "by none, RLE, ZIP, PIZ, PXR24 or B44", s->name, message);
+    }
+    if (s->whole) {
+        return rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: damaged: %s; expected an OpenEXR file", s->name, message);
     }
     return s->in ? rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: broken, or cut off after %zu bytes: %s; expected a whole OpenEXR file",
                             s->name, s->size, message)
@@ -229,6 +233,20 @@ static exr_result_t read_tiles(exr_context_t file, const ChannelChoice *choice, 
     return code;
 }
 
+// Whether the first and the last chunk are there, one of which ends the file.
+static bool is_whole(exr_context_t file, exr_storage_t storage, const exr_attr_box2i_t *window) {
+    exr_chunk_info_t chunk;
+    if (storage == EXR_STORAGE_SCANLINE) {
+        return exr_read_scanline_chunk_info(file, 0, window->min.y, &chunk) == EXR_ERR_SUCCESS &&
+               exr_read_scanline_chunk_info(file, 0, window->max.y, &chunk) == EXR_ERR_SUCCESS;
+    }
+    int32_t width, height;
+    return exr_get_tile_sizes(file, 0, 0, 0, &width, &height) == EXR_ERR_SUCCESS &&
+           exr_read_tile_chunk_info(file, 0, 0, 0, 0, 0, &chunk) == EXR_ERR_SUCCESS &&
+           exr_read_tile_chunk_info(file, 0, (window->max.x - window->min.x) / width, (window->max.y - window->min.y) / height,
+                                    0, 0, &chunk) == EXR_ERR_SUCCESS;
+}
+
 static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
     const exr_attr_chlist_t *list;
     exr_attr_box2i_t window;
@@ -257,6 +275,7 @@ static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
     if (code == EXR_ERR_SUCCESS && choice.xyz) {
         xyz_to_rgb(out);
     }
+    s->whole = code != EXR_ERR_SUCCESS && is_whole(file, storage, &window);
     return code == EXR_ERR_SUCCESS ? REY_OK : failed(s, code);
 }
 
