@@ -189,7 +189,7 @@ static void patterns_choose(void **state) {
     expect_said(f, 2, "grad %s --param \"grey.*\"", "no parameter matches 'grey.*'");
     expect_said(f, 2, "check %s --param \"grey.*\"", "no parameter matches 'grey.*'");
     expect_said(f, 2, "params %s --param \"grey.*\"", "no parameter matches 'grey.*'");
-    expect_said(f, 2, "grad %s --param \"ball.*\"", "'ball.*' matches only ball.to_world, which move things");
+    expect_said(f, 2, "grad %s --param \"camera.to*\"", "'camera.to*' matches only camera.to_world, which move things");
     expect_said(f, 2, "grad %s --param \"red.*:translate=1,0,0\"", "which this operation does not fit");
     expect_said(f, 2, "params %s --param \"red.*:add=1\"", "expected a name or a pattern");
 }
@@ -252,6 +252,34 @@ static void wrong_names_are_usage_errors(void **state) {
     json_free(node);
 }
 
+static const char further_names[] =
+    "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'><integer name='width' "
+    "value='4'/><integer name='height' value='4'/></film></sensor><emitter type='constant'/>"
+    "<shape type='sphere' id='first'><bsdf type='diffuse' id='blue'/></shape><shape type='sphere' id='second'>"
+    "<bsdf type='diffuse' id='red'><rgb name='reflectance' value='0.1 0.2 0.3'/></bsdf></shape></scene>";
+
+// A pattern fits what --param takes as a name: of an object inside of another one by its id, of one that another refers to by that
+// one's. Each parameter counts once.
+static void patterns_know_further_names(void **state) {
+    Fixture *f = *state;
+    write_file("further.xml", further_names);
+    expect_said(f, 0, "params further.xml --param 'red.*'", "second.bsdf.reflectance.value");
+    assert_null(strstr(f->out, "first"));
+    JsonNode *one = run_json(f, 0, "grad further.xml --param red.reflectance.value --spp 16 --json");
+    JsonNode *all = run_json(f, 0, "grad further.xml --param 're*.reflectance.*' --spp 16 --json");
+    assert_true(json_value(one, "value", NAN) == json_value(all, "value", NAN));
+    assert_string_equal(json_get(all, "parameters")->first->text, "red.reflectance.value");
+    json_free(one);
+    json_free(all);
+    JsonNode *both = run_json(f, 0, "grad further.xml --param 'red.*' --param 'second.bsdf.*' --spp 16 --json");
+    assert_null(json_get(both, "parameters")->first->next);
+    json_free(both);
+    JsonNode *ball = run_json(f, 0, "grad %s --param 'ball.*' --spp 4 --json");
+    assert_string_equal(json_get(ball, "parameters")->first->text, "ball.bsdf.eta.value");
+    json_free(ball);
+    expect_said(f, 2, "params further.xml --param 'green.*'", "no parameter matches 'green.*'");
+}
+
 #define COLOURS "fog.interior_medium.albedo.data"
 
 static double slope_of(Fixture *f, const char *scene, const char *direction) {
@@ -312,6 +340,7 @@ int main(void) {
         cmocka_unit_test(refusals_name_objects),
         cmocka_unit_test(absent_parameters_are_explained),
         cmocka_unit_test(patterns_choose),
+        cmocka_unit_test(patterns_know_further_names),
         cmocka_unit_test(suggestions_are_listed),
         cmocka_unit_test(terms_that_do_not_exist_are_errors),
         cmocka_unit_test(wrong_names_are_usage_errors),
