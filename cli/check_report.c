@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <unistd.h>
 
+enum { DIRECTION_WIDTH = 36 }; // columns of the first column
+
 static int count_verdicts(const Check *checks, int count, Verdict verdict) {
     int n = 0;
     for (int i = 0; i < count; i++) {
@@ -14,8 +16,8 @@ static int count_verdicts(const Check *checks, int count, Verdict verdict) {
 }
 
 static void print_titles(FILE *file) {
-    fprintf(file, "%-36s %13s %9s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", "direction", "derivative", "+-", "difference", "step",
-            "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
+    fprintf(file, "%-*s %13s %9s %13s %9s %9s %8s %7s %6s %7s %9s  %s\n", DIRECTION_WIDTH, "direction", "derivative", "+-",
+            "difference", "step", "error/rms", "worst z", "block", "sum z", "fresh z", "reverse", "verdict");
 }
 
 // What rounds to 0 at `digits` has no sign.
@@ -34,15 +36,16 @@ static void print_row(FILE *file, const Check *check, const char *verdict) {
         snprintf(noise, sizeof noise, percent < 1e5 ? "%.2f%%" : "%.1e%%", percent);
     }
     snprintf(block, sizeof block, "%d,%d %c", r->worst_x, r->worst_y, "RGB"[r->worst_channel]);
-    fprintf(file, "%-36s %13.6g %9.1e %13.6g %9.2g %9s %8.2f %7s %6.2f %7s %9.1e  %s\n", check->spec, r->derivative + 0.0,
-            r->gradient_standard_error, r->difference + 0.0, check->step.h, noise,
+    fprintf(file, "%-*s %13.6g %9.1e %13.6g %9.2g %9s %8.2f %7s %6.2f %7s %9.1e  %s\n", cli_pad(check->spec, DIRECTION_WIDTH),
+            check->spec, r->derivative + 0.0, r->gradient_standard_error, r->difference + 0.0, check->step.h, noise,
             unsigned_zero(r->worst_z, 2), block, unsigned_zero(r->sum_z, 2), fresh, check->reverse_error, verdict);
 }
 
 // "refused [2]"; *number is the reason's.
 static rey_result print_refusal(rey_context *ctx, FILE *file, const Check *check, Reasons *reasons, int *number) {
     *number = reasons_add(ctx, reasons, check->refusal, check->spec);
-    fprintf(file, "%-36s %s [%d]\n", check->spec, check_verdict_name(check->verdict), *number);
+    fprintf(file, "%-*s %s [%d]\n", cli_pad(check->spec, DIRECTION_WIDTH), check->spec, check_verdict_name(check->verdict),
+            *number);
     return *number ? REY_OK : REY_ERROR_MEMORY;
 }
 

@@ -156,6 +156,9 @@ void cli_warn_nonfinite(const rey_stats *stats);
 void cli_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // The same of a session, kept for "notes" of --json.
 void cli_session_note(Session *session, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// How many characters of UTF-8 a text has, and the width that makes %-*s of printf fill a column of `width` characters.
+int cli_text_width(const char *text);
+int cli_pad(const char *text, int width);
 // Adds a name to a list, "A, B, C and 2 more"; *count: of those so far. cli_list_end says how many are not shown.
 void cli_list_add(char *text, size_t size, int *count, const char *name);
 void cli_list_end(char *text, size_t size, int count);

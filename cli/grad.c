@@ -403,10 +403,11 @@ static void print_gradients(const Grad *g) {
             rey_param_info info = {.count = 1};
             rey_param_get_info(g->session.scene, g->direction.params[k], &info);
             cli_shape_text(&info, shape, sizeof shape);
-            width = (int)strlen(name) > width ? (int)strlen(name) : width;
+            width = cli_text_width(name) > width ? cli_text_width(name) : width;
             shape_width = (int)strlen(shape) > shape_width ? (int)strlen(shape) : shape_width;
             if (pass) {
-                printf("%-*s  %-*s  %13.6g %9.1e %13.6g\n", width, name, shape_width, shape, s->sum, s->standard_error, s->rms);
+                printf("%-*s  %-*s  %13.6g %9.1e %13.6g\n", cli_pad(name, width), name, shape_width, shape, s->sum,
+                       s->standard_error, s->rms);
             }
         }
     }

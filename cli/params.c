@@ -184,14 +184,15 @@ static void print_rows(const Array *rows) {
     int widths[PARAM_CELLS] = {0};
     for (size_t i = 0; i < rows->count; i++) {
         for (int c = 0; c < PARAM_CELLS; c++) {
-            int length = (int)strlen(ARRAY_AT(*rows, Row, i).cells[c]);
-            widths[c] = length > widths[c] ? length : widths[c];
+            int width = cli_text_width(ARRAY_AT(*rows, Row, i).cells[c]);
+            widths[c] = width > widths[c] ? width : widths[c];
         }
     }
     for (size_t i = 0; i < rows->count; i++) {
         for (int c = 0; c < PARAM_CELLS; c++) {
+            const char *cell = ARRAY_AT(*rows, Row, i).cells[c];
             bool last = c + 1 == PARAM_CELLS;
-            printf("%-*s%s", last ? 0 : widths[c], ARRAY_AT(*rows, Row, i).cells[c], last ? "\n" : "  ");
+            printf("%-*s%s", last ? 0 : cli_pad(cell, widths[c]), cell, last ? "\n" : "  ");
         }
     }
 }

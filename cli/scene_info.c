@@ -119,7 +119,7 @@ static void print_info(const Session *s) {
             const char *id = rey_mitsuba_sensor_id(s->scene, i);
             char name[256];
             snprintf(name, sizeof name, "sensor %d%s%s%s", i, id ? " '" : "", id ? id : "", id ? "'" : "");
-            printf("%-17s %d x %d pixels,", name, width, height);
+            printf("%-*s %d x %d pixels,", cli_pad(name, 17), name, width, height);
             for (int c = 0; c < rey_film_channel_count(s->scene, i); c++) {
                 printf(" %s", rey_film_channel_name(s->scene, i, c));
             }

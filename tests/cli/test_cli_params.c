@@ -280,6 +280,24 @@ static void patterns_know_further_names(void **state) {
     expect_said(f, 2, "params further.xml --param 'green.*'", "no parameter matches 'green.*'");
 }
 
+// Letters of several bytes take one place: the last column begins at the same one in every row.
+static void columns_count_characters(void **state) {
+    Fixture *f = *state;
+    write_file("letters.xml", "<scene version='3.0.0'><bsdf type='diffuse' id='gold \u00fc \u91d1'/><bsdf type='diffuse' "
+                              "id='iron'/></scene>");
+    expect(f, 0, "params letters.xml");
+    const char *line = f->out;
+    int places[3] = {0};
+    for (int row = 0; row < 3; row++, line = strchr(line, '\n') + 1) {
+        const char *last = strstr(line, row ? "refused" : "gradient");
+        assert_non_null(last);
+        for (const char *c = line; c < last; c++) {
+            places[row] += (*c & 0xC0) != 0x80;
+        }
+        assert_int_equal(places[row], places[0]);
+    }
+}
+
 #define COLOURS "fog.interior_medium.albedo.data"
 
 static double slope_of(Fixture *f, const char *scene, const char *direction) {
@@ -341,6 +359,7 @@ int main(void) {
         cmocka_unit_test(absent_parameters_are_explained),
         cmocka_unit_test(patterns_choose),
         cmocka_unit_test(patterns_know_further_names),
+        cmocka_unit_test(columns_count_characters),
         cmocka_unit_test(suggestions_are_listed),
         cmocka_unit_test(terms_that_do_not_exist_are_errors),
         cmocka_unit_test(wrong_names_are_usage_errors),
