@@ -70,7 +70,7 @@ static rey_result look_before(const Marking *w, size_t i, double level, bool *kn
     return !parts ? REY_OK
                   : rey_fail(w->scene->ctx, REY_ERROR_INCOMPLETE,
                              "two textures of one surface (shape number %d) jump along the same line, and where to_uv moves one of "
-                             "them alone the picture has no derivative. --terms interior gives the part without", (int)w->shape);
+                             "them alone the picture has no derivative. --terms interior gives the rest", (int)w->shape);
 }
 
 static rey_result push_mark(const Marking *w, const TextureStep *s, bool half, int32_t prim, int32_t instance,
