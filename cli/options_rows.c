@@ -24,7 +24,7 @@ static const OptionRow option_rows[] = {
     {OPTION_PARAM, 0, "param", "P", GRADS | CHECKS, "NAME[:OP]: a direction (see below); may be repeated"},
     {OPTION_PARAM, 0, "param", "NAME", LISTS, "these parameters only; * stands for any text; may be repeated"},
     {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
-    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or a picture (.exr .npy) of the image's size"},
+    {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or a picture (any format) of the image's size"},
     {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior,primary,indirect,specular)"},
     {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
     {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
