@@ -18,7 +18,10 @@ $(BUILD)/CMakeCache.txt: | setup
 setup:
 	@sh scripts/setup.sh $(PACKAGES)
 
-demo: all
+# The demo needs the command alone, and no word of how it is made unless that fails.
+demo: $(BUILD)/CMakeCache.txt
+	@[ -x $(BUILD)/bin/reynolds ] || echo "building $(BUILD)/bin/reynolds, which takes some minutes" >&2
+	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS) reynolds > /dev/null
 	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
 # Boundary terms in whole renders (heavy) take ten minutes by themselves: `make test SKIP=slow` runs them, too, as CI does.
