@@ -267,8 +267,9 @@ KFN Float texture_eval_real(const SceneView *scene, int32_t id, TexCoord uv) {
 // Does the derivative of this texture, or of one inside it, leave through the sink?
 KFN bool texture_wanted(const SceneView *scene, const Sink *sink, int32_t id) {
     const TextureNode *t = scene->textures + id;
+    bool volume = t->kind == TEXTURE_VOLUME && (sink->any_volumes || sink->point);
     return sink->texture_at[id] >= 0 || sink->to_uv_at[id] >= 0 || t->kind == TEXTURE_CHECKERBOARD ||
-           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY || (t->kind == TEXTURE_VOLUME && (sink->any_volumes || sink->point));
+           t->kind == TEXTURE_ATTRIBUTE || t->kind == TEXTURE_BLACKBODY || volume;
 }
 
 KFN void blackbody_adj(const SceneView *scene, const TextureNode *t, Spec d, Sink *sink, Mask m) {
