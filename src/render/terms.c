@@ -191,8 +191,8 @@ static const char *gap_of_lookups(const SceneView *view) {
     for (int32_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
         for (int k = 0; k < MAX_SLOTS; k++) {
             if (reads_jumps(view, view->bsdfs[i].slot[k])) {
-                return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to voxel pass over points "
-                       "that move";
+                return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to "
+                       "voxel pass over points that move";
             }
             if (is_volume(view, view->bsdfs[i].slot[k]) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
                 return "surfaces that let a part of the light pass have volumes as textures, which rays that move pass elsewhere";
