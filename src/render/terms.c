@@ -330,17 +330,19 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         int known = terms_known(scene, def, chains, p);
         int missing = info.terms & ~known;
         bool interior = known & REY_TERM_INTERIOR;
-        if (missing && !def->terms) {
-            int bit = missing & -missing;
-            char reason[REASON];
+        int bit = missing & -missing;
+        char reason[REASON];
+        if (missing) {
             term_reason(scene, scene->view.sensors + def->sensor, bit, p, reason);
+        }
+        if (missing && !def->terms) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
                             "the gradient of %s needs the term '%s', which does not cover this yet: %s%s", info.name,
                             rey_term_name(bit), reason, interior ? ". --terms interior gives the part that does" : "");
         }
         if (missing && !interior) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
-                            info.why);
+                            reason);
         }
         *needed |= info.terms;
     }
