@@ -261,12 +261,48 @@ static void test_sensor_by_name(void **state) {
     assert_int_equal(write_text(f, "job.yaml", JOB), 0);
 }
 
+// A weight is one number, and an alpha is none: colours and what alpha cuts out are no masks, of silhouettes the latter.
+static void test_masks_are_weights(void **state) {
+    const Fixture *f = *state;
+    float green[SIZE * SIZE * 3] = {0}, half[SIZE * SIZE * 4], grey[SIZE * SIZE * 3];
+    char path[128];
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        green[3 * i + 1] = i > SIZE; // nothing in the first row, and at the next one's begin
+        for (int c = 0; c < 4; c++) {
+            half[4 * i + c] = i % SIZE < SIZE / 2;
+        }
+        for (int c = 0; c < 3; c++) {
+            grey[3 * i + c] = 0.5f + 1e-5f * (float)c;
+        }
+    }
+    path_of(f, "green.exr", path);
+    assert_int_equal(rey_exr_write(f->ctx, path, green, SIZE, SIZE, 3, NULL), REY_OK);
+    path_of(f, "grey.exr", path);
+    assert_int_equal(rey_exr_write(f->ctx, path, grey, SIZE, SIZE, 3, NULL), REY_OK);
+    path_of(f, "half.png", path);
+    assert_int_equal(rey_png_write_alpha(f->ctx, path, half, SIZE, SIZE), REY_OK);
+    static const char *const cases[][2] = {
+        {"views.0.mask=green.exr", "--set views.0.mask=green.exr: green.exr: the mask is 0 1 0 at pixel 1, 1, expected a grey "
+                                   "picture: one weight per pixel"},
+        {"views.0.mask=half.png", "half.png has an alpha below 1, which would be left out, expected a picture without alpha"},
+        {"views.0.silhouette=half.png", "--set views.0.silhouette=half.png: half.png has an alpha below 1"},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        assert_int_equal(run_fit(f, OVERWRITE, 1, cases[i][0]), REY_ERROR_ARGUMENT);
+        if (!strstr(rey_error(f->ctx), cases[i][1])) {
+            fail_msg("'%s', expected '%s'", rey_error(f->ctx), cases[i][1]);
+        }
+    }
+    assert_int_equal(run_fit(f, OVERWRITE, 1, "views.0.mask=grey.exr"), REY_ERROR_CANCELLED); // but for rounding
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_changed_inputs),         cmocka_unit_test(test_any_lanes),
         cmocka_unit_test(test_differences_are_named),  cmocka_unit_test(test_nothing_stale),
         cmocka_unit_test(test_foreign_folder),         cmocka_unit_test(test_own_result_is_no_scene),
         cmocka_unit_test(test_resolved_output),        cmocka_unit_test(test_sensor_by_name),
+        cmocka_unit_test(test_masks_are_weights),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -28,8 +28,9 @@ rey_result rey_silhouette_load(Fit *fit, const JobView *job_view, FitView *view)
                                "silhouettes are of perspective and orthographic sensors, and sensor %d is another one",
                                view->sensor);
     }
-    rey_result result = rey_view_picture(fit, job_view->silhouette_at, view, job_view->silhouette, &image);
+    rey_result result = rey_view_opaque(fit, job_view->silhouette_at, view, job_view->silhouette, &image);
     if (result) {
+        rey_image_free(fit->ctx, &image);
         return result;
     }
     int64_t stride = view->width + 1;

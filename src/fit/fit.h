@@ -149,6 +149,8 @@ rey_result rey_frame_read(const Fit *fit, int view, int iteration, unsigned char
 rey_result rey_views_load(Fit *fit);
 // A picture of a view's size, as R G B.
 rey_result rey_view_picture(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image);
+// The same of masks and silhouettes, which are refused with an alpha: what it cuts out would count.
+rey_result rey_view_opaque(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image);
 void rey_views_free(Fit *fit);
 
 // Levels (levels.c): whether a view can be reduced as the job says; the pictures and films of a level.

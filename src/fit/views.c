@@ -18,6 +18,30 @@ rey_result rey_view_picture(Fit *fit, JobPlace at, const FitView *view, const ch
     return rey_image_to_rgb(fit->ctx, image);
 }
 
+rey_result rey_view_opaque(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image) {
+    rey_result result = rey_view_picture(fit, at, view, name, image);
+    return result || !image->translucent
+               ? result
+               : rey_job_fail_at(&fit->job, at, REY_ERROR_FORMAT, "%s has an alpha below 1, which would be left out, expected a "
+                                 "picture without alpha", name);
+}
+
+// A weight is one number: of colours, it is not known which of them is meant.
+static rey_result check_grey(Fit *fit, const JobView *job_view, const rey_image *image) {
+    static const float most_off = 1e-3f; // of the largest channel, for rounding
+    for (int64_t i = 0; i < (int64_t)image->width * image->height; i++) {
+        const float *rgb = image->data + 3 * i;
+        float largest = fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
+        if (largest - fminf(rgb[0], fminf(rgb[1], rgb[2])) > most_off * fabsf(largest)) {
+            return rey_job_fail_at(&fit->job, job_view->mask_at, REY_ERROR_FORMAT,
+                                   "%s: the mask is %g %g %g at pixel %d, %d, expected a grey picture: one weight per pixel",
+                                   job_view->mask, (double)rgb[0], (double)rgb[1], (double)rgb[2], (int)(i % image->width),
+                                   (int)(i / image->width));
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
     int64_t pixels = (int64_t)view->width * view->height;
     view->mask_sum = (double)pixels;
@@ -25,7 +49,10 @@ static rey_result load_mask(Fit *fit, const JobView *job_view, FitView *view) {
         return REY_OK;
     }
     rey_image image = {0};
-    rey_result result = rey_view_picture(fit, job_view->mask_at, view, job_view->mask, &image); // of weights: never decoded
+    rey_result result = rey_view_opaque(fit, job_view->mask_at, view, job_view->mask, &image); // of weights: never decoded
+    if (!result) {
+        result = check_grey(fit, job_view, &image);
+    }
     if (!result) {
         view->mask = rey_alloc_array(fit->ctx, (size_t)pixels, sizeof *view->mask);
         result = view->mask ? REY_OK : REY_ERROR_MEMORY;
