@@ -28,7 +28,11 @@ static bool show_progress(void *user, const FitProgress *p) {
                 display->terminal ? "\r" : "\n");
         display->finishing = true;
         display->shown = now;
-    } else if (!p->finishing && (now - display->shown >= wait || p->iteration == p->iterations)) {
+    } else if (p->remeshing && now - display->shown >= LINE_SECONDS) {
+        fprintf(stderr, "%siteration %d/%d  remeshing%s", display->terminal ? "\r\033[K" : "", p->iteration, p->iterations,
+                display->terminal ? "" : "\n");
+        display->shown = now;
+    } else if (!p->finishing && !p->remeshing && (now - display->shown >= wait || p->iteration == p->iterations)) {
         fprintf(stderr, "%siteration %d/%d  loss %.4g  gradient %.3g  %.0f s left%s",
                 display->terminal ? "\r\033[K" : "", p->iteration, p->iterations, p->loss, p->gradient_norm,
                 p->seconds_left, display->terminal ? "" : "\n");

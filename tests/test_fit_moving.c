@@ -131,9 +131,11 @@ static int tear_down(void **state) {
     return status;
 }
 
+enum { IN_REMESHING = -2 }; // when to stop, else the iteration, or -1 = never
+
 static bool stop_at(void *user, const FitProgress *progress) {
     const int *at = user;
-    return progress->finishing || *at < 0 || progress->iteration < *at;
+    return progress->finishing || (progress->remeshing ? *at != IN_REMESHING : *at < 0 || progress->iteration < *at);
 }
 
 // Runs a job of this text in a folder of its own.
@@ -201,19 +203,26 @@ static void test_vertices_and_exposure(void **state) {
     rey_fit_result_free(&result);
 }
 
+// A scene whose ball has no seam.
+static void write_plain(const Fixture *f) {
+    char command[256];
+    snprintf(command, sizeof command, "sed -e '/^vt/d' -e 's|/[0-9]*||g' %s/ball.obj > %s/plain.obj && sed 's/ball.obj/plain.obj/' "
+             "%s/scene.xml > %s/plain.xml", f->folder, f->folder, f->folder, f->folder);
+    assert_int_equal(system(command), 0);
+}
+
+#define PLAIN_VIEWS "scene: plain.xml\nviews: [{target: target_0.exr}, {target: target_1.exr}]\nloss: l2\n"
+#define PLAIN_BALL "parameters:\n  - {name: ball.positions, parameterisation: laplacian, smoothness: 4}\n"
+
 // A ball without a seam, remeshed on its way, seen through another exposure: the state of what is no mesh goes on, and a fit
 // that is stopped just before or after the change finds the same bits.
 static void test_remeshed_on_the_way(void **state) {
     Fixture *f = *state;
     FitResult result;
-    char command[256];
-    snprintf(command, sizeof command, "sed -e '/^vt/d' -e 's|/[0-9]*||g' %s/ball.obj > %s/plain.obj && sed 's/ball.obj/plain.obj/' "
-             "%s/scene.xml > %s/plain.xml", f->folder, f->folder, f->folder, f->folder);
-    assert_int_equal(system(command), 0);
-    const char *text = "scene: plain.xml\nviews: [{target: target_0.exr}, {target: target_1.exr}]\nloss: l2\nreport_spp: 2\n"
+    write_plain(f);
+    const char *text = PLAIN_VIEWS "report_spp: 2\n"
         "iterations: 60\nspp: 8\nlevels: [{from: 0, reduce: 2}, {from: 20, reduce: 2, edge_length: 0.35}, {from: 40}]\n"
-        "optimizer: {learning_rate: 0.06, beta2: 0.9, average: 4}\nparameters:\n"
-        "  - {name: ball.positions, parameterisation: laplacian, smoothness: 4}\n"
+        "optimizer: {learning_rate: 0.06, beta2: 0.9, average: 4}\n" PLAIN_BALL
         "  - {name: views.1.exposure, parameterisation: log, learning_rate: 0.05, start: 0.6}\ntruth: {scene: truth.xml}\n";
     if (run_job(f, text, "remeshed", false, -1, &result)) {
         fail_msg("%s", rey_error(f->ctx));
@@ -224,11 +233,48 @@ static void test_remeshed_on_the_way(void **state) {
     assert_true(ball->points[COLUMN_FOUND] > 1.5 * (double)ball->points[COLUMN_START]);
     assert_true(ball->chamfer[COLUMN_FOUND] < 0.7 * ball->chamfer[COLUMN_START]);
     assert_non_null(result.report);
-    const int stops[] = {20, 21, 43};
+    const int stops[] = {20, 21, 43, IN_REMESHING};
     for (int i = 0; i < COUNT_OF(stops); i++) {
         expect_same_when_resumed(f, text, stops[i], &result);
     }
     rey_fit_result_free(&result);
+}
+
+// A fit that is stopped while meshes are remeshed has not begun the level: L-BFGS has gone back to its best point, and does so
+// once.
+static void test_remeshing_is_stopped(void **state) {
+    Fixture *f = *state;
+    FitResult result;
+    write_plain(f);
+    const char *text = PLAIN_VIEWS "report_spp: 0\niterations: 12\nspp: 4\n"
+                       "levels: [{from: 0, reduce: 2}, {from: 6, edge_length: 0.5}]\n"
+                       "optimizer: {type: lbfgs, learning_rate: 0.03}\n"
+                       PLAIN_BALL
+                       "  - {name: views.1.exposure, parameterisation: log, start: 0.6}\n";
+    if (run_job(f, text, "stopped", false, -1, &result)) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    expect_same_when_resumed(f, text, IN_REMESHING, &result);
+    rey_fit_result_free(&result);
+}
+
+// Edges that no memory would hold are refused before the first iteration, whatever level they are of, and leave no folder.
+static void test_tiny_edges_are_refused(void **state) {
+    Fixture *f = *state;
+    FitResult result;
+    char path[128];
+    write_plain(f);
+    rey_result code = run_job(f, PLAIN_VIEWS PLAIN_BALL "levels:\n  - {from: 0, reduce: 2}\n  - {from: 20, edge_length: 1e-6}\n",
+                              "tiny", false, 1, &result);
+    rey_fit_result_free(&result);
+    assert_int_equal(code, REY_ERROR_PARAM);
+    if (!strstr(rey_error(f->ctx), "job.yaml:8: level 1: edge_length = 1e-06 would make about 2.") ||
+        !strstr(rey_error(f->ctx), "e+13 triangles of ball.positions, whose area is ") ||
+        !strstr(rey_error(f->ctx), ", expected 4194304 or fewer")) {
+        fail_msg("%s", rey_error(f->ctx));
+    }
+    snprintf(path, sizeof path, "%s/tiny", f->folder);
+    assert_int_not_equal(access(path, F_OK), 0);
 }
 
 // L-BFGS ends at its best point, and goes on from a checkpoint with the same bits, in the middle of a search, too.
@@ -288,6 +334,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_vertices_and_exposure),
         cmocka_unit_test(test_remeshed_on_the_way),
+        cmocka_unit_test(test_remeshing_is_stopped),
+        cmocka_unit_test(test_tiny_edges_are_refused),
         cmocka_unit_test(test_lbfgs_recovers_light),
         cmocka_unit_test(test_level_errors),
     };

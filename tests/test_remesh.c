@@ -116,7 +116,7 @@ static void test_ball_stays_a_ball(void **state) {
         Ball b;
         rey_mesh mesh, again;
         make_ball(&b, TRIANGLES);
-        assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, lengths[i], 5, &mesh), REY_OK);
+        assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, (RemeshDef){lengths[i], 5, NULL, NULL}, &mesh), REY_OK);
         Facts f = facts_of(&b, &mesh);
         print_message("edge %g: %d points, edges %.3f to %.3f, volume %.3f\n", lengths[i], (int)mesh.vertex_count, f.shortest,
                       f.longest, f.volume);
@@ -128,7 +128,10 @@ static void test_ball_stays_a_ball(void **state) {
         // About as many as equilateral triangles of this size would need: points = 4 pi / (sqrt(3) / 2 l^2).
         double expected = 4 * 3.14159265 / (0.8660254 * lengths[i] * lengths[i]);
         assert_true((double)mesh.vertex_count > 0.7 * expected && (double)mesh.vertex_count < 1.5 * expected);
-        assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, lengths[i], 5, &again), REY_OK); // to the bit
+        double estimate = rey_remesh_estimate(&b.mesh, b.points, lengths[i]);
+        assert_true((double)mesh.face_count > 0.7 * estimate && (double)mesh.face_count < 1.5 * estimate);
+        const RemeshDef same = {lengths[i], 5, NULL, NULL};
+        assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, same, &again), REY_OK); // to the bit
         assert_int_equal(again.vertex_count, mesh.vertex_count);
         assert_memory_equal(again.positions, mesh.positions, 3 * (size_t)mesh.vertex_count * sizeof(float));
         rey_mesh_free(b.ctx, &mesh);
@@ -144,7 +147,7 @@ static void test_border_stays(void **state) {
     rey_mesh mesh;
     const int half = SEGMENTS * (RINGS - 1);
     make_ball(&b, half);
-    assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, 0.1, 5, &mesh), REY_OK);
+    assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, (RemeshDef){0.1, 5, NULL, NULL}, &mesh), REY_OK);
     Facts f = facts_of(&b, &mesh);
     assert_int_equal(f.euler, 1);
     assert_int_equal(f.many, 0);
@@ -162,6 +165,32 @@ static void test_border_stays(void **state) {
     }
     assert_int_equal(found, SEGMENTS);
     rey_mesh_free(b.ctx, &mesh);
+    free_ball(&b);
+}
+
+static bool count_down(void *user) {
+    int *left = user;
+    return (*left)-- > 0;
+}
+
+// It is asked in every pass whether to go on, and leaves nothing behind where not.
+static void test_remeshing_is_cancelled(void **state) {
+    UNUSED(state);
+    Ball b;
+    rey_mesh mesh;
+    make_ball(&b, TRIANGLES);
+    for (int asked = 0; asked < 12; asked += 3) {
+        int left = asked;
+        assert_int_equal(rey_remesh(b.ctx, &b.mesh, b.points, (RemeshDef){0.07, 5, count_down, &left}, &mesh),
+                         REY_ERROR_CANCELLED);
+        assert_int_equal(left, -1);
+        assert_null(mesh.positions);
+    }
+    // What is as good as a line has no area: its edges are split all the same.
+    for (int i = 0; i < POINTS; i++) {
+        b.points[3 * i] = b.points[3 * i + 1] = 0;
+    }
+    assert_true(rey_remesh_estimate(&b.mesh, b.points, 1e-6) > 1e6);
     free_ball(&b);
 }
 
@@ -189,6 +218,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ball_stays_a_ball),
         cmocka_unit_test(test_border_stays),
+        cmocka_unit_test(test_remeshing_is_cancelled),
         cmocka_unit_test(test_chamfer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -182,6 +182,9 @@ static rey_result open_fit(Fit *fit) {
     if (!result) {
         result = rey_levels_check_grids(fit);
     }
+    if (!result) {
+        result = rey_levels_check_meshes(fit);
+    }
     fit->state.history_width = HISTORY_VALUES;
     for (size_t k = 0; k < fit->unknowns.items.count; k++) {
         int64_t count = ARRAY_AT(fit->unknowns.items, Unknown, k).count;

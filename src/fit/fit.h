@@ -10,6 +10,7 @@ typedef struct FitProgress {
     int iteration, iterations; // done, and in all
     double loss, gradient_norm;
     double seconds, seconds_left;
+    bool remeshing; // a level's meshes are at work, before its first iteration; what there is of losses and times is 0
     bool finishing; // the iterations are over; table and report are at work
 } FitProgress;
 
@@ -23,8 +24,8 @@ typedef struct FitDef {
     bool overwrite; // start again where the folder holds another fit, or this one unfinished
     bool seed_given; // seed replaces the job's
     uint32_t seed;
-    // Called after every iteration, and while longer calls render; false stops: the iteration is finished, the state
-    // saved, and rey_fit returns REY_ERROR_CANCELLED. May be null.
+    // Called after every iteration, while longer calls render, and while meshes are remeshed; false stops: the iteration is
+    // finished, or not begun where meshes were at work, the state saved, and rey_fit returns REY_ERROR_CANCELLED. May be null.
     bool (*progress)(void *user, const FitProgress *progress);
     void (*note)(void *user, const char *words); // what is not wrong and may be a mistake, before the first iteration; may be null
     void *user;
@@ -157,6 +158,8 @@ void rey_views_free(Fit *fit);
 rey_result rey_levels_check(Fit *fit, const JobView *job_view, const FitView *view);
 // Whether there are grids where levels have a resolution.
 rey_result rey_levels_check_grids(Fit *fit);
+// Whether meshes can be remeshed as the levels that are left say (remesh_level.c).
+rey_result rey_levels_check_meshes(Fit *fit);
 rey_result rey_levels_enter(Fit *fit, int level);
 void rey_levels_reduce(Fit *fit, int r);
 // Remeshes and resamples as the level says, and goes on in a scene that holds the new meshes and grids (remesh_level.c).

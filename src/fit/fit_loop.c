@@ -364,7 +364,10 @@ rey_result rey_fit_optimise(Fit *fit) {
     fit->saved = -1;
     while (!result && !fit->stop && !fit->state.converged && fit->state.iteration < fit->job.iterations) {
         result = iterate(fit, order);
-        if (!result) {
+        if (result == REY_ERROR_CANCELLED) { // in the remeshing of a level: the iteration has not begun
+            fit->stop = true;
+            result = REY_OK;
+        } else if (!result) {
             fit->state.converged = has_converged(fit);
             fit->stop = !report_progress(fit, run_start, first);
             if (checkpoint_due(fit, saved_at)) {

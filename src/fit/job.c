@@ -95,6 +95,7 @@ static rey_result read_levels(Job *job, const YamlNode *node, void *target) {
     for (const YamlNode *entry = node->child; entry && !result; entry = entry->next, i++) {
         (*levels)[i].reduce = 1;
         (*levels)[i].reduce_at = rey_job_place_of(entry, "reduce", NULL);
+        (*levels)[i].edge_length_at = rey_job_place_of(entry, "edge_length", NULL);
         (*levels)[i].resolution_at = rey_job_place_of(entry, "resolution", NULL);
         result = rey_job_read_map(job, entry, "levels", fields, &(*levels)[i]);
         if (!result && (i ? (*levels)[i].from <= (*levels)[i - 1].from : (*levels)[0].from != 0)) {

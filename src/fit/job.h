@@ -71,7 +71,7 @@ typedef struct JobLevel { // from coarse to fine, from this iteration on
     int reduce;         // every picture is so many times smaller in width and height
     double edge_length; // to which meshes are remeshed as it begins [scene units], 0 = they stay
     int resolution;     // cells along the longest axis that grids are resampled to as it begins, 0 = they stay
-    JobPlace reduce_at, resolution_at;
+    JobPlace reduce_at, edge_length_at, resolution_at;
 } JobLevel;
 
 typedef struct JobSchedule { // factor of every learning rate at iteration i

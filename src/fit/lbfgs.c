@@ -185,8 +185,10 @@ bool rey_lbfgs_leap(double *state, int64_t n, int memory, double *x) {
     return true;
 }
 
+bool rey_lbfgs_has_best(const double *state) { return state[STARTED] != UNSTARTED; }
+
 void rey_lbfgs_take_best(const double *state, int64_t n, double *x) {
-    if (state[STARTED] != UNSTARTED) {
+    if (rey_lbfgs_has_best(state)) {
         memcpy(x, state + SCALARS + POSITION * n, (size_t)n * sizeof *x);
     }
 }

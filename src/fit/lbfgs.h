@@ -17,7 +17,9 @@ int64_t rey_lbfgs_numbers(int64_t n, int memory);
 // The value and gradient at x are given; x moves to where they are wanted next. Variables are scaled such that 1 is the
 // largest change in the first step. A zeroed state is a start.
 void rey_lbfgs_step(double *state, int64_t n, int memory, double value, const double *gradient, double *x);
-// x becomes the best point so far; nothing before the first step.
+// Whether there is a best point yet: not before the first step.
+bool rey_lbfgs_has_best(const double *state);
+// x becomes the best point so far, where there is one.
 void rey_lbfgs_take_best(const double *state, int64_t n, double *x);
 // The value there.
 double rey_lbfgs_best_value(const double *state);

@@ -319,7 +319,7 @@ static void lbfgs_step(const JobOptimizer *o, Unknowns *u, double loss) {
 }
 
 void rey_optimizer_restart(const JobOptimizer *o, Unknowns *u) {
-    if (o->kind == OPTIMIZER_LBFGS) {
+    if (o->kind == OPTIMIZER_LBFGS && rey_lbfgs_has_best(u->lbfgs)) { // a second time, rounding would change the variables
         scale_by_rates(o, u, u->variable, -1);
         rey_lbfgs_take_best(u->lbfgs, u->count, u->variable);
         scale_by_rates(o, u, u->variable, 1);

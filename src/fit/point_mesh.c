@@ -1,6 +1,7 @@
 // point_mesh.c: meshes as points, triangles and edges.
 #include "fit/point_mesh.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 typedef struct Side { // of a triangle
@@ -82,6 +83,24 @@ rey_result rey_point_mesh_create(rey_context *ctx, int32_t vertex_count, const i
         out->triangles[i] = out->point[indices[i]];
     }
     return find_edges(ctx, out);
+}
+
+double rey_point_mesh_area(const PointMesh *mesh, const double *points) {
+    double area = 0;
+    for (int32_t i = 0; i < mesh->triangle_count; i++) {
+        const int32_t *t = mesh->triangles + 3 * (int64_t)i;
+        double ab[3], ac[3], square = 0;
+        for (int c = 0; c < 3; c++) {
+            ab[c] = points[3 * t[1] + c] - points[3 * t[0] + c];
+            ac[c] = points[3 * t[2] + c] - points[3 * t[0] + c];
+        }
+        for (int c = 0; c < 3; c++) {
+            double across = ab[(c + 1) % 3] * ac[(c + 2) % 3] - ab[(c + 2) % 3] * ac[(c + 1) % 3];
+            square += across * across;
+        }
+        area += sqrt(square) / 2;
+    }
+    return area;
 }
 
 void rey_point_mesh_free(rey_context *ctx, PointMesh *mesh) {

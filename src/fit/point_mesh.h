@@ -20,4 +20,6 @@ typedef struct PointMesh {
 // also after a failure.
 rey_result rey_point_mesh_create(rey_context *ctx, int32_t vertex_count, const int32_t *welded, int32_t triangle_count,
                               const int32_t *indices, PointMesh *out);
+// points: three numbers each.
+double rey_point_mesh_area(const PointMesh *mesh, const double *points);
 void rey_point_mesh_free(rey_context *ctx, PointMesh *mesh);

@@ -307,13 +307,22 @@ static rey_result take_mesh(Remesh *r, rey_mesh *out) {
     return rey_mesh_weld(r->ctx, out);
 }
 
-rey_result rey_remesh(rey_context *ctx, const PointMesh *mesh, const double *points, double edge_length, int rounds,
-                      rey_mesh *out) {
-    Remesh r = {.ctx = ctx};
+double rey_remesh_estimate(const PointMesh *mesh, const double *points, double edge_length) {
+    double split = 0;
+    for (int32_t k = 0; k < mesh->edge_count; k++) {
+        double length = rey_remesh_distance(points + 3 * mesh->edges[k].a, points + 3 * mesh->edges[k].b);
+        split += length > edge_length * 4 / 3 ? length : 0;
+    }
+    double equilateral = sqrt(3) / 4 * edge_length * edge_length;
+    return fmax(rey_point_mesh_area(mesh, points) / equilateral, split / edge_length);
+}
+
+rey_result rey_remesh(rey_context *ctx, const PointMesh *mesh, const double *points, RemeshDef def, rey_mesh *out) {
+    Remesh r = {.ctx = ctx, .def = def};
     *out = (rey_mesh){0};
     rey_result result = rey_remesh_open(&r, mesh, points);
-    for (int i = 0; i < rounds && !result; i++) {
-        result = round_of(&r, edge_length);
+    for (int i = 0; i < def.rounds && !result; i++) {
+        result = round_of(&r, def.edge_length);
     }
     if (!result) {
         result = take_mesh(&r, out);

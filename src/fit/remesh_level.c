@@ -48,24 +48,59 @@ rey_result rey_fit_open_start(Fit *fit, rey_scene **scene, Unknowns *unknowns) {
     return result ? result : rey_carve(fit, *scene, unknowns);
 }
 
-static rey_result remesh_all(Fit *fit, double edge_length, Array *meshes) {
+// Whether a mesh, as it is now, can be remeshed as a level says; true for what is none.
+static rey_result check_mesh(Fit *fit, int level, const Unknown *p) {
+    const JobLevel *l = &fit->job.levels[level];
+    if (!p->vertices || !(l->edge_length > 0)) {
+        return REY_OK;
+    }
+    if (fit->scene->view.shapes[ARRAY_AT(fit->scene->params, Param, p->param).geometry].uvs >= 0) {
+        return rey_job_fail_at(&fit->job, l->edge_length_at, REY_ERROR_UNSUPPORTED,
+                               "%s: levels cannot remesh what has uv coordinates", p->name);
+    }
+    const PointMesh *mesh = &p->vertices->mesh;
+    const double *points = rey_vertices_points(p->vertices, fit->unknowns.value + p->offset);
+    double triangles = rey_remesh_estimate(mesh, points, l->edge_length);
+    return triangles <= REMESH_LARGEST
+               ? REY_OK
+               : rey_job_fail_at(&fit->job, l->edge_length_at, REY_ERROR_PARAM,
+                                 "level %d: edge_length = %g would make about %.2g triangles of %s, whose area is %g, expected "
+                                 "%d or fewer", level, l->edge_length, triangles, p->name, rey_point_mesh_area(mesh, points),
+                                 REMESH_LARGEST);
+}
+
+rey_result rey_levels_check_meshes(Fit *fit) {
+    rey_result result = REY_OK;
+    for (int level = fit->state.meshed; level < fit->job.level_count; level++) {
+        for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
+            result = check_mesh(fit, level, &ARRAY_AT(fit->unknowns.items, Unknown, k));
+        }
+    }
+    return result;
+}
+
+static bool remeshing_step(void *user) {
+    const Fit *fit = user;
+    FitProgress progress = {.iteration = fit->state.iteration, .iterations = fit->job.iterations, .remeshing = true};
+    return !fit->def->progress || fit->def->progress(fit->def->user, &progress);
+}
+
+static rey_result remesh_all(Fit *fit, int level, Array *meshes) {
+    const RemeshDef def = {fit->job.levels[level].edge_length, ROUNDS, remeshing_step, fit};
     rey_result result = REY_OK;
     for (size_t k = 0; k < fit->unknowns.items.count && !result; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
-        if (!p->vertices) {
+        result = check_mesh(fit, level, p); // the mesh may have grown since the start
+        if (result || !p->vertices) {
             continue;
-        }
-        int32_t shape = ARRAY_AT(fit->scene->params, Param, p->param).geometry;
-        if (fit->scene->view.shapes[shape].uvs >= 0) {
-            return rey_fail(fit->ctx, REY_ERROR_UNSUPPORTED, "%s: levels cannot remesh what has uv coordinates", p->name);
         }
         SavedMesh *saved = rey_array_push(fit->ctx, meshes, sizeof *saved, 1);
         if (!saved) {
             return REY_ERROR_MEMORY;
         }
-        saved->shape = shape;
+        saved->shape = ARRAY_AT(fit->scene->params, Param, p->param).geometry;
         const double *points = rey_vertices_points(p->vertices, fit->unknowns.value + p->offset);
-        result = rey_remesh(fit->ctx, &p->vertices->mesh, points, edge_length, ROUNDS, &saved->mesh);
+        result = rey_remesh(fit->ctx, &p->vertices->mesh, points, def, &saved->mesh);
     }
     return result;
 }
@@ -146,7 +181,7 @@ rey_result rey_levels_remesh(Fit *fit, int level) {
     char *path = level_path(fit, level);
     rey_result result = path ? REY_OK : REY_ERROR_MEMORY;
     if (!result && l->edge_length > 0) {
-        result = remesh_all(fit, l->edge_length, &meshes);
+        result = remesh_all(fit, level, &meshes);
     }
     if (!result && l->resolution > 0) {
         result = resample_all(fit, l->resolution, &grids);

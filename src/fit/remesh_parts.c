@@ -126,6 +126,9 @@ rey_result rey_remesh_look(Remesh *r, bool longest_first) {
         return rey_fail(r->ctx, REY_ERROR_UNSUPPORTED, "remeshing has come to %lld triangles: the edge length is too small",
                         (long long)triangles);
     }
+    if (r->def.go_on && !r->def.go_on(r->def.user)) {
+        return rey_fail(r->ctx, REY_ERROR_CANCELLED, "remeshing was cancelled");
+    }
     rey_remesh_forget(r);
     int32_t *same = rey_alloc_array(r->ctx, points, sizeof *same);
     for (size_t i = 0; same && i < points; i++) {

@@ -5,6 +5,7 @@
 
 typedef struct Remesh {
     rey_context *ctx;
+    RemeshDef def;
     Array points;    // double, three each
     Array triangles; // int32_t, three each
     // As rey_remesh_look found them; a pass may change `points` and `triangles`, not these.
