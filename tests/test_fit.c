@@ -450,7 +450,7 @@ static void test_fit_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
         {"parameters.0.name=red.reflectanse.value", "did you mean 'red.reflectance.value'?"},
-        {"parameters.0.parameterisation=rigid", "are for poses"},
+        {"parameters.2.parameterisation=rigid", "are for poses"},
         {"parameters.0.parameterisation=laplacian", "has no bounds"},
         {"parameters.0.smoothness=3", "smoothness is for 'parameterisation: laplacian'"},
         {"parameters.3.name=red.*", "entry 0 of 'parameters' names it already"},

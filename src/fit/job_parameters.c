@@ -108,7 +108,8 @@ static rey_result finish_parameter(Job *job, const YamlNode *node, JobParameter 
     }
     bool scattering = p->parameterisation == PARAMETERISATION_SCATTERING;
     bool simplex = p->parameterisation == PARAMETERISATION_SIMPLEX;
-    if ((laplacian || scattering || simplex) && !isnan(p->bounds[0])) {
+    bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
+    if ((laplacian || scattering || simplex || pose) && !isnan(p->bounds[0])) {
         char why[64];
         snprintf(why, sizeof why, "parameterisation %s has no bounds", rey_parameterisation_name((int)p->parameterisation));
         return fail_with(job, node, "bounds", why);

@@ -97,7 +97,7 @@ static void overrides_are_told(void **state) {
         {"parameters.0.name=none.*", "parameter 'none.*': matches no parameter of the scene"},
         {"parameters.0.bounds.0=7", "bounds: 7 is not below 1"},
         {"parameters.0.bounds=[5,6]", "the bounds 5 to 6 lie outside of the parameter's range, expected some of 0 to 1"},
-        {"parameters.0.parameterisation=rigid", "parameterisations rigid and similarity are for poses"},
+        {"parameters.0={name: red.reflectance, parameterisation: rigid}", "parameterisations rigid and similarity are for poses"},
         {"parameters.0.carve=true", "carve is for grids of voxels"},
         {"parameters.0.regularisers.sparsity=1", "total_variation and sparsity are for grids"},
         {"levels.0.reduce=7", "level 0 reduces by 7, but sensor 0 has "},
