@@ -64,33 +64,39 @@ static void note_black(const Fit *fit) {
     }
 }
 
-// Numbers of a target that no photograph has, or that alone decide the loss. Held-out views are looked at as well: the report
-// judges by them.
+// Numbers of a target that no photograph has, and a pixel that alone decides the loss. Held-out views are looked at as well: the
+// report judges by them.
 static void note_target(const Fit *fit, int number) {
     static const double most_share = 0.9; // of the sum of squares
     const FitView *view = fit->views + number;
-    int64_t count = (int64_t)view->full_width * view->full_height * 3, negative = 0, largest = 0;
-    double squares = 0;
-    for (int64_t i = 0; i < count; i++) {
-        if (!view->full_mask || view->full_mask[i / 3] > 0) {
-            double value = (double)view->full_target[i];
+    int64_t pixels = (int64_t)view->full_width * view->full_height, negative = 0, brightest = 0;
+    double squares = 0, most = 0, top = 0; // of all pixels, of the brightest one, and the largest number there
+    for (int64_t i = 0; i < pixels; i++) {
+        double own = 0, largest = 0;
+        for (int c = 0; c < 3 && (!view->full_mask || view->full_mask[i] > 0); c++) {
+            double value = (double)view->full_target[3 * i + c];
             negative += value < 0;
-            squares += value * value;
-            largest = fabs(value) > fabs((double)view->full_target[largest]) ? i : largest;
+            own += value * value;
+            largest = fabs(value) > fabs(largest) ? value : largest;
+        }
+        squares += own;
+        if (own > most) {
+            most = own;
+            top = largest;
+            brightest = i;
         }
     }
     const char *name = fit->job.views[number].target;
-    double top = (double)view->full_target[largest];
     char words[1024];
     if (negative > 0) {
         snprintf(words, sizeof words, "view %d: %lld of the %lld numbers of %.500s are negative, which no light is", number,
-                 (long long)negative, (long long)count, name);
+                 (long long)negative, (long long)(3 * pixels), name);
         fit->def->note(fit->def->user, words);
     }
-    if (count > 3 && top * top > most_share * squares) {
-        snprintf(words, sizeof words, "view %d: %.500s is %g at pixel %d, %d, and next to nothing elsewhere: this number alone "
+    if (pixels > 1 && most > most_share * squares) {
+        snprintf(words, sizeof words, "view %d: %.500s is %g at pixel %d, %d, and next to nothing elsewhere: this pixel alone "
                                       "decides an 'l2' loss; a mask leaves it out", number, name, top,
-                 (int)(largest / 3 % view->full_width), (int)(largest / 3 / view->full_width));
+                 (int)(brightest % view->full_width), (int)(brightest / view->full_width));
         fit->def->note(fit->def->user, words);
     }
     if (view->translucent) {

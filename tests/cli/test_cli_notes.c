@@ -214,13 +214,13 @@ static void attributes_are_looked_for(void **state) {
     expect_note(f, "render s.xml --spp 1 --json", "warning: s.xml:5: the texture of this bumpmap is constant and has no slope");
 }
 
-// An 8 x 8 picture of 0.25 with one number that is another one.
-static void write_picture(float odd) {
+// An 8 x 8 picture of 0.25 with a pixel of which so many numbers are another one.
+static void write_picture(float odd, int channels) {
     float numbers[8 * 8 * 3];
     FILE *file = fopen("odd.pfm", "wb");
     assert_non_null(file);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
-        numbers[i] = i == 3 * (8 * 2 + 5) ? odd : 0.25f; // in the third row from below
+        numbers[i] = i / 3 == 8 * 2 + 5 && (int)(i % 3) < channels ? odd : 0.25f; // in the third row from below
     }
     assert_true(fprintf(file, "PF\n8 8\n-1.0\n") > 0 && fwrite(numbers, sizeof numbers, 1, file) == 1);
     assert_int_equal(fclose(file), 0);
@@ -232,12 +232,15 @@ static void odd_pictures_are_told(void **state) {
     write_scene();
     write_words("job.yaml", "scene: two.xml\nviews: [{target: odd.pfm}]\niterations: 1\nspp: 2\nreport_spp: 0\n"
                             "parameters: [grey.reflectance.value]\n");
-    write_picture(0.5f);
+    write_picture(0.5f, 1);
     expect_note(f, "fit job.yaml --overwrite --json", NULL);
-    write_picture(-1);
+    write_picture(-1, 1);
     expect_note(f, "fit job.yaml --overwrite --json", "view 0: 1 of the 192 numbers of odd.pfm are negative");
-    write_picture(1e9f);
-    expect_note(f, "fit job.yaml --overwrite --json", "view 0: odd.pfm is 1e+09 at pixel 5, 5, and next to nothing elsewhere");
+    for (int channels = 3; channels >= 1; channels--) {
+        write_picture(1e6f, channels);
+        expect_note(f, "fit job.yaml --overwrite --json", "view 0: odd.pfm is 1e+06 at pixel 5, 5, and next to nothing elsewhere: "
+                                                          "this pixel alone decides an 'l2' loss");
+    }
     write_words("clear.xml",
                 "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'>"
                 "<integer name='width' value='8'/><integer name='height' value='8'/><string name='pixel_format' value='rgba'/>\n"
@@ -250,7 +253,7 @@ static void odd_pictures_are_told(void **state) {
     expect_words(f, 0, "compare plain.png clear.png", "the colours of clear.png are divided by its alpha, which is left out");
     expect_words(f, 0, "compare plain.png odd.pfm",
                  "1 of 192 numbers of odd.pfm lie outside of 0 to 1, to which plain.png is clipped");
-    write_picture(0.5f);
+    write_picture(0.5f, 1);
     expect(f, 0, "compare plain.png odd.pfm");
     assert_null(strstr(f->words, "clipped"));
 }
