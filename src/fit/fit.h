@@ -173,7 +173,7 @@ rey_result rey_fit_check_truth(Fit *fit);
 // Whether every fitted view has the gradients of all unknowns (derivatives.c).
 rey_result rey_fit_check_derivatives(Fit *fit);
 
-// Notes unknowns on which no fitted view depends, poses that may shear, and black targets under a relative loss (notes.c).
+// Notes unknowns on which no fitted view depends, poses that may shear, terms that are left out, and odd targets (notes.c).
 rey_result rey_fit_notes(const Fit *fit);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled

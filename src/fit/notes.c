@@ -106,6 +106,31 @@ static void note_target(const Fit *fit, int number) {
     }
 }
 
+// Terms that the job leaves out of gradients which need them, in the words of `reynolds grad`.
+static void note_terms(const Fit *fit) {
+    const char *first = NULL;
+    int missing = 0, count = 0;
+    for (size_t k = 0; k < fit->unknowns.items.count && fit->job.terms; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        int needed = p->param < 0 ? 0 : ARRAY_AT(fit->scene->params, Param, p->param).terms;
+        int left = needed & ~fit->job.terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR);
+        first = left && !first ? p->name : first;
+        missing |= left;
+        count += left != 0;
+    }
+    if (missing) {
+        char asked[128], lacks[128], words[1024], more[32] = "";
+        rey_job_terms_text(fit->job.terms, asked, sizeof asked);
+        rey_job_terms_text(missing, lacks, sizeof lacks);
+        if (count > 1) {
+            snprintf(more, sizeof more, " and %d more", count - 1);
+        }
+        snprintf(words, sizeof words, "incomplete on request: 'terms: %s' leaves out %s, which the gradient%s of %.400s%s need%s",
+                 asked, lacks, PLURAL(count), first, more, count == 1 ? "s" : "");
+        fit->def->note(fit->def->user, words);
+    }
+}
+
 rey_result rey_fit_notes(const Fit *fit) {
     if (!fit->def->note) {
         return REY_OK;
@@ -120,6 +145,7 @@ rey_result rey_fit_notes(const Fit *fit) {
                          "'similarity' scales it besides");
         }
     }
+    note_terms(fit);
     note_black(fit);
     return note_unreached(fit);
 }

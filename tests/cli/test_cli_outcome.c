@@ -108,7 +108,9 @@ static void refusals_are_those_of_grad(void **state) {
     expect_words(f, 1, "fit glass.yaml -o glass", words);
     assert_non_null(strstr(f->words, "glass.yaml:9: parameter 'floor.to_world': "));
     assert_non_null(strstr(f->words, "(in a job, 'terms: interior')"));
-    expect(f, 0, "fit glass.yaml -o glass --set terms=interior");
+    expect_words(f, 0, "fit glass.yaml -o glass --set terms=interior",
+                 "incomplete on request: 'terms: interior' leaves out primary,indirect,specular, which the gradient of "
+                 "floor.to_world needs\n");
 }
 
 // What a restricted gradient lacks is named, and why more cannot be had where that is so.
