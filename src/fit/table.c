@@ -375,6 +375,36 @@ static rey_result load_truth(Fit *fit, rey_scene **out) {
     return rey_job_named_scene(&fit->job, fit->job.truth_at, defines, result);
 }
 
+// Whether a row's truth is its start, but for rounding; false where one of them is not known.
+static bool starts_true(const FitRow *row) {
+    static const double rounding = 1e-5;
+    double largest = 0, off = 0;
+    if (row->points[COLUMN_TRUTH]) {
+        return row->chamfer[COLUMN_START] <= rounding;
+    }
+    for (int64_t i = 0; i < row->count && row->truth && row->start; i++) {
+        largest = fmax(largest, fabs((double)row->truth[i]));
+        off = fmax(off, fabs((double)row->truth[i] - (double)row->start[i]));
+    }
+    return row->truth && row->start && off <= rounding * largest;
+}
+
+// A truth that is the start is mostly one that has got the defines of the start.
+static void note_same(const Fit *fit, const FitResult *out) {
+    int known = 0, same = 0;
+    for (size_t i = 0; i < out->rows.count; i++) {
+        const FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
+        known += row->truth || row->points[COLUMN_TRUTH];
+        same += starts_true(row);
+    }
+    if (known && same == known && fit->def->note) {
+        bool inherited = fit->job.defines.count && !fit->job.truth_defines.count;
+        fit->def->note(fit->def->user, inherited ? "all values of the truth equal the start: it got the job's 'defines'; does it "
+                                                   "need 'truth.defines' of its own?"
+                                                 : "all values of the truth equal the start");
+    }
+}
+
 rey_result rey_fit_judge(Fit *fit, FitResult *out) {
     if (!fit->job.truth_scene) {
         return REY_OK;
@@ -395,6 +425,7 @@ rey_result rey_fit_judge(Fit *fit, FitResult *out) {
         result = judge_row(fit, truth, &ARRAY_AT(out->rows, FitRow, i));
     }
     if (!result) {
+        note_same(fit, out);
         result = weigh_rows(fit, truth, ones, out);
     }
     rey_free(fit->ctx, ones);

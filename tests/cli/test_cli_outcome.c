@@ -85,6 +85,19 @@ static void truths_are_opened_last(void **state) {
     assert_int_equal(access("broken/report.html", R_OK), 0);
 }
 
+// A truth that gets the start's defines is the start.
+static void truths_that_are_the_start_are_told(void **state) {
+    Fixture *f = *state;
+    static const char words[] = "all values of the truth equal the start";
+    write_job(f, "iterations: 1\ndefines: {red: 0.5}\ntruth: {scene: " TEST_JOBS "/start.xml}\n");
+    expect_words(f, 0, "fit job.yaml -o same", "all values of the truth equal the start: it got the job's 'defines'; does it need "
+                                               "'truth.defines' of its own?");
+    expect(f, 0, "fit job.yaml -o same --overwrite --set truth.defines.red=0.7");
+    assert_null(strstr(f->words, words));
+    expect(f, 0, "fit job.yaml -o same --overwrite --set parameters.1=lamp.emitter.radiance.value --set parameters.1.start=4");
+    assert_null(strstr(f->words, words)); // of one it does not
+}
+
 // What would be found out in the first iteration is told before it.
 static void mistakes_are_told_at_the_start(void **state) {
     Fixture *f = *state;
@@ -270,6 +283,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses_are_explained),
         cmocka_unit_test(truths_are_opened_last),
+        cmocka_unit_test(truths_that_are_the_start_are_told),
         cmocka_unit_test(mistakes_are_told_at_the_start),
         cmocka_unit_test(refusals_are_those_of_grad),
         cmocka_unit_test(restricted_gradients_say_what_they_lack),
