@@ -119,11 +119,13 @@ static rey_result set_start(Job *job, const rey_scene *scene, const JobParameter
     return REY_OK;
 }
 
-static rey_result fail_start(Job *job, const JobParameter *p, const Unknown *unknown, int64_t i, float start,
+// key: what the start does not go with, before the other one of bounds and parameterisation, which decides, too.
+static rey_result fail_start(Job *job, const JobParameter *p, const Unknown *unknown, int64_t i, float start, const char *key,
                              const char *expected) {
-    const char *other = unknown->parameterisation == PARAMETERISATION_IDENTITY ? "bounds" : "parameterisation";
-    return rey_job_fail_at(job, rey_job_place_of(p->node, "start", other), REY_ERROR_PARAM,
-                           "parameter '%s': entry %lld starts at %g, %s", unknown->name, (long long)i, (double)start, expected);
+    const char *other = strcmp(key, "bounds") ? "bounds" : "parameterisation";
+    JobPlace at = rey_job_blame(rey_job_place_of(p->node, "start", key), rey_job_place_of(p->node, other, NULL));
+    return rey_job_fail_at(job, at, REY_ERROR_PARAM, "parameter '%s': entry %lld starts at %g, %s", unknown->name, (long long)i,
+                           (double)start, expected);
 }
 
 // A start that would be moved before the first iteration is not what the job asked for.
@@ -135,17 +137,17 @@ static rey_result check_start(Job *job, const JobParameter *p, const Unknown *un
     for (int64_t i = 0; i < unknown->count; i++) {
         float x = start[i], low = (float)unknown->low, high = (float)unknown->high;
         if (logarithm && !(x > 0)) {
-            return fail_start(job, p, unknown, i, x, "expected a number above 0: 'parameterisation: log' never leaves or "
-                                                     "reaches 0; give a start, or 'parameterisation: softplus'");
+            return fail_start(job, p, unknown, i, x, "parameterisation", "expected a number above 0: 'parameterisation: log' never "
+                              "leaves or reaches 0; give a start, or 'parameterisation: softplus'");
         }
         if (x < low || x > high) {
             snprintf(expected, sizeof expected, "outside of its bounds %g to %g", unknown->low, unknown->high);
-            return fail_start(job, p, unknown, i, x, expected);
+            return fail_start(job, p, unknown, i, x, "bounds", expected);
         }
         if (logit && !(x > low && x < high)) {
             snprintf(expected, sizeof expected, "expected a number between %g and %g: 'parameterisation: logit' never leaves or "
                                                 "reaches its bounds; give a start, or wider bounds", unknown->low, unknown->high);
-            return fail_start(job, p, unknown, i, x, expected);
+            return fail_start(job, p, unknown, i, x, "parameterisation", expected);
         }
     }
     return REY_OK;

@@ -275,6 +275,10 @@ static void mistakes_are_recognised(void **state) {
     expect_words(f, 2, "fit job.yaml --set parameters.0.start=nan", "start: nan, expected a finite number");
     expect_words(f, 2, "fit job.yaml --set parameters.0.start=[1,2]", "--set parameters.0.start=[1,2]: parameter 'red.reflec");
     expect_words(f, 2, "fit job.yaml --set parameters.0.start=target.exr", "--set parameters.0.start=target.exr: par");
+    assert_int_equal(system("sed 's/learning_rate: 0.05/parameterisation: logit, bounds: [0, 1]/' job.yaml >logit.yaml"), 0);
+    expect_words(f, 2, "fit logit.yaml --set parameters.0.bounds=[0.1,0.3]", "--set parameters.0.bounds=[0.1,0.3]: parameter "
+                       "'red.reflectance.value': entry 0 starts at 0.5, outside of its bounds 0.1 to 0.3");
+    expect_words(f, 2, "fit logit.yaml --set parameters.0.bounds=[0.5,0.9]", "--set parameters.0.bounds=[0.5,0.9]: parameter ");
     expect_words(f, 2, "render %s -o a.exr --load target.exr", "whose values are in 'target.exr'? expected NAME=target.exr");
     expect_words(f, 2, "render %s -o a.exr --load red.reflectance.value=", "expected FILE.xml or NAME=FILE");
 }
