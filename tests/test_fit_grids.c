@@ -229,13 +229,20 @@ static int write_silhouette(const Fixture *f) {
 static void test_carving(void **state) {
     Fixture *f = *state;
     const char *sets[] = {"views.0.silhouette=half.pfm", "parameters.0.carve=true", "iterations=22", "report_spp=0"};
-    char job[128], folder[128];
+    char job[128], folder[128], path[128];
     float picture[SIZE * SIZE * 3], empty[SIZE * SIZE * 3], values[FINE * FINE * FINE] = {0};
     FitResult result;
     path_of(f, "job.yaml", job);
     path_of(f, "g", folder);
     FitDef def = {.job_path = job, .overrides = sets, .override_count = 4, .output = folder};
     assert_int_equal(write_silhouette(f), 0);
+    path_of(f, "half.png", path); // what an alpha cuts out is no silhouette
+    assert_int_equal(rey_png_write_alpha(f->ctx, path, (float[SIZE * SIZE * 4]){1, 1, 1, 1}, SIZE, SIZE), REY_OK);
+    sets[0] = "views.0.silhouette=half.png";
+    assert_int_equal(rey_fit(f->ctx, &def, &result), REY_ERROR_ARGUMENT);
+    assert_non_null(strstr(rey_error(f->ctx), "half.png has an alpha below 1"));
+    rey_fit_result_free(&result);
+    sets[0] = "views.0.silhouette=half.pfm";
     if (rey_fit(f->ctx, &def, &result)) {
         fail_msg("%s", rey_error(f->ctx));
     }
@@ -327,7 +334,7 @@ static void test_errors(void **state) {
         {"parameters.0.start=target_0.exr", "not a VOL file"},
         {"parameters.0.carve=true", "carve needs views with a 'silhouette'"},
         {"parameters=[{name: air.interior_medium.albedo.value.value, carve: true}]", "carve is for grids of voxels"},
-        {"views.0.silhouette=half.exr", "half.exr"},
+        {"views.0.silhouette=half.pfm", "a silhouette is for parameters with 'carve: true', and the job has none"},
         {"views.0.held_out=maybe", "unknown value 'maybe'"},
         {"views_per_iteration=3", "the job has 2 views that are not held out"},
         {"parameters.1.name=views.2.exposure", "view 2 is held out"},

@@ -261,7 +261,7 @@ static void test_sensor_by_name(void **state) {
     assert_int_equal(write_text(f, "job.yaml", JOB), 0);
 }
 
-// A weight is one number, and an alpha is none: colours and what alpha cuts out are no masks, of silhouettes the latter.
+// A weight is one number, and an alpha is none: neither colours nor what alpha cuts out are masks.
 static void test_masks_are_weights(void **state) {
     const Fixture *f = *state;
     float green[SIZE * SIZE * 3] = {0}, half[SIZE * SIZE * 4], grey[SIZE * SIZE * 3];
@@ -285,7 +285,6 @@ static void test_masks_are_weights(void **state) {
         {"views.0.mask=green.exr", "--set views.0.mask=green.exr: green.exr: the mask is 0 1 0 at pixel 1, 1, expected a grey "
                                    "picture: one weight per pixel"},
         {"views.0.mask=half.png", "half.png has an alpha below 1, which would be left out, expected a picture without alpha"},
-        {"views.0.silhouette=half.png", "--set views.0.silhouette=half.png: half.png has an alpha below 1"},
     };
     for (int i = 0; i < COUNT_OF(cases); i++) {
         assert_int_equal(run_fit(f, OVERWRITE, 1, cases[i][0]), REY_ERROR_ARGUMENT);

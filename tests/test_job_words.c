@@ -56,6 +56,41 @@ static void test_keys_of_schedules(void **state) {
     rey_job_free(&job);
 }
 
+// Nor does a key do nothing that is for another loss, optimiser or parameter.
+static void test_keys_without_effect(void **state) {
+    rey_context *ctx = *state;
+    static const char *const cases[][3] = {
+        {HEAD "loss: {type: l2, epsilon: 0.1}\n", NULL, "job.yaml:4: 'epsilon' is a key of relative_l2 and log_l2, not of l2"},
+        {HEAD "loss: {epsilon: 0.1}\n", "loss.type=l1", "--set loss.type=l1: 'epsilon' is a key of relative_l2 and log_l2"},
+        {"scene: a\nviews: [{target: t, silhouette: s}]\nparameters: [a]\n", NULL,
+         "job.yaml:2: a silhouette is for parameters with 'carve: true', and the job has none"},
+        {"scene: a\nviews: [{target: t, silhouette: s}]\nparameters: [{name: a, carve: true}]\n", "parameters.0.carve=false",
+         "--set parameters.0.carve=false: a silhouette is for"},
+        {"scene: a\nviews: [{target: t}]\nparameters: [{name: a, moment: shared}]\noptimizer: lbfgs\n", NULL,
+         "job.yaml:3: 'moment' is for adam: lbfgs has none"},
+        {"scene: a\nviews: [{target: t}]\nparameters: [{name: a, moment: shared}]\n", "optimizer.type=sgd",
+         "--set optimizer.type=sgd: 'moment' is for adam: sgd has none"},
+    };
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        expect_error(ctx, cases[i][0], cases[i][1], cases[i][2]);
+    }
+    // what is written down with its defaults has none of them
+    static const char *const kinds[] = {"optimizer=lbfgs", "optimizer=sgd", "loss=l2", "loss=l1"};
+    for (int i = 0; i < COUNT_OF(kinds); i++) {
+        const char text[] = HEAD;
+        char *resolved;
+        Job job, again;
+        const unsigned char *bytes = (const unsigned char *)text;
+        assert_int_equal(rey_job_read_memory(ctx, "job.yaml", bytes, strlen(text), &kinds[i], 1, &job), REY_OK);
+        assert_int_equal(rey_job_yaml(&job, &resolved), REY_OK);
+        bytes = (const unsigned char *)resolved;
+        assert_int_equal(rey_job_read_memory(ctx, "again.yaml", bytes, strlen(resolved), NULL, 0, &again), REY_OK);
+        rey_free(ctx, resolved);
+        rey_job_free(&again);
+        rey_job_free(&job);
+    }
+}
+
 // An entry of what is no map or list was made by the override.
 static void test_overrides_are_blamed(void **state) {
     rey_context *ctx = *state;
@@ -124,6 +159,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_keys_are_named),
         cmocka_unit_test(test_keys_of_schedules),
+        cmocka_unit_test(test_keys_without_effect),
         cmocka_unit_test(test_overrides_are_blamed),
         cmocka_unit_test(test_overrides_among_others),
         cmocka_unit_test(test_bytes_have_lines),

@@ -164,8 +164,15 @@ static rey_result read_loss(Job *job, const YamlNode *node, void *target) {
         {0},
     };
     UNUSED(target);
-    return node->kind == YAML_SCALAR ? rey_job_read_field(job, fields, node, (char *)job)
-                                     : rey_job_read_map(job, node, "loss", fields, job);
+    if (node->kind == YAML_SCALAR) {
+        return rey_job_read_field(job, fields, node, (char *)job);
+    }
+    rey_result result = rey_job_read_map(job, node, "loss", fields, job);
+    bool has_epsilon = job->loss == LOSS_RELATIVE_L2 || job->loss == LOSS_LOG_L2;
+    return result || has_epsilon || !rey_yaml_find(node, "epsilon")
+               ? result
+               : rey_job_fail_at(job, rey_job_place_of(node, "epsilon", "type"), REY_ERROR_FORMAT,
+                                 "'epsilon' is a key of relative_l2 and log_l2, not of %s", rey_loss_name((int)job->loss));
 }
 
 // Keys of another kind of schedule, which would be passed over.
@@ -353,55 +360,6 @@ static rey_result set_defaults(Job *job) {
     return REY_OK;
 }
 
-static rey_result check_levels(Job *job) {
-    bool meshes = false;
-    JobPlace kinds = {0};
-    for (int i = 0; i < job->parameter_count; i++) {
-        meshes = meshes || job->parameters[i].parameterisation == PARAMETERISATION_LAPLACIAN;
-        kinds = rey_job_blame(kinds, rey_job_place_of(job->parameters[i].node, "parameterisation", NULL));
-    }
-    const YamlNode *levels = rey_yaml_find(job->tree, "levels");
-    for (const YamlNode *entry = levels ? levels->child : NULL; entry && !meshes; entry = entry->next) {
-        const YamlNode *length = rey_yaml_find(entry, "edge_length");
-        if (length) {
-            return rey_job_fail_at(job, rey_job_blame(rey_job_place(length), kinds), REY_ERROR_FORMAT,
-                                   "edge_length is for parameters of 'parameterisation: laplacian', and the job has none");
-        }
-    }
-    return REY_OK;
-}
-
-// A key of an entry (of the job itself, of its optimizer, of a parameter) that lbfgs does not go with.
-static rey_result fail_lbfgs(Job *job, const YamlNode *entry, const char *key, const char *why) {
-    JobPlace kind = rey_job_place_of(rey_yaml_find(job->tree, "optimizer"), "type", NULL);
-    return rey_job_fail_at(job, rey_job_blame(kind, rey_job_place_of(entry, key, NULL)), REY_ERROR_FORMAT, "lbfgs %s", why);
-}
-
-// L-BFGS needs one function, and takes its steps by itself.
-static rey_result check_lbfgs(Job *job) {
-    const YamlNode *optimizer = rey_yaml_find(job->tree, "optimizer");
-    if (job->optimizer.schedule.kind != SCHEDULE_CONSTANT) {
-        return fail_lbfgs(job, optimizer, "schedule", "finds the lengths of its steps by itself: it has no schedule");
-    }
-    for (int i = 0; i < job->parameter_count; i++) {
-        if (job->parameters[i].parameterisation == PARAMETERISATION_SIMPLEX) {
-            return fail_lbfgs(job, job->parameters[i].node, "parameterisation",
-                              "does not move what is on a simplex: adam and sgd do");
-        }
-    }
-    if (job->optimizer.average > 0) {
-        return fail_lbfgs(job, optimizer, "average", "ends at its best point: it has no average");
-    }
-    if (job->views_per_iteration && job->views_per_iteration != job->fitted_count) {
-        return fail_lbfgs(job, job->tree, "views_per_iteration", "needs all views in every iteration");
-    }
-    if (job->gradient_spp) {
-        return fail_lbfgs(job, job->tree, "gradient_spp",
-                          "needs the gradient of the pictures that it compares: it has no gradient_spp");
-    }
-    return REY_OK;
-}
-
 rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigned char *bytes, size_t size,
                                const char *const *overrides, int override_count, Job *job) {
     *job = (Job){.ctx = ctx, .path = path};
@@ -434,21 +392,7 @@ rey_result rey_job_read_memory(rey_context *ctx, const char *path, const unsigne
     if (!result && !job->optimizer.schedule.length) {
         job->optimizer.schedule.length = job->iterations ? job->iterations : 1;
     }
-    if (!result) {
-        result = check_levels(job);
-    }
-    if (!result && job->optimizer.kind == OPTIMIZER_LBFGS) {
-        result = check_lbfgs(job);
-    }
-    if (!result && job->views_per_iteration > job->fitted_count) {
-        result = rey_job_fail(job, rey_yaml_find(job->tree, "views_per_iteration"),
-                         "views_per_iteration = %d, but the job has %d view%s%s", job->views_per_iteration,
-                         job->fitted_count, PLURAL(job->fitted_count),
-                         job->fitted_count == job->view_count ? ""
-                         : job->fitted_count == 1             ? " that is not held out"
-                                                              : " that are not held out");
-    }
-    return result;
+    return result ? result : rey_job_check(job);
 }
 
 rey_result rey_job_read(rey_context *ctx, const char *path, const char *const *overrides, int override_count,

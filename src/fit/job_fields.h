@@ -47,3 +47,5 @@ rey_result rey_job_read_map(Job *job, const YamlNode *map, const char *what, con
 rey_result rey_job_open_list(Job *job, const YamlNode *node, size_t item_bytes, void **items, int *count);
 // The entries of `parameters` (job_parameters.c); target: JobParameter **.
 rey_result rey_job_read_parameters(Job *job, const YamlNode *node, void *target);
+// Whether the keys of a whole job go together (job_check.c).
+rey_result rey_job_check(Job *job);

@@ -33,7 +33,8 @@ static void line_integer(Text *t, const char *key, int64_t value) {
     rey_text_add(t, "%s: %lld\n", key, (long long)value);
 }
 
-static void flat_parameter(Text *t, const JobParameter *p, int i) {
+static void flat_parameter(Text *t, const Job *job, int i) {
+    const JobParameter *p = &job->parameters[i];
     char key[64];
 #define KEY(name) (snprintf(key, sizeof key, "parameters.%d." name, i), key)
     line_text(t, KEY("name"), p->name);
@@ -45,7 +46,9 @@ static void flat_parameter(Text *t, const JobParameter *p, int i) {
         line_bound(t, KEY("bounds.1"), p->bounds[1]);
     }
     line_text(t, KEY("parameterisation"), rey_parameterisation_name((int)p->parameterisation));
-    line_text(t, KEY("moment"), rey_moment_name((int)p->moment));
+    if (job->optimizer.kind == OPTIMIZER_ADAM) {
+        line_text(t, KEY("moment"), rey_moment_name((int)p->moment));
+    }
     if (p->parameterisation == PARAMETERISATION_LAPLACIAN) {
         line_real(t, KEY("smoothness"), p->smoothness);
         line_real(t, KEY("regularisers.laplacian"), p->regularisers.laplacian);
@@ -200,7 +203,7 @@ static void flat_decisive(Text *t, const Job *job) {
     }
     flat_optimizer(t, &job->optimizer);
     for (int i = 0; i < job->parameter_count; i++) {
-        flat_parameter(t, &job->parameters[i], i);
+        flat_parameter(t, job, i);
     }
     if (job->stop_window) {
         line_integer(t, "stop.window", job->stop_window);
