@@ -6,6 +6,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -75,7 +76,7 @@ static void test_words(void **state) {
         for (int k = 0; k < 12; k++) {
             pose[k] = k % 4 == 3 || cases[i].scale > 0 ? pose[k] : -pose[k];
         }
-        rey_pose_text(pose, text, sizeof text);
+        rey_pose_text(pose, NULL, text, sizeof text);
         assert_string_equal(text, cases[i].words);
         double angle = sqrt(cases[i].turn[0] * cases[i].turn[0] + cases[i].turn[1] * cases[i].turn[1] +
                             cases[i].turn[2] * cases[i].turn[2]);
@@ -84,12 +85,42 @@ static void test_words(void **state) {
     }
     const float stretched[RIGID_VALUES] = {2, 0, 0, 4, 0, 1, 0, 2, 0, 0, 3, 7};
     char text[128];
-    rey_pose_text(stretched, text, sizeof text);
+    rey_pose_text(stretched, NULL, text, sizeof text);
     assert_string_equal(text, "4 2 7, turned 0 0 0 deg, scale 2 1 3");
     assert_float_equal(rey_pose_distance(unit, stretched), 5, 1e-6);
 }
 
+// Beyond half a turn, a rotation is told as the one that it is compared with, and not by its axis turned over.
+static void test_words_of_half_turns(void **state) {
+    (void)state;
+    static const struct {
+        double turn[3], near[3];
+        const char *words[2]; // by itself, and near the other one
+    } cases[] = {{{0, 181, 0}, {0, 178, 0}, {"0 -179 0", "0 181 0"}},
+                 {{0, -181, 11}, {0, 178, -11}, {"0 178 -10.8", "0 178 -10.8"}},
+                 {{0, 0, 30}, {0, 0, 40}, {"0 0 30", "0 0 30"}},
+                 {{0, 0, 0}, {0, 0, 179}, {"0 0 0", "0 0 0"}}};
+    const float unit[RIGID_VALUES] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        double variable[2][RIGID_VALUES] = {{0}, {0}};
+        float pose[RIGID_VALUES], near[RIGID_VALUES];
+        for (int k = 0; k < 3; k++) {
+            variable[0][k] = cases[i].turn[k] * 3.14159265358979323846 / 180;
+            variable[1][k] = cases[i].near[k] * 3.14159265358979323846 / 180;
+        }
+        rey_rigid_pose(unit, variable[0], pose);
+        rey_rigid_pose(unit, variable[1], near);
+        for (int k = 0; k < 2; k++) {
+            char text[128], expected[128];
+            rey_pose_text(pose, k ? near : NULL, text, sizeof text);
+            snprintf(expected, sizeof expected, "0 0 0, turned %s deg", cases[i].words[k]);
+            assert_string_equal(text, expected);
+        }
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rigid_poses), cmocka_unit_test(test_words)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rigid_poses), cmocka_unit_test(test_words),
+                                       cmocka_unit_test(test_words_of_half_turns)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -59,11 +59,30 @@ static void rotation_vector(double r[3][3], double out[3]) {
     }
 }
 
-void rey_pose_part(const float *pose, PosePart part, double out[3]) {
+// The same rotation the other way round, where that is closer to the rotation of another pose.
+static void turn_towards(const float *near, double turn[3]) {
+    double r[3][3], lengths[3], to[3], off = 0, off_other = 0;
+    double angle = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]), other = 1 - 360 / angle;
+    if (!near || !(angle > 0)) {
+        return;
+    }
+    unit_columns(near, r, lengths);
+    rotation_vector(r, to);
+    for (int k = 0; k < 3; k++) {
+        off += (turn[k] - to[k]) * (turn[k] - to[k]);
+        off_other += (other * turn[k] - to[k]) * (other * turn[k] - to[k]);
+    }
+    for (int k = 0; k < 3 && off_other < off; k++) {
+        turn[k] *= other;
+    }
+}
+
+void rey_pose_part(const float *pose, const float *near, PosePart part, double out[3]) {
     double r[3][3], lengths[3];
     unit_columns(pose, r, lengths);
     if (part == POSE_TURN) {
         rotation_vector(r, out);
+        turn_towards(near, out);
         return;
     }
     for (int k = 0; k < 3; k++) {
@@ -80,11 +99,12 @@ static int put_three(char *text, size_t size, const double *v) {
     return snprintf(text, size, "%.3g %.3g %.3g", x[0], x[1], x[2]);
 }
 
-void rey_pose_text(const float *pose, char *text, size_t size) {
+void rey_pose_text(const float *pose, const float *near, char *text, size_t size) {
     const double at[3] = {(double)pose[3], (double)pose[SIDE + 3], (double)pose[2 * SIDE + 3]};
     double r[3][3], lengths[3], turn[3];
     unit_columns(pose, r, lengths);
     rotation_vector(r, turn);
+    turn_towards(near, turn);
     char where[48], turned[48], scale[48] = "";
     put_three(where, sizeof where, at);
     put_three(turned, sizeof turned, turn);

@@ -27,12 +27,13 @@ static double value_of(const Chart *c, int64_t row, int k) {
     if (!c->pose) {
         return cell(c->fit, row, c->column + k);
     }
-    float pose[16];
+    float pose[16], first[16];
     double three[3];
     for (int i = 0; i < COUNT_OF(pose); i++) {
         pose[i] = (float)cell(c->fit, row, c->column + i);
+        first[i] = (float)cell(c->fit, 0, c->column + i);
     }
-    rey_pose_part(pose, c->part, three);
+    rey_pose_part(pose, c->truth ? c->truth : first, c->part, three);
     return three[k];
 }
 
@@ -41,7 +42,7 @@ static double truth_of(const Chart *c, int k) {
     if (!c->pose) {
         return (double)c->truth[k];
     }
-    rey_pose_part(c->truth, c->part, three);
+    rey_pose_part(c->truth, NULL, c->part, three);
     return three[k];
 }
 

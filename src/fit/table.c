@@ -115,7 +115,7 @@ bool rey_fit_row_text(const FitRow *row, int column, char *text, size_t size) {
     if (!rey_fit_row_is_pose(row) || !values) {
         return false;
     }
-    rey_pose_text(values, text, size);
+    rey_pose_text(values, row->truth ? row->truth : row->start, text, size);
     return true;
 }
 
