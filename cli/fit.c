@@ -75,6 +75,8 @@ static void error_text(const FitRow *row, char *text, size_t size) {
     } else if (row->truth && rey_fit_row_is_pose(row)) {
         snprintf(text, size, "%.2f %% (%.3g away, turned by %.3g deg)", 100 * row->error,
                  rey_pose_distance(row->found, row->truth), rey_pose_turned(row->found, row->truth));
+    } else if (row->truth && row->absolute) {
+        snprintf(text, size, "%.3g (absolute%s)", row->error, row->weighted ? ", weighted" : "");
     } else if (row->truth) {
         snprintf(text, size, "%.2f %%%s", 100 * row->error, row->weighted ? " (weighted)" : "");
     } else {
@@ -124,6 +126,16 @@ static void json_values(Json *json, const char *key, const FitRow *row, const fl
     json_array_end(json);
 }
 
+static const char *measure_of(const FitRow *row) {
+    if (row->points[COLUMN_TRUTH]) {
+        return "chamfer";
+    }
+    if (row->weighted) {
+        return row->absolute ? "weighted_absolute" : "weighted_mean";
+    }
+    return row->absolute ? "largest_absolute" : "largest_relative";
+}
+
 static void print_json(const FitResult *result, const Session *session) {
     Json json = json_begin(stdout);
     char words[64];
@@ -156,7 +168,7 @@ static void print_json(const FitResult *result, const Session *session) {
         json_values(&json, "found", row, row->found);
         bool mesh = row->points[COLUMN_TRUTH] != 0;
         json_number(&json, "error", row->truth || mesh ? row->error : (double)NAN);
-        json_string(&json, "measure", mesh ? "chamfer" : row->weighted ? "weighted_mean" : "largest_relative");
+        json_string(&json, "measure", measure_of(row));
         if (row->truth && rey_fit_row_is_pose(row)) {
             json_number(&json, "distance", rey_pose_distance(row->found, row->truth));
             json_number(&json, "angle", rey_pose_turned(row->found, row->truth));

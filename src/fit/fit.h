@@ -40,6 +40,7 @@ typedef struct FitRow { // one unknown, in the final table
     int dims;
     float *truth, *start, *found; // truth null: not known
     double error;                 // largest relative error of an entry; weighted: see below
+    bool absolute;                // the truth is 0 where it is, so that it is no share but the difference itself
     int grid;                     // numbers of each voxel; 0 = no grid
     int64_t carved;               // numbers of voxels that were carved (carve.h)
     bool derived;                 // from other rows: absorption and reduced scattering of a medium; these rows stand last
@@ -175,6 +176,8 @@ rey_result rey_fit_check_derivatives(Fit *fit);
 
 // Notes unknowns on which no fitted view depends, poses that may shear, terms that are left out, and odd targets (notes.c).
 rey_result rey_fit_notes(const Fit *fit);
+// After the last iteration: unknowns whose gradient was never anything but 0.
+void rey_fit_note_idle(const Fit *fit);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
 // back through that, with the gradient of an unknown exposure.

@@ -238,6 +238,15 @@ static rey_result add_views(Fit *fit, const int *order, int count, double *loss)
     return REY_OK;
 }
 
+static void mark_driven(Unknowns *u) {
+    for (size_t k = 0; k < u->items.count; k++) {
+        Unknown *p = &ARRAY_AT(u->items, Unknown, k);
+        for (int64_t i = p->offset; i < p->offset + p->count && !p->driven; i++) {
+            p->driven = u->gradient[i] != 0;
+        }
+    }
+}
+
 static rey_result iterate(Fit *fit, int *order) {
     int count = choose_batch(fit, fit->state.iteration, order);
     double loss = 0;
@@ -257,6 +266,7 @@ static rey_result iterate(Fit *fit, int *order) {
     }
     loss += rey_unknowns_regularise(&fit->unknowns);
     rey_unknowns_hold(&fit->unknowns);
+    mark_driven(&fit->unknowns);
     double norm = rey_optimizer_step(&fit->job.optimizer, &fit->unknowns, fit->state.iteration, loss);
     result = check_finite(fit, loss, norm);
     if (!result) {

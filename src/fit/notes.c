@@ -131,6 +131,16 @@ static void note_terms(const Fit *fit) {
     }
 }
 
+void rey_fit_note_idle(const Fit *fit) {
+    for (size_t k = 0; k < fit->unknowns.items.count && fit->def->note && fit->state.iteration > fit->first; k++) {
+        const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        const float *start = fit->unknowns.start + p->offset, *found = fit->unknowns.value + p->offset;
+        if (!p->driven && !memcmp(start, found, (size_t)p->count * sizeof *start)) {
+            note(fit, p, "its gradient was 0 in every iteration, and it is where it started");
+        }
+    }
+}
+
 rey_result rey_fit_notes(const Fit *fit) {
     if (!fit->def->note) {
         return REY_OK;

@@ -129,6 +129,7 @@ static void take_state(const Unknowns *from, Unknowns *to) {
     for (size_t k = 0; k < to->items.count; k++) {
         const Unknown *a = &ARRAY_AT(from->items, Unknown, k), *b = &ARRAY_AT(to->items, Unknown, k);
         size_t n = (size_t)b->count;
+        ARRAY_AT(to->items, Unknown, k).driven = a->driven;
         if (b->vertices || a->count != b->count) {
             for (int64_t i = b->offset; i < b->offset + b->count; i++) {
                 to->average[i] = (double)to->value[i];

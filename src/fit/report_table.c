@@ -68,6 +68,9 @@ static void put_row(Fit *fit, const FitRow *row, int column, Text *html) {
     if (row->truth && rey_fit_row_is_pose(row)) {
         rey_text_add(html, "<td class=\"n\">%.2f&thinsp;%%<div class=\"note\">%.3g away, turned by %.3g&deg;</div></td><td>",
                      100 * row->error, rey_pose_distance(row->found, row->truth), rey_pose_turned(row->found, row->truth));
+    } else if (row->truth && row->absolute) {
+        rey_text_add(html, "<td class=\"n\">%.3g%s<div class=\"note\">absolute</div></td><td>", row->error,
+                     row->weighted ? "<sup>w</sup>" : "");
     } else if (row->truth || row->points[COLUMN_TRUTH]) {
         rey_text_add(html, row->points[COLUMN_TRUTH] ? "<td class=\"n\">%.3f&thinsp;%%%s</td><td>"
                                                      : "<td class=\"n\">%.2f&thinsp;%%%s</td><td>",
@@ -99,7 +102,7 @@ static void put_notes(const FitResult *out, Text *html) {
     }
     rey_text_add(html, "<p class=\"note\">");
     if (entries) {
-        rey_text_add(html, "Error: the largest relative error of an entry. ");
+        rey_text_add(html, "Error: the largest relative error of an entry, absolute where the truth is 0. ");
     }
     if (weighted) {
         rey_text_add(html, "<sup>w</sup>&thinsp;Mean absolute error over mean, each entry weighted by how much the pictures "

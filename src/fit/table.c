@@ -129,25 +129,28 @@ static double pose_error(const FitRow *row) {
     return worst / largest;
 }
 
-static double worst_error(const FitRow *row) {
-    double worst = 0;
+static void set_worst_error(FitRow *row) {
     if (rey_fit_row_is_pose(row)) {
-        return pose_error(row);
+        row->error = pose_error(row);
+        return;
     }
     for (int64_t i = 0; i < row->count; i++) {
         double truth = (double)row->truth[i], off = fabs((double)row->found[i] - truth);
-        worst = fmax(worst, truth != 0 ? off / fabs(truth) : off); // an entry of truth 0 counts absolutely
+        double error = truth != 0 ? off / fabs(truth) : off; // an entry of truth 0 counts absolutely
+        row->absolute = error > row->error ? truth == 0 : row->absolute;
+        row->error = fmax(row->error, error);
     }
-    return worst;
 }
 
-static double weighted_error(const FitRow *row, const double *gradient) {
-    double error = 0, mean = 0;
+static void set_weighted_error(FitRow *row, const double *gradient) {
+    double error = 0, mean = 0, weight = 0;
     for (int64_t i = 0; i < row->count; i++) {
         error += fabs(gradient[i]) * fabs((double)row->found[i] - (double)row->truth[i]);
         mean += fabs(gradient[i]) * fabs((double)row->truth[i]);
+        weight += fabs(gradient[i]);
     }
-    return mean > 0 ? error / mean : 0;
+    row->absolute = weight > 0 && !(mean > 0);
+    row->error = mean > 0 ? error / mean : weight > 0 ? error / weight : 0;
 }
 
 static Triangles triangles_of(const rey_scene *scene, int param) {
@@ -222,7 +225,7 @@ static rey_result judge_derived(Fit *fit, const rey_scene *truth, FitRow *row) {
                                         &coefficients[ABSORPTION], &coefficients[REDUCED]);
             row->truth[i] = (float)coefficients[which];
         }
-        row->error = worst_error(row);
+        set_worst_error(row);
         return REY_OK;
     }
     return REY_OK;
@@ -260,7 +263,9 @@ static rey_result judge_row(Fit *fit, rey_scene *truth, FitRow *row) {
     if (!row->truth) {
         return REY_ERROR_MEMORY;
     }
-    row->error = row->weighted ? 0 : worst_error(row); // weigh_rows follows
+    if (!row->weighted) { // weigh_rows follows
+        set_worst_error(row);
+    }
     return REY_OK;
 }
 
@@ -316,7 +321,9 @@ static rey_result weigh_rows(Fit *fit, rey_scene *truth, const float *ones, FitR
     }
     for (size_t i = 0; i < rows && !result; i++) {
         FitRow *row = &ARRAY_AT(out->rows, FitRow, i);
-        row->error = w.of_row[i] < 0 ? row->error : weighted_error(row, w.sum + w.offsets[w.of_row[i]]);
+        if (w.of_row[i] >= 0) {
+            set_weighted_error(row, w.sum + w.offsets[w.of_row[i]]);
+        }
     }
     void *const arrays[] = {w.params, w.offsets, w.of_row, w.gradient, w.sum};
     for (int k = 0; k < COUNT_OF(arrays); k++) {

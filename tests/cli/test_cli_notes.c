@@ -58,6 +58,8 @@ static void unknowns_out_of_sight_are_told(void **state) {
                 "parameter 'side.x_fov': no view that is fitted has this sensor, so that its gradient is 0");
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=idle.reflectance.value",
                 "parameter 'idle.reflectance.value': no view that is fitted depends on it");
+    assert_non_null(strstr(f->words, "parameter 'idle.reflectance.value': its gradient was 0 in every iteration"));
+    assert_null(strstr(f->words, "parameter 'grey.reflectance.value': its gradient was 0"));
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=sensor_0.x_fov", NULL);
     expect_note(f, "fit job.yaml --overwrite --json --set parameters.1=ball.to_world",
                 "parameter 'ball.to_world': the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid'");

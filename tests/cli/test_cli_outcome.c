@@ -96,6 +96,15 @@ static void truths_that_are_the_start_are_told(void **state) {
     assert_null(strstr(f->words, words));
     expect(f, 0, "fit job.yaml -o same --overwrite --set parameters.1=lamp.emitter.radiance.value --set parameters.1.start=4");
     assert_null(strstr(f->words, words)); // of one it does not
+    // an error of what is 0 is no percentage
+    JsonNode *node = run_json(f, 0, "fit job.yaml -o same --overwrite --set 'truth.defines.red=0.5, 0, 0.5' --json");
+    const JsonNode *row = json_get(node, "parameters")->first;
+    assert_string_equal(json_text(row, "measure", ""), "largest_absolute");
+    assert_true(json_value(row, "error", 0) > 0.4);
+    json_free(node);
+    expect(f, 0, "fit job.yaml -o same --overwrite --set 'truth.defines.red=0.5, 0, 0.5'");
+    assert_non_null(strstr(f->out, " (absolute)\n"));
+    assert_null(strstr(f->out, "%\n"));
 }
 
 // What would be found out in the first iteration is told before it.
