@@ -145,6 +145,30 @@ static void test_pair(void **state) {
     rey_fit_result_free(&result);
 }
 
+static void keep_words(void *user, const char *words) { snprintf(user, 512, "%s", words); }
+
+// Shares that do not sum up to 1 are divided by their sum, which is told.
+static void test_shares_are_scaled(void **state) {
+    Fixture *f = *state;
+    for (int i = 0; i < 2; i++) {
+        char job[128], folder[128], words[512] = "";
+        const char *sets[] = {i ? "parameters.1.start=[0.25,0.25,0.5]" : "parameters.1.start=[1,1,2]", "iterations=0",
+                              "report_spp=0"};
+        FitResult result;
+        path_of(f, "job.yaml", job);
+        path_of(f, "scaled", folder);
+        FitDef def = {.job_path = job, .overrides = sets, .override_count = COUNT_OF(sets), .output = folder, .overwrite = true,
+                      .note = keep_words, .user = words};
+        if (rey_fit(f->ctx, &def, &result)) {
+            fail_msg("%s", rey_error(f->ctx));
+        }
+        assert_float_equal((double)row_of(&result, "box.interior_medium.phase_function.weights")->start[0], 0.25, 1e-6);
+        rey_fit_result_free(&result);
+        const char *expected = "parameter 'box.interior_medium.phase_function.weights': the shares of the start summed up to 4";
+        assert_true(i ? !strstr(words, "shares") : strstr(words, expected) != NULL);
+    }
+}
+
 static void test_errors(void **state) {
     Fixture *f = *state;
     static const char *const cases[][2] = {
@@ -171,6 +195,7 @@ int main(void) {
         cmocka_unit_test(test_fit_media),
         cmocka_unit_test(test_known_g),
         cmocka_unit_test(test_pair),
+        cmocka_unit_test(test_shares_are_scaled),
         cmocka_unit_test(test_errors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

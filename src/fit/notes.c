@@ -142,6 +142,7 @@ void rey_fit_note_idle(const Fit *fit) {
 }
 
 rey_result rey_fit_notes(const Fit *fit) {
+    static const double rounding = 1e-4;
     if (!fit->def->note) {
         return REY_OK;
     }
@@ -150,6 +151,12 @@ rey_result rey_fit_notes(const Fit *fit) {
     }
     for (size_t k = 0; k < fit->unknowns.items.count; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
+        if (p->parameterisation == PARAMETERISATION_SIMPLEX && fabs(p->sum - 1) > rounding) {
+            char words[128];
+            snprintf(words, sizeof words, "the shares of the start summed up to %g, and were divided by that: the sum of a simplex "
+                     "is 1", p->sum);
+            note(fit, p, words);
+        }
         if (is_free_pose(fit, p)) {
             note(fit, p, "the 16 entries of this pose move freely, and shear it; 'parameterisation: rigid' turns and shifts it, "
                          "'similarity' scales it besides");

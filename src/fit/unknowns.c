@@ -445,7 +445,7 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *
         result = allocate(job, u);
     }
     for (size_t i = 0; i < u->items.count && !result; i++) {
-        const Unknown *unknown = &ARRAY_AT(u->items, Unknown, i);
+        Unknown *unknown = &ARRAY_AT(u->items, Unknown, i);
         if (unknown->param >= 0) {
             u->params[u->param_count++] = unknown->param;
         }
@@ -453,6 +453,9 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *
         result = set_start(job, scene, keep ? NULL : p, unknown, u->start + unknown->offset);
         if (!result) {
             result = check_start(job, p, unknown, u->start + unknown->offset, keep);
+        }
+        for (int64_t k = 0; k < unknown->count; k++) {
+            unknown->sum += (double)u->start[unknown->offset + k];
         }
     }
     rey_array_free(job->ctx, &owners);
