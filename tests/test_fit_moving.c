@@ -316,6 +316,10 @@ static void test_level_errors(void **state) {
         {"gradient_spp: 2\noptimizer: {type: lbfgs}\nparameters: [{name: ball.positions}]\n", "no gradient_spp"},
         {"views_per_iteration: 1\noptimizer: {type: lbfgs}\nparameters: [{name: ball.positions}]\n", "all views"},
         {"parameters: [{name: ball.positions, parameterisation: laplacian, regularisers: {length: 1}}]\n", "unknown key"},
+        {"parameters:\n  - {name: ball.positions, parameterisation: laplacian, start: 0}\n",
+         "job.yaml:7: parameter 'ball.positions': its start is a mesh without area: all of its triangles are lines or points"},
+        {"parameters: [{name: front.to_world, parameterisation: rigid, start: 0}]\n",
+         "job.yaml:6: parameter 'front.to_world': its start cannot be inverted, expected a pose"},
     };
     for (int i = 0; i < COUNT_OF(cases); i++) {
         char text[1024];
