@@ -258,7 +258,7 @@ static void test_remeshing_is_stopped(void **state) {
     rey_fit_result_free(&result);
 }
 
-// Edges that no memory would hold are refused before the first iteration, whatever level they are of, and leave no folder.
+// Edges that would make too many triangles are refused before the first iteration, whatever level they are of, and leave no folder.
 static void test_tiny_edges_are_refused(void **state) {
     Fixture *f = *state;
     FitResult result;
