@@ -105,11 +105,12 @@ static void print_table(const FitResult *result) {
         size_t row = i % (result->rows.count + 1);
         row_cells(row ? &ARRAY_AT(result->rows, FitRow, row - 1) : NULL, cells);
         for (int c = 0; c < CELLS; c++) {
-            int length = (int)strlen(cells[c]);
+            int width = cli_text_width(cells[c]);
             if (i == row) {
-                widths[c] = length > widths[c] ? length : widths[c];
+                widths[c] = width > widths[c] ? width : widths[c];
             } else {
-                printf("%-*s%s", c + 1 < CELLS ? widths[c] : 0, cells[c], c + 1 < CELLS ? "  " : "\n");
+                bool last = c + 1 == CELLS;
+                printf("%-*s%s", last ? 0 : cli_pad(cells[c], widths[c]), cells[c], last ? "\n" : "  ");
             }
         }
     }
