@@ -8,6 +8,7 @@
 #pragma once
 
 #include "math/microfacet.h"
+#include "math/warp.h"
 
 #ifdef REAL_DOUBLE
 #define CRITICAL_LEAST 1e-7
@@ -48,10 +49,8 @@ KFN Float interface_pdf(const Microfacet *mf, Vec3 wi, Vec3 m, Float e, real flo
 KFN Vec3 interface_sample(const Microfacet *mf, Vec3 wi, Float e, real floor, Float *u1, Vec2 u2) {
     Vec3 m = microfacet_sample(mf, wi, u2.x, u2.y);
     if (floor > 0) {
-        Float share = critical_share(e, floor);
-        Mask critical = m_lt(*u1, share);
+        Mask critical = warp_event(critical_share(e, floor), u1);
         m = v3_select(critical, critical_sample(wi, f_min(e, f_set(1)), u2), m);
-        *u1 = f_min(f_select(critical, *u1 * f_safe_rcp(share), (*u1 - share) / (1.0f - share)), f_set(0.99999994f));
     }
     return m;
 }

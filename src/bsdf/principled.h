@@ -218,7 +218,7 @@ KFN BsdfSample principled_sample(const Principled *p, Vec3 wi, Float u1, Vec2 u2
     Microfacet mf = principled_facets(p->roughness, p->anisotropic);
     Float eta = principled_eta(p), e = f_select(front, eta, 1.0f / eta);
     if (p->rim > 0) {
-        rim = rim_choose(principled_rim(p, &mf, wi, e), &u1);
+        rim = warp_event(principled_rim(p, &mf, wi, e), &u1);
     }
     // [0, main): the main lobe, with a random number of its own; then the clearcoat; then diffuse
     Float main = c.lobes[PRINCIPLED_MAIN], coat = main + c.lobes[PRINCIPLED_COAT];

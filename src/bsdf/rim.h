@@ -10,18 +10,12 @@
 
 #include "bsdf/record.h"
 #include "math/microfacet.h"
+#include "math/warp.h"
 
 // Probability of the rim; 0 where there is none, and small where normals hardly reach it.
 KFN Float rim_share(const Microfacet *mf, Vec3 wi, Float e, real rim) {
     Mask exists = m_lt(f_abs(wi.z), e) & m_ne(wi.z, f_set(0)) & m_set(mf->ggx);
     return f_zero_unless(exists, rim * f_min(f_max(mf->alpha_u, mf->alpha_v), f_set(1)));
-}
-
-// Whether a direction on the rim is chosen; *u1 is uniform again afterwards.
-KFN Mask rim_choose(Float share, Float *u1) {
-    Mask chosen = m_lt(*u1, share);
-    *u1 = f_min(f_select(chosen, *u1 * f_safe_rcp(share), (*u1 - share) / (1.0f - share)), f_set(0.99999994f));
-    return chosen;
 }
 
 KFN Vec3 rim_direction(Vec3 wi, Float e, Float u) {

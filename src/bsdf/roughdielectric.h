@@ -93,7 +93,7 @@ KFN BsdfSample roughdielectric_sample(const RoughDielectric *p, Vec3 wi, Float u
     Float eta = roughdielectric_eta(p), e = f_select(m_gt(wi.z, f_set(0)), eta, 1.0f / eta);
     Mask rim = m_set(false);
     if (p->rim > 0) {
-        rim = rim_choose(rim_share(&mf, wi, e, p->rim), &u1);
+        rim = warp_event(rim_share(&mf, wi, e, p->rim), &u1);
     }
     Vec3 m = interface_sample(&mf, v3_scale(wi, f_sign(wi.z)), e, p->floor, &u1, u2);
     Float cos_t, eta_it, eta_ti, f = fresnel_dielectric(v3_dot(wi, m), eta, &cos_t, &eta_it, &eta_ti);

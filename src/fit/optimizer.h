@@ -19,7 +19,7 @@ typedef struct Unknown { // one parameter of the scene, or of a view
     Vertices *vertices; // of laplacian, owned; else null
     GridSize grid;      // of grids, else all 0
     GridRegularisers regularisers;
-    double sum;         // of the start as it was given: shares are divided by it
+    double sum;         // of a simplex, of the start as it was given: shares are divided by it
     bool driven;        // its gradient was not 0 in some iteration of this run
     unsigned char *carved; // 1 for entries that stay what they are (carve.h), owned; null = none do
 } Unknown;

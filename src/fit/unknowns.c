@@ -350,7 +350,7 @@ rey_result rey_unknowns_create(Job *job, rey_scene *scene, bool keep, Unknowns *
         if (!result) {
             result = rey_start_check(job, p, unknown, u->start + unknown->offset, keep);
         }
-        for (int64_t k = 0; k < unknown->count; k++) {
+        for (int64_t k = 0; k < unknown->count && p->parameterisation == PARAMETERISATION_SIMPLEX; k++) {
             unknown->sum += (double)u->start[unknown->offset + k];
         }
     }

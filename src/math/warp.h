@@ -3,6 +3,14 @@
 
 #include "math/vec.h"
 
+// Whether an event of a probability happens, by a uniform number, which is uniform again afterwards.
+KFN Mask warp_event(Float probability, Float *u) {
+    Mask happens = m_lt(*u, probability);
+    *u = f_select(happens, *u * f_safe_rcp(probability), (*u - probability) / (1.0f - probability));
+    *u = f_min(*u, f_set(0.99999994f));
+    return happens;
+}
+
 // The unit disk in polar coordinates: radius from u.y, angle from u.x. Density 1 / pi.
 KFN Vec2 warp_uniform_disk_polar(Vec2 u) {
     Float sine, cosine, r = f_sqrt(u.y);

@@ -75,18 +75,28 @@ static bool has_jumping_media(const SceneView *view) {
     return false;
 }
 
-static bool is_volume(const SceneView *view, int32_t texture) {
+static bool is_volume(const SceneView *view, const TextureNode *t) {
+    UNUSED(view);
+    return t->kind == TEXTURE_VOLUME;
+}
+
+static bool is_jumping_volume(const SceneView *view, const TextureNode *t) {
+    return t->kind == TEXTURE_VOLUME && jumps(view->volumes + t->volume);
+}
+
+// Whether a texture, or one inside it, is of a sort.
+static bool texture_holds(const SceneView *view, int32_t texture, bool (*is)(const SceneView *view, const TextureNode *t)) {
     if (texture < 0) {
         return false;
     }
     const TextureNode *t = view->textures + texture;
-    return t->kind == TEXTURE_VOLUME || is_volume(view, t->child[0]) || is_volume(view, t->child[1]);
+    return is(view, t) || texture_holds(view, t->child[0], is) || texture_holds(view, t->child[1], is);
 }
 
 static bool phases_read_volumes(const SceneView *view) {
     for (int64_t i = 0; i < view->phases_count; i++) {
         for (int k = 0; k < MAX_PHASE_SLOTS; k++) {
-            if (is_volume(view, view->phases[i].slot[k])) {
+            if (texture_holds(view, view->phases[i].slot[k], is_volume)) {
                 return true;
             }
         }
@@ -177,24 +187,15 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     return NULL;
 }
 
-static bool reads_jumps(const SceneView *view, int32_t texture) {
-    if (texture < 0) {
-        return false;
-    }
-    const TextureNode *t = view->textures + texture;
-    return (t->kind == TEXTURE_VOLUME && jumps(view->volumes + t->volume)) || reads_jumps(view, t->child[0]) ||
-           reads_jumps(view, t->child[1]);
-}
-
 // What is not known of points that move where surfaces have volumes as textures, null where all is.
 static const char *gap_of_lookups(const SceneView *view) {
     for (int32_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
         for (int k = 0; k < MAX_SLOTS; k++) {
-            if (reads_jumps(view, view->bsdfs[i].slot[k])) {
+            if (texture_holds(view, view->bsdfs[i].slot[k], is_jumping_volume)) {
                 return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to "
                        "voxel pass over points that move";
             }
-            if (is_volume(view, view->bsdfs[i].slot[k]) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
+            if (texture_holds(view, view->bsdfs[i].slot[k], is_volume) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
                 return "surfaces that let a part of the light pass have volumes as textures, which rays that move pass elsewhere";
             }
         }
