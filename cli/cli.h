@@ -200,7 +200,7 @@ bool cli_direction_bare_pose(const rey_scene *scene, const char *spec);
 // moves nothing.
 size_t cli_direction_name_length(const char *spec);
 const char *cli_direction_file(const char *spec); // the tangent that a spec reads, or null
-bool cli_direction_fits(const rey_param_info *info, const char *spec);
+bool cli_direction_fits(rey_scene *scene, int param, const char *spec);
 // REY_ERROR_ARGUMENT where a direction has none of the terms that are asked for (0 = of all), which it names.
 rey_result cli_direction_check_terms(rey_context *ctx, const rey_scene *scene, const Direction *direction, int asked);
 // Directions of a session, with failures reported: returns the exit status.

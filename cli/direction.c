@@ -372,11 +372,13 @@ rey_selection cli_direction_selection(const Direction *direction) {
     return (rey_selection){.params = direction->params, .count = direction->count};
 }
 
-bool cli_direction_fits(const rey_param_info *info, const char *spec) {
-    Geometry geometry = geometry_of(info);
+bool cli_direction_fits(rey_scene *scene, int param, const char *spec) {
+    rey_param_info info;
+    rey_param_get_info(scene, param, &info);
+    Geometry geometry = geometry_of(&info);
     const char *op = spec + cli_direction_name_length(spec);
-    if (!*op || !info->terms) {
-        return info->terms == REY_TERM_INTERIOR && !rey_name_is_pose(info->name);
+    if (!*op || !info.terms) {
+        return rey_param_stays(scene, param) && !rey_name_is_pose(info.name);
     }
     if (!strncmp(op, ":local_translate=", 17)) {
         return geometry == GEOMETRY_TRANSFORM;

@@ -33,28 +33,12 @@ static rey_result nothing_fits(rey_context *ctx, const char *spec, const char *p
                          : "which this operation does not fit");
 }
 
-// Of each parameter the name that matches a pattern, its own or the first of its further ones; null where none does.
-static const char **matching_names(const Session *s, const char *pattern) {
-    const Array *params = &s->scene->params, *aliases = &s->scene->aliases;
-    const char **names = rey_alloc_array(s->ctx, params->count, sizeof *names);
-    for (size_t i = 0; i < params->count && names; i++) {
-        const char *name = ARRAY_AT(*params, Param, i).name;
-        names[i] = rey_name_matches(pattern, name) ? name : NULL;
-    }
-    for (size_t i = 0; i < aliases->count && names; i++) {
-        const Alias *alias = &ARRAY_AT(*aliases, Alias, i);
-        const char **name = &names[alias->param];
-        *name = !*name && rey_name_matches(pattern, alias->name) ? alias->name : *name;
-    }
-    return names;
-}
-
 static rey_result expand(Session *s, const char *spec, bool listing, Array *specs) {
     char pattern[1024], passed[512] = "";
     size_t length = cli_direction_name_length(spec), before = specs->count;
     int left_out = 0;
     snprintf(pattern, sizeof pattern, "%.*s", (int)length, spec);
-    const char **names = matching_names(s, pattern);
+    const char **names = rey_params_matching(s->scene, pattern);
     rey_result result = names ? REY_OK : REY_ERROR_MEMORY;
     for (int i = 0; i < rey_param_count(s->scene) && !result; i++) {
         rey_param_info info;
@@ -62,7 +46,7 @@ static rey_result expand(Session *s, const char *spec, bool listing, Array *spec
         if (result || !names[i]) {
             continue;
         }
-        if (listing || cli_direction_fits(&info, spec)) {
+        if (listing || cli_direction_fits(s->scene, i, spec)) {
             result = add_spec(s->ctx, names[i], spec + length, specs);
         } else {
             cli_list_add(passed, sizeof passed, &left_out, names[i]);

@@ -79,6 +79,7 @@ TESTS = [("src/integrator/kept.h", DROPPED), ("src/emitter/envmap.h", ["test_lig
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/upstream.h", [BOUNDARY + " mirror_"]),
          ("src/integrator/boundary/primary.h", ["test_edge_moves"] + EDGES),
+         ("src/integrator/boundary/rim_", ["test_rim test_sharp"]),
          ("src/integrator/boundary/indirect.h", ["test_segment_moves"] + EDGES),
          ("src/integrator/boundary/", EDGES),
          ("src/integrator/border.h", ["test_places"] + MEDIA),

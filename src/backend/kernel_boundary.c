@@ -2,6 +2,7 @@
 #include "integrator/boundary/indirect.h"
 #include "integrator/boundary/mirrored.h"
 #include "integrator/boundary/primary.h"
+#include "integrator/boundary/rim_view.h"
 
 // Behind the workspace proper: the groups' offsets, and which samples of a chunk are kept.
 size_t KNAME(rey_kernel_boundary_bytes)(void) {
@@ -61,6 +62,18 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
     }
 }
 
+static void run_rim_view(Tracer *t, const BoundaryJob *b, const FilterTable *filter, Sink *sink, Segments *q) {
+    const int32_t most = t->ws.chunk;
+    const Strips strips = strips_of(t);
+    for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
+        int64_t left = b->count - at;
+        rim_views_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, q);
+        pairs_adjoint(t, b, filter, q->count);
+        rim_views_finish(t, b, q, sink);
+        pairs_splat(t, b, q->count);
+    }
+}
+
 static void run_primary(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, const FilterTable *filter, Sink *sink,
                         Segments *q, int32_t *kept, int32_t *begin) {
     const int32_t most = t->ws.chunk / 2;
@@ -99,7 +112,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Sink sink = sink_of(&b->job);
     in.pinhole = &pinhole;
     in.filter = &filter;
-    in.glimpses = (in.upstream || b->kind == BOUNDARY_LINES) && b->mirrored;
+    in.glimpses = (in.upstream || b->kind == BOUNDARY_LINES || b->kind == BOUNDARY_RIM) && b->mirrored;
     in.sink = &sink;
     double unused = 0;
     PathJob still = b->job;
@@ -110,6 +123,8 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     b->still = &still;
     if (b->kind == BOUNDARY_MIRRORED) {
         run_mirrored(&t, b, &filter, &sink, &in.q, kept, begin);
+    } else if (b->kind == BOUNDARY_RIM_VIEW) {
+        run_rim_view(&t, b, &filter, &sink, &in.q);
     } else if (b->kind == BOUNDARY_PRIMARY) {
         run_primary(&t, b, &pinhole, &filter, &sink, &in.q, kept, begin);
     } else {

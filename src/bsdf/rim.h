@@ -4,18 +4,20 @@
 // the index, with wi and with the frame. Its derivative has, beside the slope of f_+, the part  f_+ delta(g) s g'.  Smooth
 // sampling never finds it: directions on the cone are sampled apart where derivatives are asked for (LOBE_RIM). Their value is
 // 0, their density counts per azimuth, of which delta(g) leaves 1 / e, and their adjoint is that part.
-// NOT differentiated: what lights at a point or in one direction send through such surfaces, which no sampled direction meets
-// (render/rims.c refuses it). Beckmann's density is 0 on the rim.
+// What lights at a point or with one direction send through such surfaces, which no sampled direction meets, is a boundary term
+// (integrator/boundary/rim_vertex.h). Beckmann's density is 0 on the rim.
 #pragma once
 
 #include "bsdf/record.h"
 #include "math/microfacet.h"
 #include "math/warp.h"
 
+#define RIM_ALWAYS 1e6f // as `rim` of a call: samples of functions that have one are of it
+
 // Probability of the rim; 0 where there is none, and small where normals hardly reach it.
 KFN Float rim_share(const Microfacet *mf, Vec3 wi, Float e, real rim) {
     Mask exists = m_lt(f_abs(wi.z), e) & m_ne(wi.z, f_set(0)) & m_set(mf->ggx);
-    return f_zero_unless(exists, rim * f_min(f_max(mf->alpha_u, mf->alpha_v), f_set(1)));
+    return f_zero_unless(exists, f_min(rim * f_min(f_max(mf->alpha_u, mf->alpha_v), f_set(1)), f_set(1)));
 }
 
 KFN Vec3 rim_direction(Vec3 wi, Float e, Float u) {

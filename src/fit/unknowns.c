@@ -294,19 +294,22 @@ static rey_result match_parameter(Job *job, rey_scene *scene, int index, Array *
     }
     char passed[512] = "";
     int passed_count = 0;
+    const char **names = rey_params_matching(scene, p->name);
+    result = names ? REY_OK : REY_ERROR_MEMORY;
     for (int i = 0; i < rey_param_count(scene) && !result; i++) { // a glob passes over what moves or cannot be differentiated
         rey_param_info info;
         result = rey_param_get_info(scene, i, &info);
-        if (result || !rey_name_matches(p->name, info.name)) {
+        if (result || !names[i]) {
             continue;
         }
-        if (info.terms == REY_TERM_INTERIOR && !rey_name_is_pose(info.name)) {
+        if (rey_param_stays(scene, i) && !rey_name_is_pose(info.name)) {
             result = add_unknown(job, scene, i, p, index, owners, u);
         } else if (passed_count++ < SHOWN_NAMES) {
             size_t used = strlen(passed);
             snprintf(passed + used, sizeof passed - used, "%s%s", used ? ", " : "", info.name);
         }
     }
+    rey_free(job->ctx, names);
     return result || u->items.count > before ? result : fail_pattern(job, p, passed, passed_count);
 }
 

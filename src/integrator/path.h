@@ -106,7 +106,13 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     const Paths *p = &t->ws.paths[t->current];
     SampleKey scatter_key = *key;
     Split split;
-    if (scene->split) {
+    BsdfCall rims;
+    bool only_rims = t->derivative && scene->split && scene->scatter_samples == 0; // which light samples never find
+    if (only_rims) {
+        rims = *call;
+        rims.rim = RIM_ALWAYS;
+        call = &rims;
+    } else if (scene->split) {
         split = split_of(scene, key->sample);
         scatter_key.sample = split.scatter_sample;
         key = &scatter_key;
@@ -117,7 +123,9 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     w.f = bsdf_eval_pdf(call, wi, w.sample.wo, w.sample.lobe, &w.pdf);
     w.rcp = f_safe_rcp(w.pdf);
     w.m = v->m;
-    if (scene->split) {
+    if (only_rims) {
+        w.m = w.m & lobe_is(w.sample.lobe, LOBE_RIM);
+    } else if (scene->split) {
         w.rcp = w.rcp * split.scatter_weight;
         w.m = w.m & split.scatter;
     }

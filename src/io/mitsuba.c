@@ -1,5 +1,5 @@
 // mitsuba.c: loads a Mitsuba 3 scene: walks the document in order, names what it finds, and freezes the flat scene.
-#include "bsdf/table.h"
+#include "bsdf/ends.h"
 #include "emitter/table.h"
 #include "io/build.h"
 #include "io/lenient.h"
@@ -184,6 +184,16 @@ static bool moves_border(const rey_scene *scene, const Param *p) {
     return all;
 }
 
+static void mark_used(const rey_scene *scene, int32_t bsdf) {
+    BsdfNode *node = &ARRAY_AT(scene->build.bsdfs, BsdfNode, bsdf);
+    node->used = 1;
+    for (int i = 0; i < MAX_CHILDREN; i++) {
+        if (node->child[i] >= 0 && !ARRAY_AT(scene->build.bsdfs, BsdfNode, node->child[i]).used) {
+            mark_used(scene, node->child[i]);
+        }
+    }
+}
+
 // Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
 // what turns such mirrors' normals; what moves needs another where the normals of maps turn away from the viewer. Scattering
 // functions that no shape has do not count.
@@ -192,6 +202,7 @@ static void name_further_terms(Builder *b) {
     bool bends = false, turns = false;
     for (size_t i = 0; i < scene->build.shapes.count; i++) {
         const ShapeRecord *shape = &ARRAY_AT(scene->build.shapes, ShapeRecord, i);
+        mark_used(scene, shape->bsdf);
         bends |= kind_within(scene, shape->bsdf, rey_bsdf_bends) && !only_separates(scene, shape);
         turns |= ARRAY_AT(scene->build.bsdfs, BsdfNode, shape->bsdf).turns != 0;
     }
@@ -210,6 +221,51 @@ static void name_further_terms(Builder *b) {
         p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them
         p->terms = moves_border(scene, p) ? REY_TERM_INTERIOR : p->terms;
     }
+}
+
+// Whether a parameter moves the ends of one of these functions, which shapes have.
+static bool moves_ends(const rey_scene *scene, const Param *p, const Array *bsdfs) {
+    const bool all = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0;
+    bool moves = false;
+    for (size_t i = 0; i < bsdfs->count && !moves; i++) {
+        const int32_t shape = ARRAY_AT(*bsdfs, int32_t, i);
+        moves = all || rey_bsdf_ends_move(&scene->view, scene->view.shapes[shape].bsdf, p, p->normals == shape);
+    }
+    return moves;
+}
+
+// Finds the parameters that move the ends of rough refraction in the light of a point or of one direction, which scattering does
+// not find: there they are curves like those of the terms of what moves.
+static rey_result name_rims(Builder *b) {
+    rey_scene *scene = b->scene;
+    Array ending = {0};
+    bool sharp = false;
+    for (int64_t i = 0; i < scene->view.emitters_count; i++) {
+        sharp |= rey_emitter_kinds[scene->view.emitters[i].kind].form == EMITTER_IS_DELTA;
+    }
+    for (int32_t i = 0; i < scene->view.shapes_count && sharp; i++) {
+        if (!rey_bsdf_ends_within(&scene->view, scene->view.shapes[i].bsdf)) {
+            continue;
+        }
+        int32_t *shape = rey_array_push(b->ctx, &ending, sizeof *shape, 1);
+        if (!shape) {
+            rey_array_free(b->ctx, &ending);
+            return REY_ERROR_MEMORY;
+        }
+        *shape = i;
+    }
+    for (size_t i = 0; i < scene->params.count && ending.count > 0; i++) {
+        Param *p = &ARRAY_AT(scene->params, Param, i);
+        const EmitterRecord *e = p->emitter >= 0 ? scene->view.emitters + p->emitter : NULL;
+        const bool light = e && rey_emitter_kinds[e->kind].form == EMITTER_IS_DELTA;
+        // What turns mirrored and refracted rays moves what they see.
+        p->moves_rims = light || (!e && (p->terms & REY_TERM_SPECULAR)) || moves_ends(scene, p, &ending);
+        p->why = p->moves_rims && !p->why ? "it moves where rough refraction ends, and with it the light of points and of single "
+                                            "directions" : p->why;
+        p->terms |= p->moves_rims && p->terms ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
+    }
+    rey_array_free(b->ctx, &ending);
+    return REY_OK;
 }
 
 // A scene whose integrator could not be read is rendered by the usual one.
@@ -310,6 +366,7 @@ static rey_result build_scene(Builder *b) {
                                                   (int64_t)b->scene->build.emitters.count);
     TRY(b->scene->view.emitter_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);
     TRY(rey_scene_freeze(b->scene));
+    TRY(name_rims(b));
     return build_note_ranges(b);
 }
 

@@ -26,13 +26,14 @@ static rey_result refuse(rey_scene *scene, int term, const char *what, const cha
                     object ? " ('" : "", object ? object : "", object ? "')" : "");
 }
 
-static bool boundary_sees(const SensorRecord *sensor) {
+bool rey_boundary_sees(const SensorRecord *sensor) {
     return sensor->kind == SENSOR_PERSPECTIVE || sensor->kind == SENSOR_THINLENS || sensor->kind == SENSOR_ORTHOGRAPHIC;
 }
 
 int rey_boundary_term(int32_t kind) {
     switch (kind) {
     case BOUNDARY_PRIMARY:
+    case BOUNDARY_RIM_VIEW:
         return REY_TERM_PRIMARY;
     case BOUNDARY_CHAINED:
     case BOUNDARY_MIRRORED:
@@ -47,7 +48,7 @@ int rey_boundary_term(int32_t kind) {
 // Whether paths turn at surfaces in directions that follow from how they came.
 static bool has_chains(const SceneView *view) {
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (rey_bsdf_bends(view->bsdfs[i].kind)) {
+        if (view->bsdfs[i].used && rey_bsdf_bends(view->bsdfs[i].kind)) {
             return true;
         }
     }
@@ -57,7 +58,7 @@ static bool has_chains(const SceneView *view) {
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const char *what = !boundary_sees(sensor) ? "this sensor"
+    const char *what = !rey_boundary_sees(sensor) ? "this sensor"
                        : view->through        ? "the integrator 'volpath'"
                        : view->has_media      ? "participating media"
                        : step                 ? step
@@ -68,7 +69,7 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
     }
     for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
         int kind = view->bsdfs[i].kind;
-        if (rey_bsdf_opens(kind) || rey_bsdf_turns(kind)) {
+        if (view->bsdfs[i].used && (rey_bsdf_opens(kind) || rey_bsdf_turns(kind))) {
             return (ChainObstacle){rey_bsdf_opens(kind) ? "light that passes undeviated through" : "the normals of", -1, i, -1};
         }
     }
@@ -110,7 +111,7 @@ static rey_result check_rides(rey_scene *scene, int term) {
     const SceneView *view = &scene->view;
     char name[OBJECT_NAME];
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (rey_bsdf_turns(view->bsdfs[i].kind)) {
+        if (view->bsdfs[i].used && rey_bsdf_turns(view->bsdfs[i].kind)) {
             rey_name_bsdf(scene, (int32_t)i, name);
             return refuse(scene, term, "where, in participating media, normals of maps turn away from what sees them", name);
         }
@@ -154,7 +155,7 @@ static rey_result boundary_check(const Render *r, int term) {
     const SceneView *view = &scene->view;
     const SensorRecord *sensor = r->plan.sensor;
     char name[OBJECT_NAME];
-    if (!boundary_sees(sensor)) {
+    if (!rey_boundary_sees(sensor)) {
         return refuse(scene, term, "sensors other than perspective, thinlens and orthographic", NULL);
     }
     const char *lacks = left_out(view, term);
@@ -235,8 +236,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
                                                   [BOUNDARY_LINES] = 1, [BOUNDARY_RIDING] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
                                                   [BOUNDARY_CHAINED_HORIZON] = 4, [BOUNDARY_RIDING_TERMINATOR] = 4,
-                                                  [BOUNDARY_RIDING_HORIZON] = 4};
-    int32_t asked = kind == BOUNDARY_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
+                                                  [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1};
+    int32_t asked = rey_boundary_term(kind) == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
     int64_t count = asked ? pixels * asked / (part * r->def.sets) : pixels * r->job.spp / part;
@@ -264,7 +265,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     if (result == REY_OK && kind == BOUNDARY_MIRRORED) { // it looks for edges where they are seen
         result = rey_texture_step_records(r->scene, r->job.to_uv_at, &plan->steps, &plan->step_at);
         result = result == REY_OK ? check_halves(r) : result;
-    } else if (result == REY_OK) {
+    } else if (result == REY_OK && !boundary_is_rim(kind)) {
         result = rey_boundary_edges(r, kind, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
@@ -279,6 +280,10 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
     }
     const int32_t depth = r->scene->view.max_depth;
+    if (boundary_is_rim(kind)) { // `direct` without emitter_samples meets no such lights
+        edge_count = depth < 0 || depth > 2 || kind == BOUNDARY_RIM_VIEW;
+        edge_count = r->scene->view.split && r->scene->view.light_samples == 0 ? 0 : edge_count;
+    }
     if (kind != BOUNDARY_PRIMARY && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
         edge_count = 0;
     }
@@ -288,7 +293,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none,
                               .everywhere = r->turns_rays || r->lines, .lines = r->lines,
-                              .chains = rey_chains_known(&r->scene->view, r->plan.sensor),
+                              .chains = boundary_is_rim(kind) ? has_chains(&r->scene->view)
+                                                              : rey_chains_known(&r->scene->view, r->plan.sensor),
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
     plan->job.job.y = r->plan.y;
@@ -299,11 +305,11 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
 
 // Where the boundary terms are not computed, paths look out for shading normals that turn away. Indices of refraction move nothing
 // that the sensor sees itself.
-static void watch_smooth_normals(Render *r) {
+static void watch_smooth_normals(Render *r, bool look_out) {
     const SceneView *view = &r->scene->view;
     const int both = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
     bool whole = (r->terms & both) == both || (!r->def.terms && (r->terms & REY_TERM_SPECULAR));
-    r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && !whole;
+    r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && (look_out || !whole);
     for (int64_t i = 0; i < view->shapes_count && r->job.watch_smooth; i++) {
         if (r->job.normals_at[i] >= 0 && view->shapes[i].emitter >= 0) {
             // A light's normals say into which directions it shines: light samples jump where none of its points is met.
@@ -313,24 +319,26 @@ static void watch_smooth_normals(Render *r) {
 }
 
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
-    return !has_chains(view) && boundary_sees(sensor) && !view->has_media && !view->drops;
+    return !has_chains(view) && rey_boundary_sees(sensor) && !view->has_media && !view->drops;
 }
 
 rey_result rey_boundaries_begin(Render *r) {
     r->lines = rey_lines_selected(&r->scene->view, r->job.to_uv_at);
     bool moves = r->job.any_motion || r->job.any_places || r->lines;
     rey_result result = REY_OK;
-    if (!moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor)) {
-        r->terms &= REY_TERM_INTERIOR; // paths look out instead
+    bool look_out = !moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor); // paths do, instead
+    if (look_out && !r->rims) {
+        r->terms &= REY_TERM_INTERIOR;
     }
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
-        if (r->terms & rey_boundary_term(i)) {
-            bool check = moves || !boundary_sees(r->plan.sensor);
+        bool selected = boundary_is_rim(i) ? r->rims : moves || (r->job.any_normals && !look_out);
+        if ((r->terms & rey_boundary_term(i)) && selected) {
+            bool check = moves || !rey_boundary_sees(r->plan.sensor);
             result = check ? boundary_check(r, rey_boundary_term(i)) : REY_OK;
             result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }
-    watch_smooth_normals(r);
+    watch_smooth_normals(r, look_out);
     return result == REY_OK ? rey_corners_begin(r) : result;
 }
 
@@ -361,7 +369,7 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
 
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture) {
     // The interior's paths have found out whether the sensor sees mirrors and glass.
-    bool may = !(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED) || r->lines;
+    bool may = !(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED) || r->lines || r->rims;
     plan->job.mirrored = plan->job.chains && !r->particles && may;
     if (plan->job.edge_count == 0 || (plan->job.kind == BOUNDARY_MIRRORED && !plan->job.mirrored)) {
         return;

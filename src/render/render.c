@@ -8,6 +8,7 @@
 #include "render/motion.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
+#include "render/rims.h"
 #include "render/shards.h"
 #include "render/terms.h"
 #include "render/update.h"
@@ -337,6 +338,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
         rey_live_groups(&scene->view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + scene->view.volumes_count);
     }
     r->job.spp = set_spp(r);
+    r->rims = rey_rims_move(scene, selection);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
     return rey_boundaries_begin(r);
 }

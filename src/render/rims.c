@@ -1,61 +1,67 @@
-// rims.c: whether the ends of rough refraction move where no sampled direction finds them.
+// rims.c: what of the ends of rough refraction is not known.
 #include "render/rims.h"
 
-#include "bsdf/table.h"
-#include "emitter/emitter.h"
+#include "bsdf/ends.h"
+#include "render/boundary.h"
 #include "render/particles.h"
+#include "shape/shape.h"
 
-// What of the scene's light comes along directions that are not sampled by scattering, null where none does.
-static const char *unsampled(const rey_scene *scene) {
-    const SceneView *view = &scene->view;
-    if (rey_traces_particles(scene)) {
-        return "light tracing does not find that. The integrator 'path' does";
+// What keeps the samplers of rims in the light of points and of single directions from all of what a parameter moves, null where
+// nothing does (integrator/boundary/rim_light.h, rim_view.h).
+static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord *sensor, const Param *p) {
+    if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || (p->terms & REY_TERM_SPECULAR)) {
+        return "what moves that in the light of a point or of one direction is known of indices of refraction and of normals alone";
     }
-    if (view->split && view->scatter_samples == 0) {
-        return "'direct' without bsdf_samples does not find that";
+    if (view->has_media || view->through) {
+        return "in the light of a point or of one direction the integrators for media do not find that. 'path' does";
     }
-    for (int64_t i = 0; i < view->emitters_count; i++) {
-        if (emitter_is_delta(view->emitters + i)) {
-            return "for lights at a point or with one direction that is not known";
+    if (!rey_boundary_sees(sensor)) {
+        return "in the light of a point or of one direction only perspective, thinlens and orthographic sensors find that";
+    }
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        const ShapeRecord *shape = view->shapes + i;
+        const bool bent = shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR || shape->kind == SHAPE_BSPLINE;
+        if (bent && rey_bsdf_ends_within(view, shape->bsdf)) {
+            return "in the light of a point or of one direction that is not known on curves and grids of distances";
+        }
+        if (rey_bsdf_holds(view, shape->bsdf, rey_bsdf_bends) && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_turns)) {
+            return "in the light of a point or of one direction it is not found in smooth mirrors and glass that have normal maps";
         }
     }
     return NULL;
 }
 
-// Whether a parameter moves the ends of the refraction of a function: its index, or the normals of a map around it.
-static bool moves_end(const SceneView *view, int32_t bsdf, const Param *p, bool turned) {
-    const BsdfNode *node = view->bsdfs + bsdf;
-    const BsdfKind *kind = rey_bsdf_kinds + node->kind;
-    bool moves = turned;
-    for (int k = 0; k < kind->param_count && p->texture >= 0; k++) {
-        ParamType type = kind->params[k].type;
-        bool counts = type == PARAM_IOR || type == PARAM_SPECULAR || type == PARAM_NORMAL || type == PARAM_HEIGHT ||
-                      type == PARAM_HEIGHT_SCALE;
-        moves |= counts && node->slot[k] == p->texture;
+// What of the scene's light comes along directions that are not sampled by scattering, null where none does.
+static const char *unsampled(const rey_scene *scene, const SensorRecord *sensor, const Param *p) {
+    if (rey_traces_particles(scene)) {
+        return "light tracing does not find that. The integrator 'path' does";
     }
-    bool found = moves && rey_bsdf_ends(view, node);
-    for (int k = 0; k < MAX_CHILDREN && !found; k++) {
-        found = node->child[k] >= 0 && moves_end(view, node->child[k], p, moves);
+    return p->moves_rims ? gap_of_sharp_light(&scene->view, sensor, p) : NULL;
+}
+
+bool rey_rims_move(const rey_scene *scene, rey_selection selection) {
+    bool moves = false;
+    for (int i = 0; i < selection.count && !moves; i++) {
+        moves = ARRAY_AT(scene->params, Param, selection.params[i]).moves_rims;
     }
-    return found;
+    return moves;
 }
 
 static bool any_ends(const SceneView *view) {
     bool found = false;
     for (int64_t i = 0; i < view->bsdfs_count && !found; i++) {
-        found = rey_bsdf_ends(view, view->bsdfs + i);
+        found = view->bsdfs[i].used && rey_bsdf_ends(view, view->bsdfs + i);
     }
     return found;
 }
 
-const char *rey_rims_gap(const rey_scene *scene, const Param *p, char object[OBJECT_NAME]) {
+const char *rey_rims_gap(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char object[OBJECT_NAME]) {
     const SceneView *view = &scene->view;
-    const char *gap = unsampled(scene);
-    gap = gap && any_ends(view) ? gap : NULL; // far fewer functions are looked at than by shape
-    const bool moves = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->normals >= 0 || p->emitter >= 0;
+    const char *gap = any_ends(view) ? unsampled(scene, sensor, p) : NULL; // far fewer functions are looked at than by shape
+    const bool moves = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || p->moves_rims;
     for (int64_t i = 0; i < view->shapes_count && gap; i++) {
         int32_t bsdf = view->shapes[i].bsdf;
-        if (moves_end(view, bsdf, p, moves)) {
+        if (rey_bsdf_ends_within(view, bsdf) && (moves || rey_bsdf_ends_move(view, bsdf, p, p->normals == i))) {
             rey_name_bsdf(scene, bsdf, object);
             return gap;
         }

@@ -56,6 +56,9 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     if (p->to_uv >= 0) {
         return gap_of_lines(scene) ? still : still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
+    if (p->moves_rims) {
+        return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
+    }
     const int light = REY_TERM_INTERIOR | (scene->view.has_media ? 0 : REY_TERM_PRIMARY);
     return (p->emitter >= 0 ? light : still) | REY_TERM_INDIRECT | chains;
 }
@@ -190,7 +193,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
 // What is not known of points that move where surfaces have volumes as textures, null where all is.
 static const char *gap_of_lookups(const SceneView *view) {
     for (int32_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
-        for (int k = 0; k < MAX_SLOTS; k++) {
+        for (int k = 0; k < MAX_SLOTS && view->bsdfs[i].used; k++) {
             if (texture_holds(view, view->bsdfs[i].slot[k], is_jumping_volume)) {
                 return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to "
                        "voxel pass over points that move";
@@ -244,11 +247,11 @@ static rey_result check_cuts(rey_scene *scene, const SensorRecord *sensor, const
                : REY_OK;
 }
 
-static rey_result check_rims(rey_scene *scene, const Param *p) {
+static rey_result check_rims(rey_scene *scene, const SensorRecord *sensor, const Param *p) {
     char object[OBJECT_NAME];
-    const char *gap = rey_rims_gap(scene, p, object);
+    const char *gap = rey_rims_gap(scene, sensor, p, object);
     return gap ? rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                          "the gradient of %s lacks a part of the term 'interior': the refraction of '%s' ends abruptly where its "
+                          "the gradient of %s is not complete: the refraction of '%s' ends abruptly where its "
                           "facets are seen edge-on, and %s. --terms interior gives the part that exists", p->name, object, gap)
                : REY_OK;
 }
@@ -320,7 +323,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         if (result != REY_OK) {
             return result;
         }
-        result = def->terms ? REY_OK : check_rims(scene, p);
+        result = def->terms ? REY_OK : check_rims(scene, scene->view.sensors + def->sensor, p);
         if (result != REY_OK) {
             return result;
         }

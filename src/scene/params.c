@@ -104,6 +104,27 @@ int rey_param_find(const rey_scene *scene, const char *name) {
     return alias >= 0 ? ARRAY_AT(scene->aliases, Alias, alias).param : param;
 }
 
+bool rey_param_stays(const rey_scene *scene, int param) {
+    const Param *p = &ARRAY_AT(scene->params, Param, param);
+    int sharp = p->moves_rims && p->texture >= 0 ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;
+    return (p->terms & ~sharp) == REY_TERM_INTERIOR;
+}
+
+const char **rey_params_matching(const rey_scene *scene, const char *pattern) {
+    const Array *params = &scene->params, *aliases = &scene->aliases;
+    const char **names = rey_alloc_array(scene->ctx, params->count, sizeof *names);
+    for (size_t i = 0; i < params->count && names; i++) {
+        const char *name = ARRAY_AT(*params, Param, i).name;
+        names[i] = rey_name_matches(pattern, name) ? name : NULL;
+    }
+    for (size_t i = 0; i < aliases->count && names; i++) {
+        const Alias *alias = &ARRAY_AT(*aliases, Alias, i);
+        const char **name = &names[alias->param];
+        *name = !*name && rey_name_matches(pattern, alias->name) ? alias->name : *name;
+    }
+    return names;
+}
+
 static const char *param_word(void *user, int i) {
     const rey_scene *scene = user;
     size_t n = scene->params.count;

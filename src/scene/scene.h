@@ -47,6 +47,7 @@ typedef struct BsdfNode {
     int32_t spreads;             // scatters into more than single directions, itself or in a child
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
     int32_t turns;               // turns the shading normal, itself or in a child
+    int32_t used;                // a shape has it, or one that holds it
 } BsdfNode;
 
 enum {
@@ -254,6 +255,7 @@ typedef struct Param {
     int32_t emitter;          // emitter whose place this is, -1 = none
     int32_t place;            // which of its slots that is
     int32_t volume;           // volume whose pose this is, -1 = none
+    bool moves_rims;          // it moves the ends of rough refraction (bsdf/rim.h) in light that no sampled direction meets
     uint32_t version;         // counts changes of the values
     uint32_t built;           // the version that derived data was built from
 } Param;
@@ -308,6 +310,11 @@ void rey_scene_forget_integrators(rey_scene *scene);
 rey_result rey_scene_add_note(rey_scene *scene, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Terms of a list of names with commas between them; 0, and *wrong at its first word that names none.
 int rey_terms_of(const char *text, const char **wrong);
+// Whether nothing has to be known of silhouettes for a parameter, as one of materials, lights and media that stand still.
+bool rey_param_stays(const rey_scene *scene, int param);
+// Of each parameter the name that matches a pattern, its own or the first of its further ones; null where none does. To be freed;
+// null: out of memory.
+const char **rey_params_matching(const rey_scene *scene, const char *pattern);
 // Registers a parameter; takes a copy of name. Returns its index, -1 on failure.
 int rey_scene_add_param(rey_scene *scene, const char *name, Param param);
 rey_result rey_scene_add_alias(rey_scene *scene, const char *name, int param);

@@ -158,7 +158,7 @@ static void checks_show_their_rows(void **state) {
     assert_non_null(strstr(titles, "red.reflectance.value"));
     assert_non_null(strstr(titles, "metal.alpha.value"));
     assert_non_null(strstr(f->out, "passed"));
-    expect_said(f, 1, "check %s --param glass.eta.value", "the term 'specular' does not know");
+    expect_said(f, 1, "check %s --param glass.eta.value", "needs the term 'specular'");
     expect(f, 0, "check %s --param red.reflectance.value --spp 16");
     assert_null(strstr(f->words, "worst z"));
     expect_said(f, 2, "render %s -o=a.exr", "-o=a.exr: a name follows without '='");

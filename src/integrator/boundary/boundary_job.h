@@ -10,7 +10,8 @@
 // along chains of smooth mirrors and glass (chained.h); those that the camera sees along such chains (mirrored.h); the planes
 // at which maps cut light off (turning.h); lines of textures that move over their surfaces (lines.h); and edges as collisions see
 // them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains, RIDING_TERMINATOR and
-// RIDING_HORIZON those that collisions see or light.
+// RIDING_HORIZON those that collisions see or light. RIM and RIM_VIEW are the ends of rough refraction in the light of a point or
+// of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h).
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -26,6 +27,8 @@ enum {
     BOUNDARY_RIDING,
     BOUNDARY_RIDING_TERMINATOR,
     BOUNDARY_RIDING_HORIZON,
+    BOUNDARY_RIM,
+    BOUNDARY_RIM_VIEW,
     BOUNDARY_KINDS
 };
 
@@ -68,6 +71,8 @@ static inline bool boundary_is_chained(int32_t kind) {
            boundary_is_riding(kind);
 }
 static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
+
+static inline bool boundary_is_rim(int32_t kind) { return kind == BOUNDARY_RIM || kind == BOUNDARY_RIM_VIEW; }
 
 // Samples of one number of a `pixel` of their random numbers.
 enum { BOUNDARY_PER_SET = 1 << 24 };

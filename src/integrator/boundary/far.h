@@ -4,6 +4,7 @@
 #include "integrator/boundary/lines.h"
 #include "integrator/boundary/meeting.h"
 #include "integrator/boundary/riding.h"
+#include "integrator/boundary/rim_light.h"
 #include "integrator/film.h"
 
 typedef struct Indirect {
@@ -149,6 +150,8 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
         reflected = spec_sub(reflected, far_chain(in, slot, bounce));
     }
     switch (in->b->kind) {
+    case BOUNDARY_RIM: // which has a segment more
+        return spec_zero_unless(m_set(in->t->scene->max_depth < 0 || bounce + 3 <= in->t->scene->max_depth), l);
     case BOUNDARY_TERMINATOR:
         reflected = in->upstream ? spec_add(reflected, far_chain(in, other, bounce)) : reflected;
         return spec_sub(reflected, far_reflected(in, other, bounce));

@@ -240,6 +240,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         chained_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_RIDING) {
         ridings_find(t, in->b, in->pinhole, first, count, q);
+    } else if (in->b->kind == BOUNDARY_RIM) {
+        rims_find(t, in->b, first, count, q);
     } else {
         turnings_find(t, in->b, first, count, q);
     }

@@ -29,13 +29,15 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // ends; what the
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
 // what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
-// (leg.h), and the edge, what the flight to it weighs, and whether it was looked for along a ray of the sensor's.
+// (leg.h), and the edge, what the flight to it weighs, and whether it was looked for along a ray of the sensor's. Of
+// rims: the lobe.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         F(nudge_u) F(nudge_v)                                                                                                  \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
 #define SEGMENT_INTS(I)                                                                                                \
-    I(number) I(lit) I(source) I(air) I(around) I(medium) I(sighted) SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
+    I(number) I(lit) I(source) I(air) I(around) I(medium) I(sighted) I(rim)                                                     \
+        SEGMENT_HIT(I, near) SEGMENT_HIT(I, edge) SEGMENT_HIT(I, far)
 #define SEGMENT_SPECS(S) S(light) S(flown)
 
 // Near vertices of one level (upstream.h): where they lie, where the particle came from and went on, and what the motion of a

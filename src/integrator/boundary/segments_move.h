@@ -266,6 +266,19 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     }
 }
 
+// The same of rims. Where near points are has no part in it.
+static void rim_rates_adj(Indirect *in, int32_t k, Sink *sink) {
+    const Segments *q = &in->q;
+    bool forward = in->b->job.mode == MODE_FORWARD;
+    Float worth = forward ? f_set(1) : f_load(q->seen + k) + f_load(q->unseen + k);
+    rims_move_adj(in->t, q, k, worth, sink, m_first_n(q->count - k) & m_finite(worth));
+    if (forward) {
+        Float rate = sink_taken(sink);
+        f_store(q->seen + k, rate);
+        f_store(q->unseen + k, rate);
+    }
+}
+
 static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
     if (in->upstream) {
         ways_move_adj(in, k, sink);
@@ -277,6 +290,8 @@ static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
         lines_move_adj(&in->q, in->b->job.mode == MODE_FORWARD, k, sink);
     } else if (in->b->kind == BOUNDARY_CUT) {
         cuts_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_RIM) {
+        rim_rates_adj(in, k, sink);
     } else {
         turnings_move_adj(in, k, sink);
     }

@@ -1,10 +1,11 @@
-// sightline.h: lines of sight: from a film position through smooth mirrors and glass up to the first vertex that scatters.
+// sightline.h: lines of sight: from a film position through smooth mirrors and glass, and what lets them pass, up to the first
+// vertex that scatters.
 // The random numbers are those of the path that path.h traces from there, which therefore takes the same way.
 #pragma once
 
 #include "integrator/boundary/upstream.h"
 
-// Vertices that mirror or refract; lines with more of them end.
+// Vertices that mirror, refract or let pass; lines with more of them end.
 enum { MOST_SIGHT = 12 };
 
 typedef struct Sightline {
@@ -13,7 +14,7 @@ typedef struct Sightline {
     Vec3 o[MOST_SIGHT + 1];  // and where it begins behind the vertex before
     Vec2 uv[MOST_SIGHT + 1]; // of the surfaces
     Int lobe[MOST_SIGHT + 1], behind[MOST_SIGHT + 1]; // LOBE_SMOOTH at its end; whether a surface is met from behind
-    Int turns;               // how many of them mirror or refract
+    Int turns;               // how many of them mirror, refract or let pass
     Spec through[MOST_SIGHT + 1]; // what the vertices before let through, over the probability of their lobes
     int32_t last;            // levels that are filled
 } Sightline;
@@ -54,7 +55,8 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         BsdfSample b = bsdf_sample(&call, wi, u, at);
         Float pdf;
         Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
-        Mask turns = mine & lobe_turns(b.lobe) & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0)) & m_set(!ends);
+        Mask turns = mine & (lobe_turns(b.lobe) | lobe_is(b.lobe, LOBE_NULL)) & m_set(!ends);
+        turns = turns & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0));
         Vec3 wo = frame_to_world(&si.sh, b.wo);
         s->lobe[i] = i_select(turns, b.lobe, s->lobe[i]);
         s->through[i + 1] = spec_select(turns, spec_scale(spec_mul(s->through[i], f), f_safe_rcp(pdf)), s->through[i + 1]);
@@ -138,10 +140,16 @@ static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Ve
             continue;
         }
         Vec3 next = v3_select(mi_eq(level, i_set(i + 1)), p, s->hit[i + 1].p);
-        Carried back = rays_turn_adj(t, s->hit + i, s->d[i], v3_select(on, s->d[i + 1], v3_neg(s->d[i])), s->lobe[i],
-                                     v3_length(v3_sub(next, s->hit[i].p)), &c, sink, on);
-        c.drag = v3_select(on, back.drag, c.drag);
-        c.turn = v3_select(on, back.turn, c.turn);
+        Float distance = v3_length(v3_sub(next, s->hit[i].p));
+        Mask passes = on & lobe_is(s->lobe[i], LOBE_NULL), turns = on & ~passes; // a ray that passes stays the same line
+        c.turn = v3_select(passes, v3_madd(c.turn, distance, c.drag), c.turn);
+        if (!m_any(turns)) {
+            continue;
+        }
+        Carried back = rays_turn_adj(t, s->hit + i, s->d[i], v3_select(turns, s->d[i + 1], v3_neg(s->d[i])), s->lobe[i],
+                                     distance, &c, sink, turns);
+        c.drag = v3_select(turns, back.drag, c.drag);
+        c.turn = v3_select(turns, back.turn, c.turn);
     }
     return c;
 }

@@ -1,0 +1,83 @@
+// rim_light.h: the rims of rough refraction in the light of a point or of one direction (rim_vertex.h), as vertices other than the
+// camera see them. Particles start on the lights as in light tracing, and leave the surface that they meet along its rim:
+//   dI += integral dPhi_x dphi |n_g . v| / |n_g . l| f_+ s g' W
+// over the flux that meets the surface and the azimuths of the directions v.
+#pragma once
+
+#include "integrator/boundary/rim_vertex.h"
+#include "integrator/particle_start.h"
+
+#define DIMENSION_RIM 0x80000006u
+
+// Particles as they meet surfaces.
+typedef struct RimLight {
+    Vec3 d;
+    Hit hit;
+    Spec flux; // over the density
+    Mask m;
+} RimLight;
+
+static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
+    const SceneView *scene = t->scene;
+    Int light;
+    Float choice;
+    Vec2 at = rng_2d(key, DIMENSION_EDGE_SEGMENT), way = rng_2d(key, DIMENSION_SEGMENT_END);
+    RimLight r = {.d = v3(f_set(0), f_set(0), f_set(1)), .flux = spec_zero()};
+    Vec3 o = v3_zero();
+    m = m & rim_light(scene, key, &light, &choice);
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(light, m_first(left));
+        mine = left & mi_eq(light, i_set(id));
+        ParticleStart one = emitter_start(scene, scene->emitters + id, at, way);
+        Spec flux = spec_scale(starts_value(scene, light, mine, one.uv, one.prim), one.factor * f_safe_rcp(choice));
+        o = v3_select(mine, one.o, o);
+        r.d = v3_select(mine, one.d, r.d);
+        r.flux = spec_select(mine & one.valid, flux, r.flux);
+    }
+    m = m & m_gt(spec_max(r.flux), f_set(0)) & m_finite(spec_sum(r.flux));
+    t->job->rays += m_count(m);
+    r.hit = trace_closest(scene, &(Ray){o, r.d, f_set(INFINITY)}, m, false);
+    r.m = m & mi_lt(i_set(-1), r.hit.shape);
+    return r;
+}
+
+// Lets those that meet surfaces of a group leave along the rim, and keeps them.
+static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, const SampleKey *key, int32_t group, const Hit *hit,
+                       Int number, Mask m, Segments *q) {
+    Sink still = sink_of(job->still);
+    SurfaceSweep s;
+    rim_surface(t, group, hit, m, &s);
+    Vec3 light = v3_neg(in->d), wl = frame_to_local(&s.si.sh, light);
+    BsdfSample b = bsdf_sample(&s.call, wl, rng_1d(key, DIMENSION_TURNING_SIDE), rng_2d(key, DIMENSION_RIM));
+    m = m & lobe_is(b.lobe, LOBE_RIM);
+    if (!m_any(m)) {
+        return;
+    }
+    Float pdf = bsdf_pdf(&s.call, wl, b.wo, b.lobe);
+    Vec3 view = frame_to_world(&s.si.sh, b.wo);
+    Exchange x = {b.wo, wl, view, light, b.lobe, m};
+    Rim r = rim_measure(&s, &x, &still, m & m_gt(pdf, f_set(0)));
+    Float weight = f_abs(v3_dot(s.si.ng, view)) * f_safe_rcp(f_abs(v3_dot(s.si.ng, light)) * pdf);
+    Spec l = spec_scale(spec_mul(in->flux, r.value), weight);
+    m = r.m & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
+    Ray ray = {interaction_offset(&s.si, view), view, f_set(INFINITY)};
+    rim_keep(q, hit, &ray, light, &r, b.lobe, l, number, m);
+}
+
+// As segments_find.
+static void rims_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
+    q->count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        batch_numbers(t, i, first);
+        SampleKey key = slot_key(t, i_iota() + i);
+        RimLight in = rims_shine(t, &key, m_first_n(count - i));
+        for (Mask left = in.m; m_any(left);) {
+            int32_t id;
+            Hit h;
+            Mask mine = take_group(t->scene, &in.hit, &left, &id, &h);
+            if (t->job->live[id] & LIVE_SCATTERING) {
+                rims_leave(t, b, &in, &key, id, &h, i_iota() + i, mine, q);
+            }
+        }
+    }
+}
