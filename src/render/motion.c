@@ -21,18 +21,10 @@ static bool ray_is_free(const SceneView *view, const SensorRecord *s) {
     return true;
 }
 
-// A surface that does not know how to slide, -1 = all do; group: of this shapegroup alone, unless it is -1.
-static int32_t stuck_surface(const SceneView *view, int32_t group) {
-    for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
-        if (!shape_moves(view->shapes[i].kind) && (group < 0 || view->shapes[i].collection == group)) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-static bool surfaces_slide(const SceneView *view, int32_t group) {
-    return stuck_surface(view, group) < 0;
+// Whether the motion of a shape's own numbers is known: of grids of distances, that of their pose.
+static bool numbers_move(const SceneView *view, const Param *p) {
+    const ShapeRecord *shape = view->shapes + p->geometry;
+    return shape_moves(shape->kind) || (shape->kind == SHAPE_SDFGRID && p->theta == shape->to_world);
 }
 
 bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const Param *p) {
@@ -41,26 +33,21 @@ bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const 
         return false;
     }
     if (p->geometry >= 0) {
-        return shape_moves(view->shapes[p->geometry].kind);
+        return numbers_move(view, p);
     }
-    if (p->instance >= 0) {
-        return surfaces_slide(view, view->instances[p->instance].group);
-    }
-    return p->camera >= 0 && sensor->kind != SENSOR_BATCH && surfaces_slide(view, -1);
+    return p->instance >= 0 || (p->camera >= 0 && sensor->kind != SENSOR_BATCH);
 }
 
 void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char text[OBJECT_NAME]) {
     const SceneView *view = &scene->view;
-    int32_t group = p->instance >= 0 ? view->instances[p->instance].group : -1;
-    int32_t stuck = p->geometry >= 0 ? p->geometry : stuck_surface(view, group);
     char name[OBJECT_NAME];
     if (!ray_is_free(view, sensor)) {
         snprintf(text, OBJECT_NAME, "the rays of this sensor begin or end on surfaces");
-    } else if (stuck < 0) {
+    } else if (p->geometry < 0) {
         snprintf(text, OBJECT_NAME, "this sensor is a batch of sensors");
     } else {
-        rey_name_shape(scene, stuck, name);
-        snprintf(text, OBJECT_NAME, "points do not slide over the shape '%.120s' yet", name);
+        rey_name_shape(scene, p->geometry, name);
+        snprintf(text, OBJECT_NAME, "the surface of '%.120s' does not follow these numbers yet", name);
     }
 }
 

@@ -1,5 +1,6 @@
 // curve_move.h: B-spline tubes whose control points move. Points keep their position along the segment and their angle
-// about the tangent, so that their texture coordinates stay. NOT here: polylines.
+// about the tangent, so that their texture coordinates stay. How points slide over tubes.
+// NOT differentiated: the control points of polylines.
 #pragma once
 
 #include "shape/curve.h"
@@ -181,4 +182,25 @@ KFN void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, co
     out[1].dp_du = v3_scale(v3_madd(v3_scale(c.around, p.r1), p.r, turned), n * TWO_PI);
     Vec3 second = v3_madd(v3_scale(dtangent, stretch), ds, c.tangent);
     out[1].dp_dv = v3_scale(v3_madd(v3_madd(second, r2, c.e), p.r1, de), n * n);
+}
+
+// Cones and the spheres at their ends: where v is along dp_du, or in the plane of the normal and the axis, dn = v / r on spheres,
+// and on cones, whose normals are the same along their lines, for the former alone.
+KFN void linear_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+    Float b[2] = {1.0f - hit->u, hit->u}, b1[2] = {f_set(-1), f_set(1)}, b2[2] = {f_set(0), f_set(0)};
+    CurveAxes c = curve_axes(curve_sum(scene, hit, LINEAR_POINTS, b, b1, b2), hit->p);
+    Float n = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count)), sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);
+    Vec3 normal = v3_scale(si->ng, sign), away = v3_sub(si->p, c.p.c);
+    Mask cone = m_gt(hit->u, f_set(0)) & m_lt(hit->u, f_set(1));
+    // around: e goes along `around`, that along -e
+    Float size = v3_dot(away, c.e), dphi = TWO_PI * c.p.r * f_safe_rcp(size);
+    out[0] = slide_along(si->dp_du, dphi * INV_TWO_PI, f_set(0));
+    out[0].n = out[0].ng = v3_scale(si->dp_du, sign * f_safe_rcp(c.p.r));
+    out[0].dp_du = v3_scale(c.e, -TWO_PI * c.p.r * dphi);
+    out[0].dp_dv = v3_scale(c.around, n * c.p.r1 * dphi);
+    // along, in units of all segments
+    Vec3 along = v3_select(cone, v3_madd(c.p.c1, c.p.r1, normal), v3_scale(v3_cross(c.around, normal), c.speed));
+    out[1] = slide_along(v3_scale(along, n), f_set(0), f_select(cone, f_set(1), f_set(0)));
+    out[1].n = out[1].ng = v3_select(cone, v3_zero(), v3_scale(along, sign * n * f_safe_rcp(c.p.r)));
+    out[1].dp_du = v3_scale(c.around, f_select(cone, TWO_PI * c.p.r1 * n, f_set(0)));
 }

@@ -1,11 +1,12 @@
 // move.h: dispatch over the kinds of surface that move: how an interaction slides along its surface, and the adjoint of an
 // interaction that is attached to its surface in vertices, normals, poses of shapes and of instances.
-// NOT differentiated: polylines and grids of distances.
+// NOT differentiated: the control points of polylines and the distances of grids.
 #pragma once
 
 #include "shape/curve_move.h"
 #include "shape/mesh_move.h"
 #include "shape/posed_move.h"
+#include "shape/sdfgrid_move.h"
 #include "shape/shape.h"
 
 KFN void surface_slide(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit, const Interaction *si,
@@ -26,9 +27,11 @@ KFN void surface_slide(const SceneView *scene, int32_t kind, int32_t flags, cons
     case SHAPE_BSPLINE:
         bspline_slide(scene, flags, hit, si, out);
         break;
+    case SHAPE_LINEAR:
+        linear_slide(scene, flags, hit, si, out);
+        break;
     default:
-        out[0] = slide_along(si->dp_du, f_set(0), f_set(0));
-        out[1] = slide_along(si->dp_dv, f_set(0), f_set(0));
+        sdfgrid_slide(scene, flags, hit, si, out);
         break;
     }
 }
@@ -63,6 +66,9 @@ KFN void surface_move_adj(const SceneView *scene, int32_t kind, int32_t flags, c
         break;
     case SHAPE_BSPLINE:
         bspline_move_adj(scene, flags, hit, si, d, sink, m);
+        break;
+    case SHAPE_SDFGRID:
+        sdfgrid_move_adj(scene, flags, hit, si, d, sink, m);
         break;
     default:
         break;

@@ -1,5 +1,5 @@
 // posed_move.h: shapes of one surface that move with their pose: spheres, disks, cylinders. They slide along dp_du and
-// dp_dv. NOT here: grids of distances.
+// dp_dv.
 #pragma once
 
 #include "shape/cylinder.h"

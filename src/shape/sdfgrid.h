@@ -132,14 +132,19 @@ typedef struct SdfNodes {
     Int grid, nx, ny, nz;
 } SdfNodes;
 
-// Gradient of the trilinear function of voxel (x, y, z) at q, both in grid coordinates.
-KFN Vec3 sdfgrid_gradient(const SceneView *scene, const SdfNodes *n, Int x, Int y, Int z, Vec3 q) {
+// Distances at the corners of voxel (x, y, z), x fastest.
+KFN void sdfgrid_distances(const SceneView *scene, const SdfNodes *n, Int x, Int y, Int z, Float c[8]) {
     Int at = (z * n->ny + y) * n->nx + x + n->grid;
-    Float c[8], fx = q.x - f_from_i(x), fy = q.y - f_from_i(y), fz = q.z - f_from_i(z);
     for (int k = 0; k < 8; k++) {
         Int offset = i_set(k & 1) + (k & 2 ? n->nx : i_set(0)) + (k & 4 ? n->nx * n->ny : i_set(0));
         c[k] = theta_at(scene, at + offset);
     }
+}
+
+// Gradient of the trilinear function of voxel (x, y, z) at q, both in grid coordinates.
+KFN Vec3 sdfgrid_gradient(const SceneView *scene, const SdfNodes *n, Int x, Int y, Int z, Vec3 q) {
+    Float c[8], fx = q.x - f_from_i(x), fy = q.y - f_from_i(y), fz = q.z - f_from_i(z);
+    sdfgrid_distances(scene, n, x, y, z, c);
     Float gx, gy, gz;
     gx = f_lerp(f_lerp(c[1] - c[0], c[3] - c[2], fy), f_lerp(c[5] - c[4], c[7] - c[6], fy), fz);
     gy = f_lerp(f_lerp(c[2] - c[0], c[3] - c[1], fx), f_lerp(c[6] - c[4], c[7] - c[5], fx), fz);
@@ -163,12 +168,26 @@ KFN Vec3 sdfgrid_smooth(const SceneView *scene, const SdfNodes *n, Vec3 q) {
     return sum;
 }
 
+// A hit in grid coordinates.
+typedef struct SdfPoint {
+    SdfNodes nodes;
+    Vec3 q;
+} SdfPoint;
+
+KFN SdfPoint sdfgrid_point(const SceneView *scene, const Hit *hit) {
+    Int at = SHAPE_FIELD(scene, hit->shape, table);
+    Vec3 local = pose_to_local(scene, at, hit->p), nodes = table_v3(scene, at + SDFGRID_NODES);
+    SdfPoint p = {{SHAPE_FIELD(scene, hit->shape, positions), i_from_f(nodes.x), i_from_f(nodes.y), i_from_f(nodes.z)}, v3_zero()};
+    p.q = v3(local.x * (nodes.x - 1.0f), local.y * (nodes.y - 1.0f), local.z * (nodes.z - 1.0f));
+    return p;
+}
+
 KFN Interaction sdfgrid_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
-    Vec3 local = pose_to_local(scene, at, hit->p), nodes = table_v3(scene, at + SDFGRID_NODES);
-    SdfNodes n = {SHAPE_FIELD(scene, hit->shape, positions), i_from_f(nodes.x), i_from_f(nodes.y), i_from_f(nodes.z)};
-    Vec3 q = v3(local.x * (nodes.x - 1.0f), local.y * (nodes.y - 1.0f), local.z * (nodes.z - 1.0f));
+    SdfPoint point = sdfgrid_point(scene, hit);
+    SdfNodes n = point.nodes;
+    Vec3 q = point.q;
     Vec3 g = sdfgrid_gradient(scene, &n, sdfgrid_cell(q.x, n.nx), sdfgrid_cell(q.y, n.ny), sdfgrid_cell(q.z, n.nz), q);
     si.p = hit->p;
     si.ng = pose_normal(scene, at, g);

@@ -64,7 +64,7 @@ KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     }
 }
 
-// Kinds that move.h knows.
+// Kinds whose points and numbers move.h knows how to move; all slide.
 KFN bool shape_moves(int32_t kind) {
     return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK || kind == SHAPE_CYLINDER ||
            kind == SHAPE_BSPLINE;

@@ -18,12 +18,13 @@
 #define float double
 #include "shape/move.h"
 
-enum { POSITIONS, NORMALS = 9, UVS = 18, POSE = 24, INSTANCE = 40, CONTROL_POINTS = 56, NUMBERS = 72 };
+enum { POSITIONS, NORMALS = 9, UVS = 18, POSE = 24, INSTANCE = 40, CONTROL_POINTS = 56, DISTANCES = 72, NODES = 4 };
+enum { NUMBERS = DISTANCES + NODES * NODES * NODES };
 
 typedef struct Case {
     const char *name;
     int32_t kind, flags;
-    bool posed_mesh;
+    bool posed_mesh; // of cones: the sphere at their end
 } Case;
 
 static const Case cases[] = {
@@ -43,7 +44,15 @@ static const Case cases[] = {
     {"cylinder in an instance", SHAPE_CYLINDER, SHAPE_INSTANCED, false},
     {"curve", SHAPE_BSPLINE, 0, false},
     {"flipped curve in an instance", SHAPE_BSPLINE, SHAPE_INSTANCED | SHAPE_FLIP_NORMALS, false},
+    {"cone", SHAPE_LINEAR, 0, false},
+    {"end of a flipped cone", SHAPE_LINEAR, SHAPE_FLIP_NORMALS, true},
+    {"cone in an instance", SHAPE_LINEAR, SHAPE_INSTANCED, false},
+    {"grid of distances", SHAPE_SDFGRID, 0, false},
+    {"smooth grid of distances", SHAPE_SDFGRID, SHAPE_SMOOTH_GRADIENT | SHAPE_FLIP_NORMALS, false},
+    {"smooth grid of distances in an instance", SHAPE_SDFGRID, SHAPE_SMOOTH_GRADIENT | SHAPE_INSTANCED, false},
 };
+
+static bool is_tube(const Case *c) { return c->kind == SHAPE_BSPLINE || c->kind == SHAPE_LINEAR; }
 
 static double uniform(uint64_t *state) {
     uint64_t z = (*state += 0x9e3779b97f4a7c15u);
@@ -60,7 +69,7 @@ typedef struct World {
     InstanceRecord instance;
     double theta[NUMBERS], tables[64], a[2];
     int32_t triangles[3], segments[2];
-    Vec3 q; // curves: along e, in the frame about the tangent
+    Vec3 q; // tubes: along e, in the frame about the tangent
 } World;
 
 static void inverse_rows(const double *m, double *r) {
@@ -103,6 +112,46 @@ static void follow(World *w) {
     }
 }
 
+// The distance at a point in the space of a grid's pose.
+static double distance_at(const World *w, Vec3 q) {
+    double g[3] = {q.x * (NODES - 1), q.y * (NODES - 1), q.z * (NODES - 1)}, c[8], f[3];
+    int32_t at[3];
+    for (int k = 0; k < 3; k++) {
+        at[k] = (int32_t)fmin(fmax(floor(g[k]), 0), NODES - 2);
+        f[k] = g[k] - at[k];
+    }
+    for (int k = 0; k < 8; k++) {
+        c[k] = w->theta[DISTANCES + ((at[2] + (k >> 2)) * NODES + at[1] + (k >> 1 & 1)) * NODES + at[0] + (k & 1)];
+    }
+    return sdfgrid_value(c, f);
+}
+
+// A bumpy ball, and where a ray from its middle meets it.
+static void grid_make(World *w, uint64_t *random) {
+    const Vec3 middle = {0.5, 0.5, 0.5};
+    for (int k = 0; k < NODES * NODES * NODES; k++) {
+        Vec3 node = v3_scale(v3(k % NODES, k / NODES % NODES, k / NODES / NODES), 1.0 / (NODES - 1));
+        w->theta[DISTANCES + k] = v3_length(v3_sub(node, middle)) - 0.4 + 0.05 * w->theta[DISTANCES + k];
+    }
+    Vec3 d = v3_normalize(v3(uniform(random), uniform(random), uniform(random)));
+    double low = 0, high = 0.5;
+    for (int i = 0; i < 100; i++) {
+        double half = 0.5 * (low + high);
+        *(distance_at(w, v3_madd(middle, half, d)) < 0 ? &low : &high) = half;
+    }
+    w->q = v3_madd(middle, low, d);
+}
+
+static Vec3 distance_slope(const World *w, Vec3 q) {
+    const double h = 1e-6;
+    double g[3];
+    for (int k = 0; k < 3; k++) {
+        Vec3 step = v3(h * (k == 0), h * (k == 1), h * (k == 2));
+        g[k] = (distance_at(w, v3_add(q, step)) - distance_at(w, v3_sub(q, step))) / (2 * h);
+    }
+    return v3(g[0], g[1], g[2]);
+}
+
 static void world_make(World *w, const Case *c, uint64_t *random) {
     memset(w, 0, sizeof *w);
     w->c = c;
@@ -133,7 +182,10 @@ static void world_make(World *w, const Case *c, uint64_t *random) {
     w->triangles[1] = 1;
     w->triangles[2] = 2;
     w->shape = (ShapeRecord){.kind = c->kind, .flags = c->flags, .triangle_count = 1, .vertex_count = 3,
-                             .positions = c->kind == SHAPE_BSPLINE ? CONTROL_POINTS : POSITIONS, .segment_count = 2,
+                             .positions = is_tube(c)                 ? CONTROL_POINTS
+                                          : c->kind == SHAPE_SDFGRID ? DISTANCES
+                                                                     : POSITIONS,
+                             .segment_count = 2,
                              .normals = NORMALS, .uvs = UVS, .to_world = POSE};
     w->instance = (InstanceRecord){.to_world = INSTANCE, .table = INSTANCE_AT};
     w->a[0] = 0.3 + 0.1 * uniform(random);
@@ -142,6 +194,15 @@ static void world_make(World *w, const Case *c, uint64_t *random) {
     w->q = c->kind == SHAPE_SPHERE  ? v3(cos(phi) * sqrt(1 - z * z), sin(phi) * sqrt(1 - z * z), z)
            : c->kind == SHAPE_DISK ? v3(z * cos(phi), z * sin(phi), 0)
                                     : v3(cos(phi), sin(phi), z);
+    if (c->kind == SHAPE_LINEAR && c->posed_mesh) {
+        w->a[0] = 1;
+    }
+    for (int k = 0; k < 3; k++) {
+        w->tables[SDFGRID_NODES + k] = NODES;
+    }
+    if (c->kind == SHAPE_SDFGRID) {
+        grid_make(w, random);
+    }
     follow(w);
 }
 
@@ -174,8 +235,21 @@ static Vec3 curve_point(const World *w, double v, double x, double y) {
     return v3_madd(c, r, v3_normalize(v3_madd(v3_scale(f.s, x), y, f.t)));
 }
 
+// The same of a cone, or of the sphere at its end.
+static Vec3 cone_point(const World *w, double v, double x, double y) {
+    const double *a = w->theta + CONTROL_POINTS, *b = a + 4;
+    Vec3 c1 = v3(b[0] - a[0], b[1] - a[1], b[2] - a[2]), tangent = v3_normalize(c1);
+    double r1 = b[3] - a[3], along = w->c->posed_mesh ? 0.8 : -r1 / v3_length(c1);
+    Frame f = curve_frame(tangent);
+    Vec3 e = v3_normalize(v3_madd(v3_scale(f.s, x), y, f.t));
+    Vec3 n = v3_madd(v3_scale(tangent, along), sqrt(1 - along * along), e);
+    return v3_madd(v3_madd(v3(a[0], a[1], a[2]), v, c1), a[3] + v * r1, n);
+}
+
 static Hit attached(const World *w, const double a[2], Vec3 q) {
-    Vec3 p = w->c->kind == SHAPE_BSPLINE ? curve_point(w, a[0], q.x, q.y) : apply(w->theta + POSE, q);
+    Vec3 p = w->c->kind == SHAPE_BSPLINE  ? curve_point(w, a[0], q.x, q.y)
+             : w->c->kind == SHAPE_LINEAR ? cone_point(w, a[0], q.x, q.y)
+                                          : apply(w->theta + POSE, q);
     Hit hit = {0, 0, a[0], a[1], p, 0};
     if (w->c->flags & SHAPE_INSTANCED) {
         hit.p = apply(w->theta + INSTANCE, p);
@@ -192,7 +266,9 @@ static Interaction look(World *w, const Hit *hit) {
 static Vec3 patch(World *w) {
     const double e = 1e-5;
     Vec3 p[3];
-    Frame f = frame_from_normal(w->c->kind == SHAPE_DISK ? v3(0, 0, 1) : v3_normalize(w->q));
+    Frame f = frame_from_normal(v3_normalize(w->c->kind == SHAPE_DISK      ? v3(0, 0, 1)
+                                             : w->c->kind == SHAPE_SDFGRID ? distance_slope(w, w->q)
+                                                                           : w->q));
     for (int k = 0; k < 3; k++) {
         double a[2] = {w->a[0] + e * (k == 1), w->a[1] + e * (k == 2)};
         Vec3 q = v3_madd(v3_madd(w->q, e * (k == 1), f.s), e * (k == 2), f.t);
@@ -262,7 +338,7 @@ static void test_adjoint(void **state) {
         for (int i = 0; i < NUMBERS; i++) {
             const double h = 1e-4;
             double difference = 0;
-            if (c->posed_mesh && i < POSE) {
+            if ((c->posed_mesh && i < POSE) || i >= DISTANCES) {
                 continue;
             }
             for (int k = -1; k <= 1; k += 2) {
@@ -283,6 +359,12 @@ static void test_adjoint(void **state) {
     assert_true(size > 1);
 }
 
+// The distance at a point of the world.
+static double distance_of(const World *w, Vec3 p) {
+    p = w->c->flags & SHAPE_INSTANCED ? apply(w->tables + INSTANCE_AT + 12, p) : p;
+    return distance_at(w, apply(w->tables + 12, p));
+}
+
 // Where the ray p + t d meets the surface near the attached point.
 static Hit meet(World *w, Vec3 p, Vec3 d) {
     Hit hit = attached(w, w->a, w->q);
@@ -292,9 +374,14 @@ static Hit meet(World *w, Vec3 p, Vec3 d) {
         shape_slide(&w->scene, w->c->kind, w->c->flags, &hit, &si, s);
         Vec3 off = v3_sub(p, si.p), b1 = v3_cross(s[1].p, d), b2 = v3_cross(d, s[0].p);
         double det = v3_dot(s[0].p, b1), x = v3_dot(off, b1) / det, y = v3_dot(off, b2) / det;
-        hit.u += w->c->kind == SHAPE_BSPLINE ? 2 * y : x; // of two segments
+        hit.u += !is_tube(w->c) ? x : w->c->kind == SHAPE_LINEAR && w->c->posed_mesh ? 0 : 2 * y; // of two segments
         hit.v += y;
         hit.p = v3_madd(v3_madd(si.p, x, s[0].p), y, s[1].p);
+        if (w->c->kind == SHAPE_SDFGRID) { // along the ray to where the distance is 0
+            const double h = 1e-4;
+            double here = distance_of(w, hit.p), slope = (distance_of(w, v3_madd(hit.p, h, d)) - here) / h;
+            hit.p = v3_madd(hit.p, -here / slope, d);
+        }
     }
     return hit;
 }
@@ -393,12 +480,15 @@ int main(void) {
     enum { CASES = sizeof cases / sizeof *cases };
     struct CMUnitTest tests[2 * CASES + 2];
     static char names[2 * CASES][64];
+    int count = 0;
     for (int i = 0; i < 2 * CASES; i++) {
         void *c = (void *)(uintptr_t)(cases + i / 2);
         snprintf(names[i], sizeof names[i], "%s: %s", i % 2 ? "slide" : "adjoint", cases[i / 2].name);
-        tests[i] = (struct CMUnitTest){names[i], i % 2 ? test_slide : test_adjoint, NULL, NULL, c};
+        if (i % 2 || cases[i / 2].kind != SHAPE_LINEAR) { // whose control points do not move
+            tests[count++] = (struct CMUnitTest){names[i], i % 2 ? test_slide : test_adjoint, NULL, NULL, c};
+        }
     }
-    tests[2 * CASES] = (struct CMUnitTest)cmocka_unit_test(test_frame);
-    tests[2 * CASES + 1] = (struct CMUnitTest)cmocka_unit_test(test_mesh_frame);
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_frame);
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_mesh_frame);
+    return _cmocka_run_group_tests("tests", tests, (size_t)count, NULL, NULL);
 }

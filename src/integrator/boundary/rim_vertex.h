@@ -1,8 +1,8 @@
-// rim_vertex.h: vertices of rough refraction whose light is that of a point or of one direction. Where such refraction ends (bsdf/rim.h)
-// the value, f = f_+ H(s g), jumps with a direction to the light that is given. With all of the two directions fixed,
+// rim_vertex.h: vertices of rough refraction whose light is that of a point or of one direction. Where such refraction ends
+// (bsdf/rim.h) the value, f = f_+ H(s g), jumps with a direction to the light that is given. With all of the two directions fixed,
 //   dI += integral f_+ delta(g) s g' L W
-// over the points of such surfaces and the directions to what looks at them. The adjoints of both directions, -f_+ s / e and f_+ s
-// times a normal (rim_adj), tell f_+, e and that normal of whatever functions are nested within each other.
+// over the points of such surfaces and the directions to what looks at them. The adjoints of both directions, f_+ s / e and
+// -f_+ s times a normal (rim_adj), tell f_+, e and that normal of whatever functions are nested within each other.
 #pragma once
 
 #include "integrator/boundary/segments.h"
