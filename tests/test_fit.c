@@ -455,6 +455,7 @@ static void test_fit_errors(void **state) {
         {"parameters.0.smoothness=3", "smoothness is for 'parameterisation: laplacian'"},
         {"parameters.3.name=red.*", "entry 0 of 'parameters' names it already"},
         {"parameters.3.name=floor.bsdf.*", "entry 0 of 'parameters' names it already"}, // by its further name
+        {"parameters.3.name=camera.to_world", "a camera turns and moves, but does not scale or shear"},
         {"parameters.3.name=nothing*", "matches no parameter of the scene"},
         {"parameters.0.start=[1, 2]", "start holds 2 numbers"},
         {"parameters.1.start=0", "entry 0 starts at 0, expected a number above 0: 'parameterisation: log'"},

@@ -237,7 +237,8 @@ REY_API int64_t rey_selection_size(const rey_scene *scene, rey_selection selecti
 /* Vector-Jacobian product (reverse mode): gradient[i] = d/dtheta_i sum over pixels and channels of adjoint * image.
  * adjoint: height x width x 3 floats. gradient: rey_selection_size doubles, assigned.
  * set_gradients: null, or def->sets times the selection's size doubles: the gradient of each sample set, whose mean
- * is gradient. REY_ERROR_INCOMPLETE when a parameter needs a term that def->terms does not allow. */
+ * is gradient. REY_ERROR_INCOMPLETE when def->terms is 0 and a parameter needs a term that does not exist, or when none of
+ * the terms that def->terms asks for is one of the parameters'; what else it leaves out is left out without a word. */
 REY_API rey_result rey_vjp(rey_scene *scene, const rey_render_def *def, rey_selection selection,
                            const float *adjoint, double *gradient, double *set_gradients, rey_stats *stats);
 

@@ -62,12 +62,13 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
     }
 }
 
-static void run_rim_view(Tracer *t, const BoundaryJob *b, const FilterTable *filter, Sink *sink, Segments *q) {
+static void run_rim_view(Tracer *t, const BoundaryJob *b, const FilterTable *filter, Sink *sink, Segments *q, int32_t *kept) {
     const int32_t most = t->ws.chunk;
     const Strips strips = strips_of(t);
     for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
         int64_t left = b->count - at;
-        rim_views_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, q);
+        int32_t count = rim_strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept);
+        rim_views_find(t, b, &strips, b->first + at, kept, count, q);
         pairs_adjoint(t, b, filter, q->count);
         rim_views_finish(t, b, q, sink);
         pairs_splat(t, b, q->count);
@@ -124,7 +125,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     if (b->kind == BOUNDARY_MIRRORED) {
         run_mirrored(&t, b, &filter, &sink, &in.q, kept, begin);
     } else if (b->kind == BOUNDARY_RIM_VIEW) {
-        run_rim_view(&t, b, &filter, &sink, &in.q);
+        run_rim_view(&t, b, &filter, &sink, &in.q, kept);
     } else if (b->kind == BOUNDARY_PRIMARY) {
         run_primary(&t, b, &pinhole, &filter, &sink, &in.q, kept, begin);
     } else {

@@ -110,7 +110,7 @@ static rey_result add_product(Fit *fit, const FitView *view, uint32_t set, int s
 // Adds one view's share of the gradient; *loss is its loss. Nothing where reused paths turn out to be stale.
 static rey_result add_view(Fit *fit, int index, int batch_count, double *loss) {
     const FitView *view = &fit->views[index];
-    int iteration = rey_reuse_iteration(fit), spp = rey_job_spp_at(&fit->job, fit->state.iteration) / 2;
+    int iteration = rey_reuse_iteration(fit), spp = (rey_job_spp_at(&fit->job, fit->state.iteration) + 1) / 2; // of each half
     bool frozen = fit->job.optimizer.kind == OPTIMIZER_LBFGS; // it needs one function, noise included
     uint32_t set_a = frozen ? 0 : 2 * (uint32_t)iteration, set_b = set_a + 1;
     rey_result result = render_half(fit, view, set_a, spp, fit->a);

@@ -5,6 +5,7 @@
 #include "fit/start.h"
 #include "scene/absent.h"
 #include "scene/names.h"
+#include "sensor/kinds.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -85,6 +86,29 @@ static rey_result check_terms(Job *job, const JobParameter *p, const rey_param_i
                            "terms %s: the gradient of %s has no such term, expected some of %s", asked, info->name, expected);
 }
 
+// Whether a parameter is the pose of a camera, which scene files take unstretched only.
+static bool is_camera_pose(const rey_scene *scene, int param) {
+    const Param *p = &ARRAY_AT(scene->params, Param, param);
+    const SceneView *view = &scene->view;
+    bool found = false;
+    for (int64_t i = 0; i < view->sensors_count + view->batch_sensors_count && p->camera == CAMERA_POSE && !found; i++) {
+        const SensorRecord *s = i < view->sensors_count ? view->sensors + i : view->batch_sensors + (i - view->sensors_count);
+        found = s->to_world == p->theta && (s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_THINLENS);
+    }
+    return found;
+}
+
+static rey_result check_pose(Job *job, const rey_scene *scene, const JobParameter *p, int param, const rey_param_info *info) {
+    bool rigid = p->parameterisation == PARAMETERISATION_RIGID, pose = rigid || p->parameterisation == PARAMETERISATION_SIMILARITY;
+    if (pose && info->count != RIGID_VALUES) {
+        return fail_key(job, p, "name", info->name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
+    }
+    return rigid || !is_camera_pose(scene, param)
+               ? REY_OK
+               : fail_key(job, p, "name", info->name, "a camera turns and moves, but does not scale or shear: expected "
+                          "'parameterisation: rigid'");
+}
+
 static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobParameter *p, int job_index,
                               Array *owners, Unknowns *u) {
     rey_param_info info;
@@ -102,9 +126,9 @@ static rey_result add_unknown(Job *job, rey_scene *scene, int param, const JobPa
     if (p->parameterisation == PARAMETERISATION_SIMPLEX && info.count < 2) {
         return fail_key(job, p, "name", info.name, "parameterisation simplex is for two or more shares");
     }
-    bool pose = p->parameterisation == PARAMETERISATION_RIGID || p->parameterisation == PARAMETERISATION_SIMILARITY;
-    if (pose && info.count != RIGID_VALUES) {
-        return fail_key(job, p, "name", info.name, "parameterisations rigid and similarity are for poses, such as NAME.to_world");
+    result = check_pose(job, scene, p, param, &info);
+    if (result) {
+        return result;
     }
     for (size_t i = 0; i < u->items.count; i++) {
         if (ARRAY_AT(u->items, Unknown, i).param == param) {

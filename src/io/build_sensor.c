@@ -140,7 +140,7 @@ static rey_result lens_numbers(Builder *b, rey_xml_node *node, const char *path,
                                   "aperture_radius %g and focus_distance %g, expected positive numbers", radius, focus);
     }
     const SensorNumber numbers[] = {
-        {"aperture_radius", "scene units", "radius of the aperture", radius, 0, INFINITY, CAMERA_APERTURE},
+        {"aperture_radius", "scene units", "radius of the aperture", radius, 1e-6f, INFINITY, CAMERA_APERTURE},
         {"focus_distance", "scene units", "distance along the axis that is sharp", focus, 1e-6f, INFINITY, CAMERA_FOCUS}};
     return add_numbers(b, path, numbers, COUNT_OF(numbers), &s->lens);
 }

@@ -254,13 +254,16 @@ static void write_value(Writer *w, int depth, const rey_xml_node *node, const ch
     rey_save_line(w, depth, "</volume>");
 }
 
-// What goes with a property: the other half of a metal's index.
+// What goes with a property: the other half of a metal's index, and what a spot has by default as a share of its cone.
 static const char *other_half(const Edit *e) {
+    if (strcmp(e->node->type, "spot") == 0) {
+        return strcmp(e->property, "cutoff_angle") == 0 ? "beam_width" : NULL;
+    }
     bool metal = strstr(e->node->type, "conductor") != NULL;
     return metal && strcmp(e->property, "eta") == 0 ? "k" : metal && strcmp(e->property, "k") == 0 ? "eta" : NULL;
 }
 
-// The other half, when other words stood for both.
+// The other half, when other words stood for both, or none for that.
 static void write_other_half(Writer *w, int depth, const Edit *e) {
     const char *other = other_half(e);
     if (!other || rey_xml_has(e->node, other)) {

@@ -4,13 +4,12 @@
 #include "bsdf/ends.h"
 #include "render/boundary.h"
 #include "render/particles.h"
-#include "shape/shape.h"
 
 // What keeps the samplers of rims in the light of points and of single directions from all of what a parameter moves, null where
 // nothing does (integrator/boundary/rim_light.h, rim_view.h).
 static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord *sensor, const Param *p) {
     if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || (p->terms & REY_TERM_SPECULAR)) {
-        return "what moves that in the light of a point or of one direction is known of indices of refraction and of normals alone";
+        return "in the light of a point or of one direction only what the glass's own indices and normals move of that is known";
     }
     if (view->has_media || view->through) {
         return "in the light of a point or of one direction the integrators for media do not find that. 'path' does";
@@ -20,10 +19,6 @@ static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord 
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
-        const bool bent = shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR || shape->kind == SHAPE_BSPLINE;
-        if (bent && rey_bsdf_ends_within(view, shape->bsdf)) {
-            return "in the light of a point or of one direction that is not known on curves and grids of distances";
-        }
         if (rey_bsdf_holds(view, shape->bsdf, rey_bsdf_bends) && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_turns)) {
             return "in the light of a point or of one direction it is not found in smooth mirrors and glass that have normal maps";
         }

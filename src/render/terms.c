@@ -350,6 +350,10 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
         }
         *needed |= info.terms;
     }
+    if (selection.count > 0 && def->terms && !(def->terms & *needed)) {
+        return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "the gradient of %s has none of the terms that are asked for",
+                        ARRAY_AT(scene->params, Param, selection.params[0]).name);
+    }
     return check_asked(scene, def, chains, selection);
 }
 

@@ -211,8 +211,8 @@ static void test_refused(void **state) {
         const char *kind, *facets, *light, *integrator, *param, *expected;
     } rows[] = {{"glass", "ggx", "directional", "path", "glass.eta.value", NULL},
                 {"coat", "ggx", "directional", "direct", "coat.eta.value", NULL},
-                {"blend", "ggx", "directional", "path", "pane.to_world", "indices of refraction"},
-                {"glass", "ggx", "directional", "path", "emitter_0.to_world", "indices of refraction"},
+                {"blend", "ggx", "directional", "path", "pane.to_world", "own indices and normals"},
+                {"glass", "ggx", "directional", "path", "emitter_0.to_world", "own indices and normals"},
                 {"glass", "ggx", "directional", "volpath", "glass.eta.value", "integrators for media"},
                 {"glass", "ggx", "constant", "ptracer", "glass.eta.value", "light tracing"},
                 {"glass", "ggx", "directional", "path", "glass.alpha_u.value", NULL},

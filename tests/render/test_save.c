@@ -171,6 +171,35 @@ static void mesh_flags_come_back(void **state) {
                             "<transform name=\"to_world\"><scale x=\"-1\" y=\"0.5\"/></transform>");
 }
 
+// What a file says nothing of, and what then depends on a number that changes, keeps its value: the beam of a spot.
+static void spots_come_back(void **state) {
+    static float before[NUMBERS], after[NUMBERS];
+    const float wider = 40;
+    Fixture *f = *state;
+    char path[128], copy[128];
+    snprintf(path, sizeof path, "%s/spot.xml", f->folder);
+    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file, "<scene version=\"3.0.0\"><integrator type=\"path\"/><sensor type=\"perspective\">"
+                  "<transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
+                  "<film type=\"hdrfilm\"><integer name=\"width\" value=\"24\"/><integer name=\"height\" value=\"24\"/></film>"
+                  "</sensor><shape type=\"rectangle\"/><emitter type=\"spot\" id=\"spot\">"
+                  "<float name=\"cutoff_angle\" value=\"25\"/>"
+                  "<transform name=\"to_world\"><lookat origin=\"0, 0, 2\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform></emitter>"
+                  "</scene>");
+    assert_int_equal(fclose(file), 0);
+    rey_scene *scene = load(f, path, 0);
+    assert_int_equal(rey_param_set(scene, rey_param_find(scene, "spot.cutoff_angle.value"), &wider, 1), REY_OK);
+    render(f, scene, before);
+    assert_int_equal(rey_scene_save(scene, copy), REY_OK);
+    rey_scene_destroy(scene);
+    scene = load(f, copy, 0);
+    render(f, scene, after);
+    rey_scene_destroy(scene);
+    assert_memory_equal(before, after, sizeof before);
+}
+
 // Moves every parameter a little.
 static void change_all(Fixture *f, rey_scene *scene) {
     static float values[1 << 16];
@@ -310,6 +339,7 @@ int main(void) {
         cmocka_unit_test(rooms_come_back),
         cmocka_unit_test(texture_poses_come_back),
         cmocka_unit_test(mesh_flags_come_back),
+        cmocka_unit_test(spots_come_back),
         cmocka_unit_test(files_are_written_once),
         cmocka_unit_test(values_load_by_name),
         cmocka_unit_test(wrong_values_are_refused),

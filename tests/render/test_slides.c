@@ -1,4 +1,4 @@
-// The term `interior` of cameras and poses where the surfaces are grids of distances and cones (shape/sdfgrid_move.h, linear_slide), of
+// The term `interior` of cameras and poses where the surfaces are grids of distances (shape/sdfgrid_move.h) and cones, of
 // which no silhouette is seen: against differences of pictures.
 #include "rooms.h"
 

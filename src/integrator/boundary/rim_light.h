@@ -57,6 +57,7 @@ static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, co
     Vec3 view = frame_to_world(&s.si.sh, b.wo);
     Exchange x = {b.wo, wl, view, light, b.lobe, m};
     Rim r = rim_measure(&s, &x, &still, m & m_gt(pdf, f_set(0)));
+    r.value = rim_colour(&s, &x, &still, r.m);
     Float weight = f_abs(v3_dot(s.si.ng, view)) * f_safe_rcp(f_abs(v3_dot(s.si.ng, light)) * pdf);
     Spec l = spec_scale(spec_mul(in->flux, r.value), weight);
     m = r.m & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));

@@ -32,27 +32,30 @@ typedef struct Rim {
     Mask m;      // whether there is one
 } Rim;
 
-// The rim that a lobe belongs to, whether the directions lie on it or not.
+// The rim that a lobe belongs to, whether the directions lie on it or not, without its value.
 static NOINLINE Rim rim_measure(const SurfaceSweep *s, const Exchange *x, Sink *still, Mask m) {
     Rim r = {.value = spec_zero()};
-    Vec3 n = v3_zero();
-    Float viewed = f_set(0), sum = f_set(0);
+    Vec3 dview = v3_zero(), dlight = v3_zero();
+    bsdf_adj(&s->call, x->view, x->light, x->lobe, spec_set(f_set(1)), still, m, &dview, &dlight, NULL);
+    Float viewed = v3_length(dview), sum = v3_length(dlight), e = sum * f_safe_rcp(viewed), rcp = f_safe_rcp(sum);
+    Float a = v3_dot(dlight, x->view) * rcp, b = v3_dot(dlight, x->light) * rcp;
+    r.scale = e * rcp;
+    r.g = f_abs(a) - e * f_abs(b);
+    r.m = m & m_gt(viewed, f_set(0)) & m_finite(r.scale) & m_lt(a * b, f_set(0));
+    return r;
+}
+
+// Its value.
+static Spec rim_colour(const SurfaceSweep *s, const Exchange *x, Sink *still, Mask m) {
+    Spec value = spec_zero();
     for (int c = 0; c < SPEC_N; c++) {
         Spec one = spec_zero();
         Vec3 dview = v3_zero(), dlight = v3_zero();
         one.c[c] = f_set(1);
         bsdf_adj(&s->call, x->view, x->light, x->lobe, one, still, m, &dview, &dlight, NULL);
-        r.value.c[c] = v3_length(dlight);
-        viewed = viewed + v3_length(dview);
-        sum = sum + r.value.c[c];
-        n = v3_add(n, dlight);
+        value.c[c] = v3_length(dlight);
     }
-    n = v3_scale(n, f_safe_rcp(v3_length(n)));
-    Float e = sum * f_safe_rcp(viewed), a = v3_dot(n, x->view), b = v3_dot(n, x->light);
-    r.scale = e * f_safe_rcp(sum);
-    r.g = f_abs(a) - e * f_abs(b);
-    r.m = m & m_gt(viewed, f_set(0)) & m_finite(r.scale) & m_lt(a * b, f_set(0));
-    return r;
+    return value;
 }
 
 // The derivative of s g at the vertices of segments k... by the parameters of their functions and by vertex normals, worth `worth`.

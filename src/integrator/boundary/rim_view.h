@@ -22,7 +22,8 @@ typedef struct RimView {
 } RimView;
 
 // The vertices in surfaces of a group.
-static void rim_view_group(Tracer *t, const BoundaryJob *b, int32_t group, const Hit *hit, Float u, Mask m, RimView *v) {
+static void rim_view_group(Tracer *t, const BoundaryJob *b, int32_t group, const Hit *hit, Float u, bool whole, Mask m,
+                           RimView *v) {
     Sink still = sink_of(b->still);
     SurfaceSweep s;
     const Vec2 anywhere = {f_set(0), f_set(0)};
@@ -36,20 +37,23 @@ static void rim_view_group(Tracer *t, const BoundaryJob *b, int32_t group, const
     Float pdf = bsdf_pdf(&s.call, wi, sample.wo, sample.lobe) * TWO_PI;
     Exchange x = {wi, frame_to_local(&s.si.sh, v->light_d), view, v->light_d, sample.lobe, m};
     Rim r = rim_measure(&s, &x, &still, m & m_gt(pdf, f_set(0)));
-    Ray shadow;
-    shadow_ray(&s.si, v->light_d, v->light_distance, &shadow);
-    v->shadow.o = v3_select(m, shadow.o, v->shadow.o);
-    v->shadow.d = v3_select(m, shadow.d, v->shadow.d);
-    v->shadow.tmax = f_select(m, shadow.tmax, v->shadow.tmax);
+    if (whole) {
+        Ray shadow;
+        shadow_ray(&s.si, v->light_d, v->light_distance, &shadow);
+        v->shadow.o = v3_select(m, shadow.o, v->shadow.o);
+        v->shadow.d = v3_select(m, shadow.d, v->shadow.d);
+        v->shadow.tmax = f_select(m, shadow.tmax, v->shadow.tmax);
+        v->rim.value = spec_select(m, rim_colour(&s, &x, &still, r.m), v->rim.value);
+    }
     v->probability = f_select(m, v->probability * pdf, v->probability);
     v->lobe = i_select(m, sample.lobe, v->lobe);
-    v->rim.value = spec_select(m, r.value, v->rim.value);
     v->rim.scale = f_select(m, r.scale, v->rim.scale);
     v->rim.g = f_select(m, r.g, v->rim.g);
     v->rim.m = v->rim.m | (r.m & m_ne(r.g, f_set(0)));
 }
 
-static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x, Float y, Mask m, RimView *v) {
+// whole: with its value and the way to the light.
+static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x, Float y, bool whole, Mask m, RimView *v) {
     const SceneView *scene = t->scene;
     SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
     const Vec2 zero = {f_set(0), f_set(0)};
@@ -85,7 +89,7 @@ static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x
         Hit h;
         Mask mine = take_group(scene, &v->hit, &left, &id, &h);
         if (t->job->live[id] & LIVE_SCATTERING) {
-            rim_view_group(t, b, id, &h, u, mine, v);
+            rim_view_group(t, b, id, &h, u, whole, mine, v);
         }
     }
 }
@@ -104,7 +108,7 @@ typedef struct RimEnds {
 
 static RimEnds rim_strip(Tracer *t, const BoundaryJob *b, Int slot, const Strip *s, Mask m, RimView v[2]) {
     for (int k = 0; k < 2; k++) {
-        rim_look(t, b, slot, s->x[k], s->y[k], m, v + k);
+        rim_look(t, b, slot, s->x[k], s->y[k], false, m, v + k);
     }
     return (RimEnds){{v[0].rim.g, v[1].rim.g}, m & rim_between(v, v + 1)};
 }
@@ -119,7 +123,7 @@ static NOINLINE Mask rim_narrow(Tracer *t, const BoundaryJob *b, Int slot, real 
             break;
         }
         Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]);
-        rim_look(t, b, slot, x, y, open, &middle);
+        rim_look(t, b, slot, x, y, false, open, &middle);
         Mask first = open & m_lt(e.g[0] * middle.rim.g, f_set(0)), second = open & ~first;
         e.m = e.m & (middle.rim.m | ~open);
         s->x[1] = f_select(first, x, s->x[1]);
@@ -188,12 +192,29 @@ static Float rim_again(Tracer *t, const BoundaryJob *b, const Strips *all, Int s
     return count;
 }
 
-// Keeps the places of `count` samples from number `first` on whose strips find one: where on the film, in ws, and in q what the
-// derivative of g there is worth.
-static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, int32_t count, Segments *q) {
+// As strips_find: those at whose ends g has either sign.
+static int32_t rim_strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, int32_t count, int32_t *kept) {
+    int32_t kept_count = 0;
+    for (int32_t i = 0; i < count; i += LANES) {
+        RimView v[2];
+        batch_numbers(t, i, first);
+        SampleKey own = slot_key(t, i_iota() + i);
+        Strip s = strip_sample(all, &own);
+        Mask m = rim_strip(t, b, i_iota() + i, &s, m_first_n(count - i), v).m;
+        i_compress(kept + kept_count, i_iota() + i, m);
+        kept_count += m_count(m);
+    }
+    return kept_count;
+}
+
+// Keeps the places that those strips find: where on the film, in ws, and in q what the derivative of g there is worth.
+static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, const int32_t *kept, int32_t count,
+                           Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        batch_numbers(t, i, first);
+        for (int32_t k = i; k < i + LANES; k++) {
+            slot_number(t, k, first + kept[k < count ? k : i]);
+        }
         Int slot = i_iota() + i;
         SampleKey own = slot_key(t, slot);
         Strip s = strip_sample(all, &own);
@@ -204,7 +225,7 @@ static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         RimView v;
         Vec2 lens = sightline_lens(t, &own);
         Float x = 0.5f * (s.x[0] + s.x[1]), y = 0.5f * (s.y[0] + s.y[1]);
-        rim_look(t, b, slot, x, y, m, &v);
+        rim_look(t, b, slot, x, y, true, m, &v);
         m = m & v.rim.m & m_ge(x, f_set(all->x)) & m_lt(x, f_set(all->x + all->width)) & m_ge(y, f_set(all->y)) &
             m_lt(y, f_set(all->y + all->height));
         t->job->rays += m_count(m);
