@@ -186,8 +186,8 @@ static void spots_come_back(void **state) {
                   "<film type=\"hdrfilm\"><integer name=\"width\" value=\"24\"/><integer name=\"height\" value=\"24\"/></film>"
                   "</sensor><shape type=\"rectangle\"/><emitter type=\"spot\" id=\"spot\">"
                   "<float name=\"cutoff_angle\" value=\"25\"/>"
-                  "<transform name=\"to_world\"><lookat origin=\"0, 0, 2\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform></emitter>"
-                  "</scene>");
+                  "<transform name=\"to_world\"><lookat origin=\"0, 0, 2\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
+                  "</emitter></scene>");
     assert_int_equal(fclose(file), 0);
     rey_scene *scene = load(f, path, 0);
     assert_int_equal(rey_param_set(scene, rey_param_find(scene, "spot.cutoff_angle.value"), &wider, 1), REY_OK);
