@@ -26,11 +26,7 @@ KFN Exchange exchange_onward(const SurfaceSweep *s) {
 // The vertices of a batch; s->call points into s.
 static void landing_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, SurfaceSweep *s) {
     surface_load(t, batch, slot, suffix, s);
-    s->call.uv.hit = &s->hit;
-    if (t->scene->bsdfs[s->group->bsdf].surface) {
-        find_surface(t->scene, s->group, &s->hit, &s->surface, &s->dp_dv);
-        s->call.surface = &s->surface;
-    }
+    surface_parameterise(t, s);
 }
 
 // A particle is looked at from the sensor and from where it goes on.

@@ -4,17 +4,21 @@
 
 enum { VALUES = 4 * 4 * 3 };
 
-static Room rim_open(const char *kind, const char *facets, const char *z, const char *light, const char *integrator,
-                     int lanes) {
-    const rey_define defines[] = {{"kind", kind}, {"facets", facets}, {"z", z}, {"light", light}, {"integrator", integrator}};
+static Room rim_load(const char *path, const rey_define *defines, int count, int lanes) {
     rey_context_def def = rey_default_context_def();
     Room room;
     def.lanes = lanes;
     assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    if (rey_scene_load(room.ctx, RENDER_DIR "/rim.xml", defines, COUNT_OF(defines), &room.scene) != REY_OK) {
+    if (rey_scene_load(room.ctx, path, defines, count, &room.scene) != REY_OK) {
         fail_msg("%s", rey_error(room.ctx));
     }
     return room;
+}
+
+static Room rim_open(const char *kind, const char *facets, const char *z, const char *light, const char *integrator,
+                     int lanes) {
+    const rey_define defines[] = {{"kind", kind}, {"facets", facets}, {"z", z}, {"light", light}, {"integrator", integrator}};
+    return rim_load(RENDER_DIR "/rim.xml", defines, COUNT_OF(defines), lanes);
 }
 
 static void rim_close(Room room) {
@@ -118,14 +122,7 @@ static const SharpView veiled_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "4", "ch
 static Room sharp_open(const char *kind, const char *light, const SharpView *view, int lanes) {
     const rey_define defines[] = {{"kind", kind}, {"light", light}, {"eye", view->eye}, {"target", view->target},
                                   {"depth", view->depth}, {"back", view->back}, {"front", view->front}};
-    rey_context_def def = rey_default_context_def();
-    Room room;
-    def.lanes = lanes;
-    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    if (rey_scene_load(room.ctx, RENDER_DIR "/rim_sharp.xml", defines, COUNT_OF(defines), &room.scene) != REY_OK) {
-        fail_msg("%s", rey_error(room.ctx));
-    }
-    return room;
+    return rim_load(RENDER_DIR "/rim_sharp.xml", defines, COUNT_OF(defines), lanes);
 }
 
 // There no sampled direction finds the rim: it lies along curves that the sensor sees, itself or in a mirror, and particles
@@ -165,8 +162,7 @@ static double derivative_of(Room room, const char *name, int spp) {
     int param = rey_param_find(room.scene, name);
     def.spp = spp;
     assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, &one, derivative, NULL, NULL), REY_OK);
-    rey_scene_destroy(room.scene);
-    rey_context_destroy(room.ctx);
+    rim_close(room);
     return mean_of(derivative);
 }
 

@@ -235,23 +235,33 @@ static int32_t strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
     return kept_count;
 }
 
+// Numbers the slots i... of a batch of those that are kept.
+static void strips_number(Tracer *t, int64_t first, const int32_t *kept, int32_t i, int32_t count) {
+    for (int32_t k = i; k < i + LANES; k++) {
+        slot_number(t, k, first + kept[k < count ? k : i]);
+    }
+}
+
+// Lanes whose place on the film counts.
+KFN Mask strips_inside(const Strips *all, Float x, Float y) {
+    return m_ge(x, f_set(all->x)) & m_lt(x, f_set(all->x + all->width)) & m_ge(y, f_set(all->y)) &
+           m_lt(y, f_set(all->y + all->height));
+}
+
 // Finds the curves of those strips: leaves in q their ends (o, d) and what they are worth (behind).
 static void curves_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, const int32_t *kept, int32_t count,
                         Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
         Mask m = m_first_n(count - i);
-        for (int32_t k = i; k < i + LANES; k++) {
-            slot_number(t, k, first + kept[k < count ? k : i]);
-        }
+        strips_number(t, first, kept, i, count);
         Int slot = i_iota() + i;
         SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
         Strip s = strip_sample(all, &own);
         m = m & mi_lt(i_set(0), strip_narrow(t, b, &key, sightline_lens(t, &own), all->end, &s, m));
         Curve c;
         curve_find(t, b, slot, &s, m, &c);
-        c.m = c.m & m & m_ge(c.x, f_set(all->x)) & m_lt(c.x, f_set(all->x + all->width)) & m_ge(c.y, f_set(all->y)) &
-              m_lt(c.y, f_set(all->y + all->height));
+        c.m = c.m & m & strips_inside(all, c.x, c.y);
         Float weight = m_any(c.m) ? curve_again(t, b, all, slot, &c) * f_set(1 / all->density) : f_set(0);
         c.m = c.m & m_gt(weight, f_set(0));
         f_compress(q->ox + q->count, s.x[0], c.m);

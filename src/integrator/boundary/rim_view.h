@@ -212,9 +212,7 @@ static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
                            Segments *q) {
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
-        for (int32_t k = i; k < i + LANES; k++) {
-            slot_number(t, k, first + kept[k < count ? k : i]);
-        }
+        strips_number(t, first, kept, i, count);
         Int slot = i_iota() + i;
         SampleKey own = slot_key(t, slot);
         Strip s = strip_sample(all, &own);
@@ -226,8 +224,7 @@ static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         Vec2 lens = sightline_lens(t, &own);
         Float x = 0.5f * (s.x[0] + s.x[1]), y = 0.5f * (s.y[0] + s.y[1]);
         rim_look(t, b, slot, x, y, true, m, &v);
-        m = m & v.rim.m & m_ge(x, f_set(all->x)) & m_lt(x, f_set(all->x + all->width)) & m_ge(y, f_set(all->y)) &
-            m_lt(y, f_set(all->y + all->height));
+        m = m & v.rim.m & strips_inside(all, x, y);
         t->job->rays += m_count(m);
         m = m & m_gt(spec_max(trace_transmittance(t->scene, &v.shadow, m)), f_set(0));
         if (!m_any(m)) {
