@@ -168,7 +168,7 @@ class Runner:
         self.kills, self.seconds = collections.Counter(), {}
         self.keep = tree / "kept"
         self.keep.mkdir(exist_ok=True)
-        rows = re.findall(r'\{"(\w+\.xml)", "([\w.]+)", (?:SHIFT|TURN|GROW|ADD|SHEAR)', (tree / "tests/render/test_boundary.c").read_text())
+        rows = re.findall(r'\{"(\w+\.xml)", "([\w.]+)", (?:SHIFT|TURN|GROW|ADD|SHEAR)', (tree / "tests/render/motions.h").read_text())
         self.rows = list(dict.fromkeys(rows))
 
     def commands(self, name):
