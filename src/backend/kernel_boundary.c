@@ -70,7 +70,7 @@ static void run_rim_view(Tracer *t, const BoundaryJob *b, const FilterTable *fil
         int32_t count = rim_strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept);
         rim_views_find(t, b, &strips, b->first + at, kept, count, q);
         pairs_adjoint(t, b, filter, q->count);
-        rim_views_finish(t, b, q, sink);
+        rim_views_finish(t, b, b->first + at, q, sink);
         pairs_splat(t, b, q->count);
     }
 }
@@ -104,6 +104,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
     bool turns = boundary_is_terminator(b->kind) || boundary_is_horizon(b->kind);
     bool segments = turns || b->kind == BOUNDARY_INDIRECT || boundary_is_paired(b->kind);
+    segments |= boundary_is_rim(b->kind) && (b->job.any_motion || b->job.any_places);
     Indirect in = {.t = &t, .b = b, .upstream = (b->chains || b->job.rides) && segments};
     bytes += segments_layout(&in.q, (char *)job.workspace + bytes);
     int32_t *kept = (int32_t *)((char *)job.workspace + bytes), *begin = kept + CHUNK + 2 * LANES;

@@ -259,7 +259,8 @@ static rey_result name_rims(Builder *b) {
         const EmitterRecord *e = p->emitter >= 0 ? scene->view.emitters + p->emitter : NULL;
         const bool light = e && rey_emitter_kinds[e->kind].form == EMITTER_IS_DELTA;
         // What turns mirrored and refracted rays moves what they see.
-        p->moves_rims = light || (!e && (p->terms & REY_TERM_SPECULAR)) || moves_ends(scene, p, &ending);
+        const bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || (!e && (p->terms & REY_TERM_SPECULAR));
+        p->moves_rims = light || (points && p->terms != REY_TERM_INTERIOR) || moves_ends(scene, p, &ending);
         p->why = p->moves_rims && !p->why ? "it moves where rough refraction ends, and with it the light of points and of single "
                                             "directions" : p->why;
         p->terms |= p->moves_rims && p->terms ? REY_TERM_PRIMARY | REY_TERM_INDIRECT : 0;

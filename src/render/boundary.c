@@ -39,6 +39,7 @@ int rey_boundary_term(int32_t kind) {
     case BOUNDARY_MIRRORED:
     case BOUNDARY_CHAINED_TERMINATOR:
     case BOUNDARY_CHAINED_HORIZON:
+    case BOUNDARY_CHAINED_RIM:
         return REY_TERM_SPECULAR;
     default:
         return REY_TERM_INDIRECT;
@@ -236,7 +237,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_CHAINED] = 1, [BOUNDARY_MIRRORED] = 1, [BOUNDARY_CUT] = 1,
                                                   [BOUNDARY_LINES] = 1, [BOUNDARY_RIDING] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
                                                   [BOUNDARY_CHAINED_HORIZON] = 4, [BOUNDARY_RIDING_TERMINATOR] = 4,
-                                                  [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1};
+                                                  [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1,
+                                                  [BOUNDARY_CHAINED_RIM] = 1};
     int32_t asked = rey_boundary_term(kind) == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -281,8 +283,10 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     }
     const int32_t depth = r->scene->view.max_depth;
     if (boundary_is_rim(kind)) { // `direct` without emitter_samples meets no such lights
-        edge_count = depth < 0 || depth > 2 || kind == BOUNDARY_RIM_VIEW;
-        edge_count = r->scene->view.split && r->scene->view.light_samples == 0 ? 0 : edge_count;
+        bool lit = !r->scene->view.split || r->scene->view.light_samples > 0, deep = depth < 0 || depth > 2;
+        bool chained = kind == BOUNDARY_CHAINED_RIM, moves = r->job.any_motion || r->job.any_places;
+        edge_count = lit && (deep || kind == BOUNDARY_RIM_VIEW) && !r->scene->view.has_media;
+        edge_count = chained && !(moves && has_chains(&r->scene->view)) ? 0 : edge_count;
     }
     if (kind != BOUNDARY_PRIMARY && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
         edge_count = 0;

@@ -7,10 +7,7 @@
 
 // What keeps the samplers of rims in the light of points and of single directions from all of what a parameter moves, null where
 // nothing does (integrator/boundary/rim_light.h, rim_view.h).
-static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord *sensor, const Param *p) {
-    if (p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || (p->terms & REY_TERM_SPECULAR)) {
-        return "in the light of a point or of one direction only what the glass's own indices and normals move of that is known";
-    }
+static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord *sensor) {
     if (view->has_media || view->through) {
         return "in the light of a point or of one direction the integrators for media do not find that. 'path' does";
     }
@@ -31,7 +28,7 @@ static const char *unsampled(const rey_scene *scene, const SensorRecord *sensor,
     if (rey_traces_particles(scene)) {
         return "light tracing does not find that. The integrator 'path' does";
     }
-    return p->moves_rims ? gap_of_sharp_light(&scene->view, sensor, p) : NULL;
+    return p->moves_rims ? gap_of_sharp_light(&scene->view, sensor) : NULL;
 }
 
 bool rey_rims_move(const rey_scene *scene, rey_selection selection) {

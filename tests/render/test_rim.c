@@ -4,6 +4,8 @@
 
 enum { VALUES = 4 * 4 * 3 };
 
+static const float one[1] = {1};
+
 static Room rim_load(const char *path, const rey_define *defines, int count, int lanes) {
     rey_context_def def = rey_default_context_def();
     Room room;
@@ -91,14 +93,13 @@ static void check_sky(const char *kind, const char *z, const char *name, const f
 }
 
 static void test_index(void **state) {
-    const float one = 1;
     (void)state;
-    check_sky("glass", "0.7", "glass.eta.value", &one, 1, 0.04, 1 << 16);
-    check_sky("glass", "-0.7", "glass.eta.value", &one, 1, 0.2, 1 << 17);
-    check_sky("coat", "0.7", "coat.eta.value", &one, 1, 0.12, 1 << 16);
-    check_sky("coat", "-0.7", "coat.eta.value", &one, 1, 0.24, 1 << 16);
-    check_sky("blend", "-0.7", "glass.eta.value", &one, 1, 0.2, 1 << 18);
-    check(rim_open("coat", "ggx", "0.7", "constant", "direct", 0), "direct", "coat.eta.value", &one, 1, 0.12, 1 << 17);
+    check_sky("glass", "0.7", "glass.eta.value", one, 1, 0.04, 1 << 16);
+    check_sky("glass", "-0.7", "glass.eta.value", one, 1, 0.2, 1 << 17);
+    check_sky("coat", "0.7", "coat.eta.value", one, 1, 0.12, 1 << 16);
+    check_sky("coat", "-0.7", "coat.eta.value", one, 1, 0.24, 1 << 16);
+    check_sky("blend", "-0.7", "glass.eta.value", one, 1, 0.2, 1 << 18);
+    check(rim_open("coat", "ggx", "0.7", "constant", "direct", 0), "direct", "coat.eta.value", one, 1, 0.12, 1 << 17);
 }
 
 // The pane turns about the x axis.
@@ -110,58 +111,86 @@ static void test_turn(void **state) {
 
 // What is seen in the light of a point or of one direction (rim_sharp.xml).
 typedef struct SharpView {
-    const char *eye, *target, *depth, *back, *front;
+    const char *eye, *target, *depth, *back, *front, *away;
 } SharpView;
 
-static const SharpView of_pane = {"0.3, -1, -0.3", "0, 0, 0", "2", "chalk", "nothing"};
-static const SharpView in_mirror = {"0.4, 1.54, -0.65", "0.4, 2, -0.45", "3", "mirror", "nothing"};
-static const SharpView of_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "3", "chalk", "nothing"};
-static const SharpView veiled_pane = {"0.3, -1, -0.3", "0, 0, 0", "3", "chalk", "veil"};
-static const SharpView veiled_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "4", "chalk", "veil"};
+static const SharpView of_pane = {"0.3, -1, -0.3", "0, 0, 0", "2", "chalk", "nothing", "2"};
+static const SharpView in_mirror = {"0.4, 1.54, -0.65", "0.4, 2, -0.45", "3", "mirror", "nothing", "2"};
+static const SharpView of_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "3", "chalk", "nothing", "2"};
+static const SharpView veiled_pane = {"0.3, -1, -0.3", "0, 0, 0", "3", "chalk", "veil", "2"};
+static const SharpView veiled_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "4", "chalk", "veil", "2"};
+
+static const SharpView of_plain_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "3", "chalk", "nothing", "3.3"};
+static const SharpView beside_mirror = {"0.3, 0.5, -0.3", "0.3, 0.9, -0.7", "4", "mirror", "nothing", "2"};
 
 static Room sharp_open(const char *kind, const char *light, const SharpView *view, int lanes) {
     const rey_define defines[] = {{"kind", kind}, {"light", light}, {"eye", view->eye}, {"target", view->target},
-                                  {"depth", view->depth}, {"back", view->back}, {"front", view->front}};
+                                  {"depth", view->depth}, {"back", view->back}, {"front", view->front},
+                                  {"away", view->away}};
     return rim_load(RENDER_DIR "/rim_sharp.xml", defines, COUNT_OF(defines), lanes);
 }
 
-// There no sampled direction finds the rim: it lies along curves that the sensor sees, itself or in a mirror, and particles
-// carry it from where others see it.
-static void test_sharp(void **state) {
-    static const float one[1] = {1}, turn[3] = {0, 0.5f, 0}, tilt[12] = {0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
-    static const struct {
-        const char *kind, *light, *param;
-        const SharpView *view;
-        const float *tangent;
-        int count;
-        int spp;
-    } rows[] = {{"glass", "lamp", "glass.eta.value", &of_pane, one, 1, 1 << 15},
-                {"coat", "lamp", "coat.eta.value", &of_pane, one, 1, 1 << 15},
-                {"blend", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
-                {"turned", "lamp", "glass.eta.value", &of_pane, one, 1, 1 << 15},
-                {"turned", "lamp", "turned.normalmap.value", &of_pane, turn, 3, 1 << 15},
-                {"glass", "lamp", "pane.normals", &of_pane, tilt, 12, 1 << 15},
-                {"glass", "sun", "pane.normals", &of_floor, tilt, 12, 1 << 15},
-                {"glass", "lamp", "glass.eta.value", &in_mirror, one, 1, 1 << 16},
-                {"coat", "sun", "coat.eta.value", &of_floor, one, 1, 1 << 15},
-                {"holes", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
-                {"silvered", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
-                {"glass", "sun", "glass.eta.value", &veiled_pane, one, 1, 1 << 16},
-                {"coat", "sun", "coat.eta.value", &veiled_floor, one, 1, 1 << 15}};
-    (void)state;
-    for (size_t i = 0; i < COUNT_OF(rows); i++) {
+typedef struct SharpRow {
+    const char *kind, *light, *param;
+    const SharpView *view;
+    const float *tangent;
+    int count, spp;
+} SharpRow;
+
+static void check_rows(const SharpRow *rows, size_t count) {
+    for (size_t i = 0; i < count; i++) {
         Room room = sharp_open(rows[i].kind, rows[i].light, rows[i].view, 0);
         check(room, rows[i].kind, rows[i].param, rows[i].tangent, rows[i].count, 0, rows[i].spp);
     }
 }
 
+static const float tilt[12] = {0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
+
+// There no sampled direction finds the rim: it lies along curves that the sensor sees, itself or in a mirror, and particles
+// carry it from where others see it.
+static void test_sharp(void **state) {
+    static const float turn[3] = {0, 0.5f, 0};
+    static const SharpRow rows[] = {{"glass", "lamp", "glass.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"coat", "lamp", "coat.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"blend", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"turned", "lamp", "glass.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"turned", "lamp", "turned.normalmap.value", &of_pane, turn, 3, 1 << 15},
+                                    {"glass", "lamp", "pane.normals", &of_pane, tilt, 12, 1 << 15},
+                                    {"glass", "sun", "pane.normals", &of_plain_floor, tilt, 12, 1 << 15},
+                                    {"glass", "lamp", "glass.eta.value", &in_mirror, one, 1, 1 << 16},
+                                    {"coat", "sun", "coat.eta.value", &of_floor, one, 1, 1 << 15},
+                                    {"holes", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"silvered", "sun", "glass.eta.value", &of_pane, one, 1, 1 << 15},
+                                    {"glass", "sun", "glass.eta.value", &veiled_pane, one, 1, 1 << 16},
+                                    {"coat", "sun", "coat.eta.value", &veiled_floor, one, 1, 1 << 15}};
+    (void)state;
+    check_rows(rows, COUNT_OF(rows));
+}
+
+// What moves surfaces, the sensor and lights, and what turns mirrors, moves it, too.
+static void test_moves(void **state) {
+    static const float shift[12] = {0, 1, 0.3f, 0, 1, 0.3f, 0, 1, 0.3f, 0, 1, 0.3f}, place[3] = {1, 0.3f, 0.5f};
+    static const float nod[12] = {0, 0, 0.3f, 0, 0, 0.3f, 0, 0, 0.3f, 0, 0, 0.3f};
+    static const float along[16] = {[3] = 1, [7] = 0.5f}, up[16] = {[11] = 1}, swing[16] = {[2] = 0.3f, [6] = 0.5f, [10] = -0.5f};
+    static const SharpRow rows[] = {{"glass", "lamp", "pane.positions", &of_pane, shift, 12, 1 << 15},
+                                    {"coat", "lamp", "sensor_0.to_world", &of_pane, along, 16, 1 << 15},
+                                    {"glass", "lamp", "light.position", &of_pane, place, 3, 1 << 15},
+                                    {"glass", "sun", "light.to_world", &of_plain_floor, swing, 16, 1 << 15},
+                                    {"glass", "sun", "floor.to_world", &of_plain_floor, up, 16, 1 << 15},
+                                    {"coat", "sun", "sensor_0.to_world", &of_plain_floor, along, 16, 1 << 15},
+                                    {"glass", "lamp", "back.normals", &in_mirror, nod, 12, 1 << 14},
+                                    {"glass", "sun", "back.positions", &in_mirror, shift, 12, 1 << 15},
+                                    {"glass", "lamp", "back.normals", &beside_mirror, nod, 12, 1 << 16}};
+    (void)state;
+    check_rows(rows, COUNT_OF(rows));
+}
+
 static double derivative_of(Room room, const char *name, int spp) {
-    const float one = 1;
     rey_render_def def = rey_default_render_def();
     float derivative[VALUES];
     int param = rey_param_find(room.scene, name);
     def.spp = spp;
-    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, &one, derivative, NULL, NULL), REY_OK);
+    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, one, derivative, NULL, NULL), REY_OK);
     rim_close(room);
     return mean_of(derivative);
 }
@@ -205,8 +234,10 @@ static void test_refused(void **state) {
         const char *kind, *facets, *light, *integrator, *param, *expected;
     } rows[] = {{"glass", "ggx", "directional", "path", "glass.eta.value", NULL},
                 {"coat", "ggx", "directional", "direct", "coat.eta.value", NULL},
-                {"blend", "ggx", "directional", "path", "pane.to_world", "own indices and normals"},
-                {"glass", "ggx", "directional", "path", "emitter_0.to_world", "own indices and normals"},
+                {"blend", "ggx", "directional", "path", "pane.to_world", NULL},
+                {"glass", "ggx", "directional", "path", "emitter_0.to_world", NULL},
+                {"glass", "ggx", "directional", "volpath", "pane.to_world", "integrators for media"},
+                {"glass", "ggx", "constant", "ptracer", "pane.to_world", "light tracing"},
                 {"glass", "ggx", "directional", "volpath", "glass.eta.value", "integrators for media"},
                 {"glass", "ggx", "constant", "ptracer", "glass.eta.value", "light tracing"},
                 {"glass", "ggx", "directional", "path", "glass.alpha_u.value", NULL},
@@ -228,7 +259,8 @@ static void test_refused(void **state) {
 
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_index), cmocka_unit_test(test_turn), cmocka_unit_test(test_sharp),
-                                       cmocka_unit_test(test_widths), cmocka_unit_test(test_refused)};
+                                       cmocka_unit_test(test_moves), cmocka_unit_test(test_widths),
+                                       cmocka_unit_test(test_refused)};
     if (argc > 1) {
         cmocka_set_test_filter(argv[1]);
     }

@@ -11,7 +11,8 @@
 // at which maps cut light off (turning.h); lines of textures that move over their surfaces (lines.h); and edges as collisions see
 // them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains, RIDING_TERMINATOR and
 // RIDING_HORIZON those that collisions see or light. RIM and RIM_VIEW are the ends of rough refraction in the light of a point or
-// of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h).
+// of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h); CHAINED_RIM, those of segments that
+// keep their directions.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -29,6 +30,7 @@ enum {
     BOUNDARY_RIDING_HORIZON,
     BOUNDARY_RIM,
     BOUNDARY_RIM_VIEW,
+    BOUNDARY_CHAINED_RIM,
     BOUNDARY_KINDS
 };
 
@@ -68,11 +70,13 @@ static inline bool boundary_is_riding(int32_t kind) {
 }
 static inline bool boundary_is_chained(int32_t kind) {
     return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON ||
-           boundary_is_riding(kind);
+           kind == BOUNDARY_CHAINED_RIM || boundary_is_riding(kind);
 }
 static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
 
-static inline bool boundary_is_rim(int32_t kind) { return kind == BOUNDARY_RIM || kind == BOUNDARY_RIM_VIEW; }
+static inline bool boundary_is_rim(int32_t kind) {
+    return kind == BOUNDARY_RIM || kind == BOUNDARY_RIM_VIEW || kind == BOUNDARY_CHAINED_RIM;
+}
 
 // Samples of one number of a `pixel` of their random numbers.
 enum { BOUNDARY_PER_SET = 1 << 24 };

@@ -143,6 +143,11 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     const Segments *q = &in->q;
     Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
     Int other = slot + far_half(q);
+    if (boundary_is_rim(in->b->kind)) { // which has a segment more
+        bool ends = in->t->scene->max_depth >= 0 && bounce + 3 > in->t->scene->max_depth;
+        Mask full = mi_eq(i_gather(q->full, slot), i_set(1)) | m_set(in->b->kind == BOUNDARY_RIM);
+        return spec_zero_unless(full & m_set(!ends), l);
+    }
     if (boundary_is_chained(in->b->kind)) {
         return far_jump(in, slot, bounce);
     }
@@ -150,8 +155,6 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
         reflected = spec_sub(reflected, far_chain(in, slot, bounce));
     }
     switch (in->b->kind) {
-    case BOUNDARY_RIM: // which has a segment more
-        return spec_zero_unless(m_set(in->t->scene->max_depth < 0 || bounce + 3 <= in->t->scene->max_depth), l);
     case BOUNDARY_TERMINATOR:
         reflected = in->upstream ? spec_add(reflected, far_chain(in, other, bounce)) : reflected;
         return spec_sub(reflected, far_reflected(in, other, bounce));

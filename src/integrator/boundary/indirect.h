@@ -178,7 +178,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         if (t->scene->has_media) {
             near_place(t, q, k);
         }
-        if (segments_at_surface(in->b)) { // they are there
+        if (segments_at_surface(in->b) || boundary_is_rim(in->b->kind)) { // they are there, or are known to meet it
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
             hit_store(t, k, &hit);
@@ -187,7 +187,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     t->active = q->count;
     t->current = 0;
     const bool media = t->scene->has_media;
-    t->placed = segments_at_surface(in->b) || media;
+    t->placed = segments_at_surface(in->b) || boundary_is_rim(in->b->kind) || media;
     int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (media ? (int32_t)t->scene->media_count : 0);
     t->lobes = in->upstream ? q->lobe : NULL;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
@@ -240,7 +240,7 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
         chained_find(t, in->b, first, count, q);
     } else if (in->b->kind == BOUNDARY_RIDING) {
         ridings_find(t, in->b, in->pinhole, first, count, q);
-    } else if (in->b->kind == BOUNDARY_RIM) {
+    } else if (boundary_is_rim(in->b->kind)) {
         rims_find(t, in->b, first, count, q);
     } else {
         turnings_find(t, in->b, first, count, q);

@@ -11,43 +11,45 @@
 
 // Particles as they meet surfaces.
 typedef struct RimLight {
-    Vec3 d;
-    Hit hit;
+    RimVertex x;
     Spec flux; // over the density
     Mask m;
 } RimLight;
 
 static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
     const SceneView *scene = t->scene;
-    Int light;
     Float choice;
     Vec2 at = rng_2d(key, DIMENSION_EDGE_SEGMENT), way = rng_2d(key, DIMENSION_SEGMENT_END);
-    RimLight r = {.d = v3(f_set(0), f_set(0), f_set(1)), .flux = spec_zero()};
-    Vec3 o = v3_zero();
-    m = m & rim_light(scene, key, &light, &choice);
+    RimLight r = {.flux = spec_zero()};
+    Vec3 o = v3_zero(), d = v3(f_set(0), f_set(0), f_set(1));
+    m = m & rim_light(scene, key, &r.x.light, &choice);
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
-        int32_t id = i_lane(light, m_first(left));
-        mine = left & mi_eq(light, i_set(id));
+        int32_t id = i_lane(r.x.light, m_first(left));
+        mine = left & mi_eq(r.x.light, i_set(id));
         ParticleStart one = emitter_start(scene, scene->emitters + id, at, way);
-        Spec flux = spec_scale(starts_value(scene, light, mine, one.uv, one.prim), one.factor * f_safe_rcp(choice));
+        Spec flux = spec_scale(starts_value(scene, r.x.light, mine, one.uv, one.prim), one.factor * f_safe_rcp(choice));
         o = v3_select(mine, one.o, o);
-        r.d = v3_select(mine, one.d, r.d);
+        d = v3_select(mine, one.d, d);
         r.flux = spec_select(mine & one.valid, flux, r.flux);
     }
     m = m & m_gt(spec_max(r.flux), f_set(0)) & m_finite(spec_sum(r.flux));
     t->job->rays += m_count(m);
-    r.hit = trace_closest(scene, &(Ray){o, r.d, f_set(INFINITY)}, m, false);
-    r.m = m & mi_lt(i_set(-1), r.hit.shape);
+    r.x.hit = trace_closest(scene, &(Ray){o, d, f_set(INFINITY)}, m, false);
+    r.x.light_d = v3_neg(d);
+    r.x.light_distance = v3_length(v3_sub(r.x.hit.p, o));
+    r.m = m & mi_lt(i_set(-1), r.x.hit.shape);
     return r;
 }
 
-// Lets those that meet surfaces of a group leave along the rim, and keeps them.
+// Lets those that meet surfaces of a group leave along the rim, and keeps those that meet something there.
 static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, const SampleKey *key, int32_t group, const Hit *hit,
                        Int number, Mask m, Segments *q) {
     Sink still = sink_of(job->still);
     SurfaceSweep s;
+    RimVertex x = in->x;
+    x.hit = *hit;
     rim_surface(t, group, hit, m, &s);
-    Vec3 light = v3_neg(in->d), wl = frame_to_local(&s.si.sh, light);
+    Vec3 wl = frame_to_local(&s.si.sh, x.light_d);
     BsdfSample b = bsdf_sample(&s.call, wl, rng_1d(key, DIMENSION_TURNING_SIDE), rng_2d(key, DIMENSION_RIM));
     m = m & lobe_is(b.lobe, LOBE_RIM);
     if (!m_any(m)) {
@@ -55,14 +57,17 @@ static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, co
     }
     Float pdf = bsdf_pdf(&s.call, wl, b.wo, b.lobe);
     Vec3 view = frame_to_world(&s.si.sh, b.wo);
-    Exchange x = {b.wo, wl, view, light, b.lobe, m};
+    x.d = v3_neg(view);
+    x.lobe = b.lobe;
     Rim r = rim_measure(&s, &x, &still, m & m_gt(pdf, f_set(0)));
     r.value = rim_colour(&s, &x, &still, r.m);
-    Float weight = f_abs(v3_dot(s.si.ng, view)) * f_safe_rcp(f_abs(v3_dot(s.si.ng, light)) * pdf);
+    Float weight = f_abs(v3_dot(s.si.ng, view)) * f_safe_rcp(f_abs(v3_dot(s.si.ng, x.light_d)) * pdf);
     Spec l = spec_scale(spec_mul(in->flux, r.value), weight);
     m = r.m & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
     Ray ray = {interaction_offset(&s.si, view), view, f_set(INFINITY)};
-    rim_keep(q, hit, &ray, light, &r, b.lobe, l, number, m);
+    t->job->rays += m_count(m);
+    Hit near = trace_closest(t->scene, &ray, m, false);
+    rims_keep(q, &x, &r, ray.o, &near, l, number, m & mi_lt(i_set(-1), near.shape));
 }
 
 // As segments_find.
@@ -75,7 +80,7 @@ static void rims_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t co
         for (Mask left = in.m; m_any(left);) {
             int32_t id;
             Hit h;
-            Mask mine = take_group(t->scene, &in.hit, &left, &id, &h);
+            Mask mine = take_group(t->scene, &in.x.hit, &left, &id, &h);
             if (t->job->live[id] & LIVE_SCATTERING) {
                 rims_leave(t, b, &in, &key, id, &h, i_iota() + i, mine, q);
             }

@@ -2,11 +2,20 @@
 // (bsdf/rim.h) the value, f = f_+ H(s g), jumps with a direction to the light that is given. With all of the two directions fixed,
 //   dI += integral f_+ delta(g) s g' L W
 // over the points of such surfaces and the directions to what looks at them. The adjoints of both directions, f_+ s / e and
-// -f_+ s times a normal (rim_adj), tell f_+, e and that normal of whatever functions are nested within each other.
+// -f_+ s times a normal (rim_adj), tell f_+, e and that normal of whatever functions are nested within each other. g' is that of
+// attached points, or, along chains and from a film position, of where the ray meets the surface (turning.h).
 #pragma once
 
 #include "integrator/boundary/segments.h"
-#include "integrator/exchange.h"
+#include "integrator/path_move.h"
+
+// A vertex that a ray meets, the light that shines on it, and the lobe.
+typedef struct RimVertex {
+    Hit hit;
+    Vec3 d, light_d; // of the ray; towards the light
+    Float light_distance;
+    Int light, lobe;
+} RimVertex;
 
 // A light of a point or one direction per lane, and its probability. False where the light chosen is of another sort.
 KFN Mask rim_light(const SceneView *scene, const SampleKey *key, Int *light, Float *probability) {
@@ -33,12 +42,13 @@ typedef struct Rim {
 } Rim;
 
 // The rim that a lobe belongs to, whether the directions lie on it or not, without its value.
-static NOINLINE Rim rim_measure(const SurfaceSweep *s, const Exchange *x, Sink *still, Mask m) {
+static NOINLINE Rim rim_measure(const SurfaceSweep *s, const RimVertex *x, Sink *still, Mask m) {
     Rim r = {.value = spec_zero()};
+    Vec3 view = frame_to_local(&s->si.sh, v3_neg(x->d)), light = frame_to_local(&s->si.sh, x->light_d);
     Vec3 dview = v3_zero(), dlight = v3_zero();
-    bsdf_adj(&s->call, x->view, x->light, x->lobe, spec_set(f_set(1)), still, m, &dview, &dlight, NULL);
+    bsdf_adj(&s->call, view, light, x->lobe, spec_set(f_set(1)), still, m, &dview, &dlight, NULL);
     Float viewed = v3_length(dview), sum = v3_length(dlight), e = sum * f_safe_rcp(viewed), rcp = f_safe_rcp(sum);
-    Float a = v3_dot(dlight, x->view) * rcp, b = v3_dot(dlight, x->light) * rcp;
+    Float a = v3_dot(dlight, view) * rcp, b = v3_dot(dlight, light) * rcp;
     r.scale = e * rcp;
     r.g = f_abs(a) - e * f_abs(b);
     r.m = m & m_gt(viewed, f_set(0)) & m_finite(r.scale) & m_lt(a * b, f_set(0));
@@ -46,50 +56,83 @@ static NOINLINE Rim rim_measure(const SurfaceSweep *s, const Exchange *x, Sink *
 }
 
 // Its value.
-static Spec rim_colour(const SurfaceSweep *s, const Exchange *x, Sink *still, Mask m) {
+static Spec rim_colour(const SurfaceSweep *s, const RimVertex *x, Sink *still, Mask m) {
+    Vec3 view = frame_to_local(&s->si.sh, v3_neg(x->d)), light = frame_to_local(&s->si.sh, x->light_d);
     Spec value = spec_zero();
     for (int c = 0; c < SPEC_N; c++) {
         Spec one = spec_zero();
         Vec3 dview = v3_zero(), dlight = v3_zero();
         one.c[c] = f_set(1);
-        bsdf_adj(&s->call, x->view, x->light, x->lobe, one, still, m, &dview, &dlight, NULL);
+        bsdf_adj(&s->call, view, light, x->lobe, one, still, m, &dview, &dlight, NULL);
         value.c[c] = v3_length(dlight);
     }
     return value;
 }
 
-// The derivative of s g at the vertices of segments k... by the parameters of their functions and by vertex normals, worth `worth`.
-static NOINLINE void rims_move_adj(const Tracer *t, const Segments *q, int32_t k, Float worth, Sink *sink, Mask m) {
-    Hit x = LOAD_HIT(q, k, edge);
-    Vec3 view = v3_neg(record_v3(q->dx, q->dy, q->dz, k)), light = record_v3(q->nx, q->ny, q->nz, k);
-    Spec df = spec_set(worth * f_load(q->behind + k));
+// The derivative of s g, times `worth`: adds that of the functions, the surfaces and the lights. slides: where the rays meet the
+// surfaces; else of attached points, at 1 / behind from what looks at them. Returns what that asks of the rays: of the position
+// there and of the direction, or of the position of what looks.
+static NOINLINE Carried rim_vertex_adj(const Tracer *t, const RimVertex *x, Float behind, bool slides, Float worth, Sink *sink,
+                                       Mask m) {
+    Carried all = {v3_zero(), v3_zero()};
     for (Mask left = m; m_any(left);) {
         int32_t id;
         Hit h;
         SurfaceSweep s;
-        Mask mine = take_group(t->scene, &x, &left, &id, &h);
+        VertexAdj d;
+        Mask mine = take_group(t->scene, &x->hit, &left, &id, &h);
         rim_surface(t, id, &h, mine, &s);
-        Exchange e = {frame_to_local(&s.si.sh, view), frame_to_local(&s.si.sh, light), view, light, i_load(q->rim + k), mine};
-        exchange_adj(t, &s, &e, df, sink);
+        s.d = x->d;
+        s.slides = s.chained = slides ? mine : m_set(false);
+        s.wi = frame_to_local(&s.si.sh, v3_neg(x->d));
+        vertex_adj_clear(&d, true);
+        s.call.dsurface = s.call.surface ? &d.surface : NULL;
+        Vec3 light = frame_to_local(&s.si.sh, x->light_d), dlight = v3_zero();
+        sink->at = slides ? &d.at : NULL;
+        sink->point = &d.point;
+        bsdf_adj(&s.call, s.wi, light, x->lobe, spec_zero_unless(mine, spec_set(worth)), sink, mine, &d.wi, &dlight,
+                 vertex_uv_adj(&s, &d, sink));
+        sink->at = NULL;
+        sink->point = NULL;
+        LightMove move = light_move_zero();
+        frame_to_local_adj(&s.si.sh, x->light_d, dlight, &d.frame, &move.d);
+        lights_move_adj(t->scene, x->light, mine, h.p, x->light_d, x->light_distance, &move, sink);
+        Vec3 dp = v3_select(mine, move.ref, v3_zero()), turn = frame_to_world(&s.si.sh, d.wi);
+        Vec3 apart = v3_select(mine, v3_scale(v3_madd(turn, -v3_dot(turn, x->d), x->d), behind), v3_zero());
+        Carried own = {slides ? v3_zero() : apart, v3_zero()};
+        dp = slides ? dp : v3_sub(dp, apart);
+        vertex_place_adj(t, &s, &d, dp, s.slides, t->job->live[id], &own, sink);
+        all.drag = v3_select(mine, own.drag, all.drag);
+        all.turn = v3_select(mine, own.turn, all.turn);
     }
+    return all;
 }
 
-// Keeps vertices of m, which something looks at along the ray out of the surface, and what of the light goes there.
-static void rim_keep(Segments *q, const Hit *x, const Ray *ray, Vec3 light, const Rim *r, Int lobe, Spec l, Int number, Mask m) {
+// Of the segments k....
+static Carried rims_ahead_adj(const Tracer *t, const Segments *q, int32_t k, bool slides, Float worth, Sink *sink, Mask m) {
+    RimVertex x = {LOAD_HIT(q, k, edge), record_v3(q->dx, q->dy, q->dz, k), record_v3(q->nx, q->ny, q->nz, k), f_load(q->mx + k),
+                   i_load(q->source + k), i_load(q->rim + k)};
+    return rim_vertex_adj(t, &x, f_load(q->behind + k), slides, worth * f_load(q->along + k), sink, m);
+}
+
+// Keeps vertices of m, at which something looks along the rays, and what of the light goes there. near: what looks.
+static void rims_keep(Segments *q, const RimVertex *x, const Rim *r, Vec3 o, const Hit *near, Spec l, Int number, Mask m) {
     int32_t at = q->count;
-    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray->o, m);
-    v3_compress(q->dx + at, q->dy + at, q->dz + at, v3_neg(ray->d), m);
-    v3_compress(q->nx + at, q->ny + at, q->nz + at, light, m);
-    f_compress(q->behind + at, r->scale, m);
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, x->d, m);
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, x->light_d, m);
+    f_compress(q->mx + at, x->light_distance, m);
+    f_compress(q->behind + at, f_safe_rcp(v3_length(v3_sub(near->p, x->hit.p))), m);
+    f_compress(q->along + at, r->scale, m);
     f_compress(q->seen + at, f_set(0), m);
     f_compress(q->unseen + at, f_set(0), m);
     spec_compress(q->light, at, l, m);
     i_compress(q->lit + at, i_set(1), m);
-    i_compress(q->rim + at, lobe, m);
-    i_compress(q->source + at, i_set(-1), m);
+    i_compress(q->rim + at, x->lobe, m);
+    i_compress(q->source + at, x->light, m);
     i_compress(q->number + at, number, m);
-    KEEP_HIT(q, at, near, x, x->p, m);
-    KEEP_HIT(q, at, edge, x, x->p, m);
-    KEEP_HIT(q, at, far, x, x->p, m);
+    KEEP_HIT(q, at, near, near, near->p, m);
+    KEEP_HIT(q, at, edge, &x->hit, x->hit.p, m);
+    KEEP_HIT(q, at, far, &x->hit, x->hit.p, m);
     q->count += m_count(m);
 }

@@ -11,12 +11,9 @@
 typedef struct RimView {
     Sightline line;
     Int level;   // of its vertices; any, because what reflects or passes may scatter, too
-    Hit hit;
-    Vec3 d;
-    Int light, lobe;
-    Vec3 light_d;
-    Float light_distance, probability; // of the light and of the lobe
-    Spec arrives, through;             // of the light; of the line
+    RimVertex x;
+    Float probability;     // of the light and of the lobe
+    Spec arrives, through; // of the light; of the line
     Ray shadow;
     Rim rim;
 } RimView;
@@ -28,25 +25,26 @@ static void rim_view_group(Tracer *t, const BoundaryJob *b, int32_t group, const
     SurfaceSweep s;
     const Vec2 anywhere = {f_set(0), f_set(0)};
     rim_surface(t, group, hit, m, &s);
-    Vec3 view = v3_neg(v->d), wi = frame_to_local(&s.si.sh, view);
+    Vec3 wi = frame_to_local(&s.si.sh, v3_neg(v->x.d));
     BsdfSample sample = bsdf_sample(&s.call, wi, u, anywhere);
     m = m & lobe_is(sample.lobe, LOBE_RIM);
     if (!m_any(m)) {
         return;
     }
     Float pdf = bsdf_pdf(&s.call, wi, sample.wo, sample.lobe) * TWO_PI;
-    Exchange x = {wi, frame_to_local(&s.si.sh, v->light_d), view, v->light_d, sample.lobe, m};
+    RimVertex x = v->x;
+    x.lobe = sample.lobe;
     Rim r = rim_measure(&s, &x, &still, m & m_gt(pdf, f_set(0)));
     if (whole) {
         Ray shadow;
-        shadow_ray(&s.si, v->light_d, v->light_distance, &shadow);
+        shadow_ray(&s.si, v->x.light_d, v->x.light_distance, &shadow);
         v->shadow.o = v3_select(m, shadow.o, v->shadow.o);
         v->shadow.d = v3_select(m, shadow.d, v->shadow.d);
         v->shadow.tmax = f_select(m, shadow.tmax, v->shadow.tmax);
         v->rim.value = spec_select(m, rim_colour(&s, &x, &still, r.m), v->rim.value);
     }
     v->probability = f_select(m, v->probability * pdf, v->probability);
-    v->lobe = i_select(m, sample.lobe, v->lobe);
+    v->x.lobe = i_select(m, sample.lobe, v->x.lobe);
     v->rim.scale = f_select(m, r.scale, v->rim.scale);
     v->rim.g = f_select(m, r.g, v->rim.g);
     v->rim.m = v->rim.m | (r.m & m_ne(r.g, f_set(0)));
@@ -59,10 +57,10 @@ static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x
     const Vec2 zero = {f_set(0), f_set(0)};
     Ends end;
     v->rim = (Rim){spec_zero(), f_set(0), f_set(0), m_set(false)};
-    v->lobe = i_set(LOBE_SMOOTH);
+    v->x.lobe = i_set(LOBE_SMOOTH);
     v->level = i_set(0);
     v->shadow = (Ray){v3_zero(), v3(f_set(0), f_set(0), f_set(1)), f_set(0)};
-    m = m & rim_light(scene, &own, &v->light, &v->probability);
+    m = m & rim_light(scene, &own, &v->x.light, &v->probability);
     sightline_trace(t, &key, sightline_lens(t, &own), x, y, m, &v->line);
     if (!m_any(m)) {
         return;
@@ -72,22 +70,22 @@ static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x
     v->level = i_min(i_from_f(rng_1d(&own, DIMENSION_SEGMENT_END) * levels), v->line.turns);
     v->probability = v->probability / levels;
     ends_load(&v->line, v->level, 0, &end);
-    v->hit = end.hit[0];
-    v->d = end.d[0];
+    v->x.hit = end.hit[0];
+    v->x.d = end.d[0];
     v->through = v->line.through[0];
     for (int32_t i = 1; i < v->line.last; i++) {
         v->through = spec_select(mi_eq(v->level, i_set(i)), v->line.through[i], v->through);
     }
-    m = m & mi_lt(i_set(-1), v->hit.shape) & (m_set(depth < 0) | mi_lt(v->level + 1, i_set(depth)));
-    LightSample l = lights_sample(scene, v->light, m, v->hit.p, zero, &v->arrives);
-    v->light_d = l.d;
-    v->light_distance = l.distance;
+    m = m & mi_lt(i_set(-1), v->x.hit.shape) & (m_set(depth < 0) | mi_lt(v->level + 1, i_set(depth)));
+    LightSample l = lights_sample(scene, v->x.light, m, v->x.hit.p, zero, &v->arrives);
+    v->x.light_d = l.d;
+    v->x.light_distance = l.distance;
     m = m & l.valid & m_gt(spec_max(v->arrives), f_set(0));
     Float u = rng_1d(&own, DIMENSION_TURNING_SIDE);
     for (Mask left = m; m_any(left);) {
         int32_t id;
         Hit h;
-        Mask mine = take_group(scene, &v->hit, &left, &id, &h);
+        Mask mine = take_group(scene, &v->x.hit, &left, &id, &h);
         if (t->job->live[id] & LIVE_SCATTERING) {
             rim_view_group(t, b, id, &h, u, whole, mine, v);
         }
@@ -96,8 +94,8 @@ static NOINLINE void rim_look(Tracer *t, const BoundaryJob *b, Int slot, Float x
 
 // Lanes in which g has either sign at the ends of a strip, on rims of one light.
 KFN Mask rim_between(const RimView *a, const RimView *b) {
-    return a->rim.m & b->rim.m & mi_eq(a->hit.shape, b->hit.shape) & mi_eq(a->hit.instance, b->hit.instance) &
-           mi_eq(a->lobe, b->lobe) & m_lt(a->rim.g * b->rim.g, f_set(0));
+    return a->rim.m & b->rim.m & mi_eq(a->x.hit.shape, b->x.hit.shape) & mi_eq(a->x.hit.instance, b->x.hit.instance) &
+           mi_eq(a->x.lobe, b->x.lobe) & m_lt(a->rim.g * b->rim.g, f_set(0));
 }
 
 // What halving needs of its ends.
@@ -136,43 +134,21 @@ static NOINLINE Mask rim_narrow(Tracer *t, const BoundaryJob *b, Int slot, real 
     }
     // Between two facets g jumps, and there is no rim.
     e = rim_strip(t, b, slot, s, e.m, v);
-    Mask alike = mi_eq(v[0].hit.prim, v[1].hit.prim) & mi_eq(v[0].level, v[1].level);
+    Mask alike = mi_eq(v[0].x.hit.prim, v[1].x.hit.prim) & mi_eq(v[0].level, v[1].level);
     return e.m & alike;
 }
 
-// How fast s g grows over the film there: its gradient.
+// What the derivative of s g at a film position, times `worth`, asks of the ray from the sensor.
+static Carried rim_view_adj(const Tracer *t, const RimView *v, Float worth, Sink *sink, Mask m) {
+    Carried c = rim_vertex_adj(t, &v->x, f_set(0), true, worth * v->rim.scale, sink, m);
+    return sightline_back(t, &v->line, v->level, v->x.hit.p, &c, sink, m);
+}
+
+// How fast it grows over the film there: its gradient.
 static NOINLINE Vec2 rim_slope(const Tracer *t, const BoundaryJob *b, const RimView *v, Vec2 lens, Float x, Float y, Mask m) {
     Sink still = sink_of(b->still);
-    Carried carried = {v3_zero(), v3_zero()};
     still.any_motion = true; // so that all that slides counts
-    for (Mask left = m; m_any(left);) {
-        int32_t id;
-        Hit h;
-        SurfaceSweep s;
-        VertexAdj d;
-        Mask mine = take_group(t->scene, &v->hit, &left, &id, &h);
-        rim_surface(t, id, &h, mine, &s);
-        s.d = v->d;
-        s.slides = s.chained = mine;
-        vertex_adj_clear(&d, true);
-        s.call.dsurface = s.call.surface ? &d.surface : NULL;
-        Vec3 view = frame_to_local(&s.si.sh, v3_neg(v->d)), light = frame_to_local(&s.si.sh, v->light_d), dlight = v3_zero();
-        s.wi = view;
-        still.at = &d.at;
-        still.point = &d.point;
-        Spec df = spec_zero_unless(mine, spec_set(v->rim.scale));
-        bsdf_adj(&s.call, view, light, v->lobe, df, &still, mine, &d.wi, &dlight, &d.uv);
-        still.at = NULL;
-        still.point = NULL;
-        LightMove move = light_move_zero();
-        frame_to_local_adj(&s.si.sh, v->light_d, dlight, &d.frame, &move.d);
-        lights_move_adj(t->scene, v->light, mine, h.p, v->light_d, v->light_distance, &move, &still);
-        Carried own = {v3_zero(), v3_zero()};
-        vertex_place_adj(t, &s, &d, v3_select(mine, move.ref, v3_zero()), mine, 0, &own, &still);
-        carried.drag = v3_select(mine, own.drag, carried.drag);
-        carried.turn = v3_select(mine, own.turn, carried.turn);
-    }
-    carried = sightline_back(t, &v->line, v->level, v->hit.p, &carried, &still, m);
+    Carried carried = rim_view_adj(t, v, f_set(1), &still, m);
     return film_adj(t, x, y, lens, v->line.hit[0].p, &carried);
 }
 
@@ -207,7 +183,8 @@ static int32_t rim_strips_find(Tracer *t, const BoundaryJob *b, const Strips *al
     return kept_count;
 }
 
-// Keeps the places that those strips find: where on the film, in ws, and in q what the derivative of g there is worth.
+// Keeps the places that those strips find: where on the film, in ws, and in q the strip's number and what the derivative of g there
+// is worth.
 static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, const int32_t *kept, int32_t count,
                            Segments *q) {
     q->count = 0;
@@ -241,20 +218,31 @@ static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         m = m & m_gt(weight, f_set(0)) & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
         f_compress(t->ws.film_x + q->count, x, m);
         f_compress(t->ws.film_y + q->count, y, m);
-        Ray ray = {v.hit.p, v3_neg(v.d), f_set(INFINITY)};
-        rim_keep(q, &v.hit, &ray, v.light_d, &v.rim, v.lobe, l, slot, m);
+        spec_compress(q->light, q->count, l, m);
+        i_compress(q->number + q->count, i_load(kept + i), m);
+        q->count += m_count(m);
     }
 }
 
 // Books them. Reverse: the film's adjoint lies in ws.adjoint.
-static void rim_views_finish(Tracer *t, const BoundaryJob *b, const Segments *q, Sink *sink) {
+static void rim_views_finish(Tracer *t, const BoundaryJob *b, int64_t first, const Segments *q, Sink *sink) {
     for (int32_t k = 0; k < q->count; k += LANES) {
         Mask m = m_first_n(q->count - k);
+        Int slot = i_iota() + k;
+        Float x = f_load(t->ws.film_x + k), y = f_load(t->ws.film_y + k);
+        RimView v;
+        strips_number(t, first, q->number, k, q->count);
+        SampleKey own = slot_key(t, slot);
+        rim_look(t, b, slot, x, y, false, m, &v);
         Spec l = spec_load(q->light, k);
         bool forward = b->job.mode == MODE_FORWARD;
         Float worth = forward ? f_set(1) : spec_dot(l, spec_load(t->ws.adjoint, k));
-        m = m & m_finite(worth);
-        rims_move_adj(t, q, k, worth, sink, m);
+        m = m & v.rim.m & m_finite(worth);
+        Carried carried = rim_view_adj(t, &v, f_zero_unless(m, worth), sink, m);
+        if (sink->any_camera) {
+            RayAdj ray = {v.line.hit[0].p, carried.drag, carried.turn};
+            sensor_ray_adj(t->scene, t->sensor, x, y, sightline_lens(t, &own), &ray, sink, m);
+        }
         if (forward) {
             spec_store(t->ws.radiance, k, spec_zero_unless(m, spec_scale(l, sink->derivative)));
             sink->derivative = f_set(0);

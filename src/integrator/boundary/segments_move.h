@@ -100,6 +100,9 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
     if (boundary_is_terminator(in->b->kind) || boundary_is_horizon(in->b->kind)) {
         return turnings_ahead_adj(in, k, worth, sink, m);
     }
+    if (boundary_is_rim(in->b->kind)) {
+        return rims_ahead_adj(in->t, q, k, boundary_is_chained(in->b->kind), worth, sink, m);
+    }
     Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
     if (!still) {
         segments_ahead_adj(in, k, n, worth, sink, m);
@@ -266,17 +269,17 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     }
 }
 
-// The same of rims. Where near points are has no part in it.
-static void rim_rates_adj(Indirect *in, int32_t k, Sink *sink) {
+// The same of rims.
+static void rims_move_adj(Indirect *in, int32_t k, Sink *sink) {
     const Segments *q = &in->q;
     bool forward = in->b->job.mode == MODE_FORWARD;
-    Float worth = forward ? f_set(1) : f_load(q->seen + k) + f_load(q->unseen + k);
-    rims_move_adj(in->t, q, k, worth, sink, m_first_n(q->count - k) & m_finite(worth));
-    if (forward) {
-        Float rate = sink_taken(sink);
-        f_store(q->seen + k, rate);
-        f_store(q->unseen + k, rate);
-    }
+    Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
+    Float worth = seen + unseen;
+    Mask m = m_first_n(q->count - k) & m_finite(worth) & m_ne(worth, f_set(0));
+    Hit near = LOAD_HIT(q, k, near);
+    Carried c = rims_ahead_adj(in->t, q, k, false, worth, sink, m);
+    Float some = f_select(m, worth, f_set(1));
+    segments_near_adj(in, k, &near, c.drag, seen / some, unseen / some, sink, m);
 }
 
 static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
@@ -291,7 +294,7 @@ static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
     } else if (in->b->kind == BOUNDARY_CUT) {
         cuts_move_adj(in, k, sink);
     } else if (in->b->kind == BOUNDARY_RIM) {
-        rim_rates_adj(in, k, sink);
+        rims_move_adj(in, k, sink);
     } else {
         turnings_move_adj(in, k, sink);
     }
