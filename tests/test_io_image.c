@@ -153,7 +153,7 @@ static void make_png(Bytes *b, int type, int channels, int bits, bool linear) {
 static void make_jpeg(Bytes *b, int channels) {
     struct jpeg_compress_struct jpeg;
     struct jpeg_error_mgr errors;
-    unsigned char *memory = NULL, row[W * 3];
+    unsigned char *memory = NULL, row[W * 4];
     unsigned long size = 0;
     jpeg.err = jpeg_std_error(&errors);
     jpeg_create_compress(&jpeg);
@@ -161,7 +161,7 @@ static void make_jpeg(Bytes *b, int channels) {
     jpeg.image_width = W;
     jpeg.image_height = H;
     jpeg.input_components = channels;
-    jpeg.in_color_space = channels == 3 ? JCS_RGB : JCS_GRAYSCALE;
+    jpeg.in_color_space = channels == 4 ? JCS_CMYK : channels == 3 ? JCS_RGB : JCS_GRAYSCALE;
     jpeg_set_defaults(&jpeg);
     jpeg_set_quality(&jpeg, 100, TRUE);
     jpeg_start_compress(&jpeg, TRUE);
@@ -201,7 +201,6 @@ static void make_npy(Bytes *b, const char *header, int item) {
 }
 
 /* ---- what must be read ----------------------------------------------------------------------------------------- */
-
 static Bytes file; // large: not on the stack
 
 static void test_exr_types(void **state) {
@@ -260,8 +259,8 @@ static void test_png_types(void **state) {
 static void test_jpeg_types(void **state) {
     UNUSED(state);
     rey_context *ctx = context();
+    rey_image image;
     for (int channels = 1; channels <= 3; channels += 2) {
-        rey_image image;
         make_jpeg(&file, channels);
         expect_read(ctx, &file, channels, &image);
         assert_true(image.srgb);
@@ -270,6 +269,8 @@ static void test_jpeg_types(void **state) {
         }
         rey_image_free(ctx, &image);
     }
+    make_jpeg(&file, 4);
+    expect_failure(ctx, "printed.picture", &file, file.count, "CMYK");
     rey_context_destroy(ctx);
 }
 

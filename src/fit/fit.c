@@ -287,7 +287,7 @@ static rey_result finish(Fit *fit, FitResult *out) {
         result = rey_unknowns_apply(&fit->unknowns, fit->scene, fit->unknowns.value);
     }
     rey_levels_reduce(fit, 1);
-    rey_fit_note_idle(fit);
+    rey_fit_note_ends(fit);
     if (!result) {
         result = save_scene(fit, out);
     }

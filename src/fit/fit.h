@@ -176,8 +176,8 @@ rey_result rey_fit_check_derivatives(Fit *fit);
 
 // Notes unknowns on which no fitted view depends, poses that may shear, terms that are left out, and odd targets (notes.c).
 rey_result rey_fit_notes(const Fit *fit);
-// After the last iteration: unknowns whose gradient was never anything but 0.
-void rey_fit_note_idle(const Fit *fit);
+// After the last iteration: unknowns whose gradient was never anything but 0, and those that a bound holds back.
+void rey_fit_note_ends(const Fit *fit);
 
 // Exposures (exposure.c): of a view, given the unknowns' values; a picture times it; the adjoints of the view at work pulled
 // back through that, with the gradient of an unknown exposure.

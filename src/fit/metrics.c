@@ -27,7 +27,16 @@ static size_t lines_length(const unsigned char *bytes, size_t size, int lines) {
 static rey_result truncate_metrics(Fit *fit, const char *path) {
     unsigned char *bytes;
     size_t size;
-    if (!fit->state.iteration || access(path, F_OK)) {
+    if (!fit->state.iteration) {
+        return REY_OK;
+    }
+    if (access(path, F_OK) != 0) {
+        char words[4096];
+        snprintf(words, sizeof words, "%.3900s is gone, and with it the losses of the first %d iterations: it begins anew", path,
+                 fit->state.iteration);
+        if (fit->def->note) {
+            fit->def->note(fit->def->user, words);
+        }
         return REY_OK;
     }
     rey_result result = rey_file_read(fit->ctx, path, &bytes, &size);

@@ -131,13 +131,31 @@ static void note_terms(const Fit *fit) {
     }
 }
 
-void rey_fit_note_idle(const Fit *fit) {
+// A result that a bound holds back may lie beyond it, or say that the scene lacks something.
+static void note_bounds(const Fit *fit, const Unknown *p) {
+    const float *found = fit->unknowns.value + p->offset;
+    int64_t held = 0;
+    for (int64_t i = 0; i < p->count; i++) {
+        held += found[i] <= (float)p->low || found[i] >= (float)p->high;
+    }
+    if (held > 0 && p->driven && p->count <= HISTORY_LARGEST) { // of textures' texels, some often are
+        char words[256], which[64] = "it";
+        if (p->count > 1) {
+            snprintf(which, sizeof which, "%lld of its %lld numbers", (long long)held, (long long)p->count);
+        }
+        snprintf(words, sizeof words, "%s ended at a bound of [%g, %g]", which, p->low, p->high);
+        note(fit, p, words);
+    }
+}
+
+void rey_fit_note_ends(const Fit *fit) {
     for (size_t k = 0; k < fit->unknowns.items.count && fit->def->note && fit->state.iteration > fit->first; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
         const float *start = fit->unknowns.start + p->offset, *found = fit->unknowns.value + p->offset;
         if (!p->driven && !memcmp(start, found, (size_t)p->count * sizeof *start)) {
             note(fit, p, "its gradient was 0 in every iteration, and it is where it started");
         }
+        note_bounds(fit, p);
     }
 }
 

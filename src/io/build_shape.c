@@ -234,6 +234,7 @@ static rey_result build_posed(Builder *b, rey_xml_node *node, int32_t id, const 
     shape->kind = plugin->kind;
     if (plugin->kind == SHAPE_SPHERE && rey_matrix_determinant(m) < 0) {
         shape->flags ^= SHAPE_FLIP_NORMALS;
+        shape->mirrored = 1;
     }
     // Embree reads a sphere's centre and radius from here by one load of 16 bytes, which must be aligned.
     Array *tables = &b->scene->build.tables;

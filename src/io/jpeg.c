@@ -45,6 +45,10 @@ rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char
     jpeg_create_decompress(&jpeg);
     jpeg_mem_src(&jpeg, bytes, size);
     jpeg_read_header(&jpeg, TRUE);
+    if (jpeg.num_components > 3) {
+        jpeg_destroy_decompress(&jpeg);
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the JPEG is in the colours of a printer (CMYK), expected grey or RGB", name);
+    }
     jpeg.out_color_space = jpeg.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
     jpeg_start_decompress(&jpeg);
     rey_result result = rey_image_check_claim(ctx, name, jpeg.output_width, jpeg.output_height, size);

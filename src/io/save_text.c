@@ -117,8 +117,8 @@ static void put_matrix(Writer *w, int depth, const char *name, const char *forma
 }
 
 void rey_save_matrix(Writer *w, int depth, const char *name, const float m[16]) {
-    double numbers[16];
-    for (int i = 0; i < 16; i++) {
+    double numbers[16] = {[15] = 1}; // no pose's last row has an effect, and one other than this cannot be read
+    for (int i = 0; i < 12; i++) {
         numbers[i] = (double)m[i];
     }
     put_matrix(w, depth, name, "%.9g", numbers);

@@ -35,7 +35,7 @@ bool rey_motion_known(const rey_scene *scene, const SensorRecord *sensor, const 
     if (p->geometry >= 0) {
         return numbers_move(view, p);
     }
-    return p->instance >= 0 || (p->camera >= 0 && sensor->kind != SENSOR_BATCH);
+    return p->instance >= 0 || p->camera >= 0;
 }
 
 void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char text[OBJECT_NAME]) {
@@ -43,9 +43,7 @@ void rey_motion_obstacle(const rey_scene *scene, const SensorRecord *sensor, con
     char name[OBJECT_NAME];
     if (!ray_is_free(view, sensor)) {
         snprintf(text, OBJECT_NAME, "the rays of this sensor begin or end on surfaces");
-    } else if (p->geometry < 0) {
-        snprintf(text, OBJECT_NAME, "this sensor is a batch of sensors");
-    } else {
+    } else if (p->geometry >= 0) {
         rey_name_shape(scene, p->geometry, name);
         snprintf(text, OBJECT_NAME, "the surface of '%.120s' does not follow these numbers yet", name);
     }
@@ -90,6 +88,21 @@ bool rey_moves_border(const SceneView *view, const Param *p) {
     return all;
 }
 
+int32_t rey_motion_cameras(const SensorRecord *s) {
+    return CAMERA_NUMBERS * (s->kind == SENSOR_BATCH ? s->batch_count : 1);
+}
+
+// The part of a batch whose number a parameter is, 0 of other sensors; -1: it is another sensor's.
+static int32_t camera_part(const SceneView *view, const SensorRecord *s, const Param *p) {
+    const SensorRecord *parts = s->kind == SENSOR_BATCH ? view->batch_sensors + s->batch : s;
+    for (int32_t i = 0; i < rey_motion_cameras(s) / CAMERA_NUMBERS; i++) {
+        if (rey_camera_theta(parts + i, p->camera) == p->theta) {
+            return i;
+        }
+    }
+    return -1;
+}
+
 int32_t *rey_motion_slot(Render *r, const Param *p) {
     const SceneView *view = &r->scene->view;
     PathJob *job = &r->job;
@@ -105,11 +118,12 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
         job->rides = job->any_motion && view->has_media;
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
-    if (p->camera >= 0 && rey_camera_theta(r->plan.sensor, p->camera) == p->theta) {
+    int32_t part = p->camera >= 0 ? camera_part(view, r->plan.sensor, p) : -1;
+    if (part >= 0) {
         *(rey_cameras_glide(view) ? &job->glides : &job->any_motion) = true;
         job->rides = job->any_motion && view->has_media;
         job->any_camera = true;
-        return (int32_t *)(uintptr_t)job->camera_at + p->camera;
+        return (int32_t *)(uintptr_t)job->camera_at + part * CAMERA_NUMBERS + p->camera;
     }
     return NULL;
 }

@@ -20,6 +20,9 @@ bool rey_cameras_glide(const SceneView *view);
 // Where a sensor keeps one of its numbers (CAMERA_), -1 where it has none.
 int32_t rey_camera_theta(const SensorRecord *s, int32_t number);
 
+// The numbers of a sensor's cameras, CAMERA_NUMBERS of each: several are those of a batch.
+int32_t rey_motion_cameras(const SensorRecord *s);
+
 // Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
 int32_t *rey_motion_slot(Render *r, const Param *p);
 

@@ -1,17 +1,20 @@
 // particles.c: the pass of light tracing: particles are cut into shards, each with a film of its own that covers the whole
 // picture, or a gradient, and these are added up in the order of the shards.
-#include "base/parallel.h"
-#include "math/rng.h"
 #include "render/particles.h"
-#include "render/render_parts.h"
+
+#include "base/parallel.h"
+#include "bsdf/table.h"
+#include "emitter/emitter.h"
+#include "math/rng.h"
+#include "render/rims.h"
 #include "sensor/kinds.h"
 
 #include <string.h>
 
-// Shards of the particles: fixed, so that sums do not depend on the threads. Large pictures have fewer, for memory's sake.
 // Mixed into the scramble of the pass from the camera.
 enum { PARTICLES = 2 };
 
+// Shards of the particles: fixed, so that sums do not depend on the threads. Large pictures have fewer, for memory's sake.
 enum { MOST_SHARDS = 8, FEWEST_SHARDS = 2, SHARD_PIXELS = 1 << 25 };
 
 typedef struct Particles {
@@ -24,6 +27,18 @@ typedef struct Particles {
 
 bool rey_traces_particles(const rey_scene *scene) {
     return scene->view.particles;
+}
+
+bool rey_particles_alone(const rey_scene *scene) {
+    const SceneView *view = &scene->view;
+    bool alone = false;
+    for (int64_t i = 0; i < view->bsdfs_count && view->particles && !alone; i++) {
+        alone = view->bsdfs[i].used && (rey_bsdf_bends(view->bsdfs[i].kind) || rey_bsdf_opens(view->bsdfs[i].kind));
+    }
+    for (int64_t i = 0; i < view->emitters_count && view->particles && !alone; i++) {
+        alone = view->emitters[i].kind == EMITTER_DIRECTIONALAREA;
+    }
+    return alone;
 }
 
 // Refuses sensors that see one direction only.
@@ -124,28 +139,30 @@ rey_result rey_particles_run(Render *r, double *picture) {
     return REY_OK;
 }
 
-// Refuses what moves the places that particles are connected through.
-static rey_result check_selection(const rey_scene *scene, rey_selection selection) {
+// A parameter of a selection that moves the places that particles are connected through, or what jumps there; null: none does.
+static const Param *moving(const rey_scene *scene, rey_selection selection) {
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
-        if (p->texture < 0 && p->to_uv < 0 && p->attribute < 0 && p->normals < 0) {
-            return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                            "the gradient of %s needs how places move that light tracing reaches, which does not exist: the "
-                            "integrator 'ptracer' has derivatives of materials, textures and radiance",
-                            p->name);
+        const bool stays = p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0 || p->normals >= 0;
+        if (!stays || (p->to_uv >= 0 && (p->terms & REY_TERM_PRIMARY)) || rey_rims_moved_by(scene, p)) {
+            return p;
         }
     }
-    return REY_OK;
+    return NULL;
 }
 
 rey_result rey_particles_begin(Render *r, rey_selection selection) {
     rey_scene *scene = r->scene;
     int32_t depth = scene->view.max_depth;
     rey_result result = check_sensor(scene, &r->def);
-    if (result == REY_OK) {
-        result = check_selection(scene, selection);
+    const Param *p = moving(scene, selection);
+    if (result == REY_OK && p && rey_particles_alone(scene)) {
+        result = rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
+                          "the gradient of %s needs how places move that light tracing reaches, which is known where paths from "
+                          "the sensor find the same light: not beside smooth mirrors and glass, masks and 'directionalarea'. "
+                          "'path' has it", p->name);
     }
-    if (depth < 0 || depth > 1) {
+    if (!p && (depth < 0 || depth > 1)) {
         r->particles = true;
         r->lights = scene->view;
         r->lights.max_depth = 1;

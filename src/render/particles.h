@@ -5,8 +5,11 @@
 
 // Whether the scene's integrator is `ptracer`.
 bool rey_traces_particles(const rey_scene *scene);
-// Of derivatives and replays: checks that sensor and selection are ones that light tracing knows, and makes the paths of
-// this call end at what the sensor sees of lights directly, if particles are to follow (r->particles).
+// Whether it is, and paths from the sensor find other light than particles do: smooth mirrors and glass, surfaces that let light
+// pass, and lights that no path meets. Without these, derivatives of what moves are found along such paths.
+bool rey_particles_alone(const rey_scene *scene);
+// Of derivatives and replays: checks that sensor and selection are ones that are known, and makes the paths of this call end at
+// what the sensor sees of lights directly, if particles are to follow (r->particles).
 rey_result rey_particles_begin(Render *r, rey_selection selection);
 // One pass of particles in the call's mode, with its samples per pixel: into its gradients, or added to a picture of 3
 // channels.

@@ -242,8 +242,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     int64_t textures = view->textures_count, shapes = view->shapes_count;
     enum { PAD = 16 };
     int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
-    int64_t n = 2 * textures + 3 * shapes + view->instances_count + CAMERA_NUMBERS + view->attributes_count + places +
-                view->volumes_count + view->groups_count + view->media_count + PAD;
+    int64_t n = 2 * textures + 3 * shapes + view->instances_count + rey_motion_cameras(r->plan.sensor) + view->attributes_count +
+                places + view->volumes_count + view->groups_count + view->media_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, 2 * (size_t)n, sizeof *r->offsets);
     if (!r->offsets) {
         return REY_ERROR_MEMORY;
@@ -256,7 +256,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
     r->job.pose_at = r->job.points_at + shapes;
     r->job.instance_at = r->job.pose_at + shapes;
     r->job.camera_at = r->job.instance_at + view->instances_count;
-    r->job.volume_at = r->job.camera_at + CAMERA_NUMBERS;
+    r->job.volume_at = r->job.camera_at + rey_motion_cameras(r->plan.sensor);
     r->job.texture_at = texture_at, r->job.to_uv_at = to_uv_at, r->job.normals_at = normals_at;
     r->job.attribute_at = attribute_at, r->job.place_at = place_at;
     int64_t at = 0;

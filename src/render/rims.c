@@ -23,9 +23,9 @@ static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord 
     return NULL;
 }
 
-// What of the scene's light comes along directions that are not sampled by scattering, null where none does.
+// What keeps the scene's light from being found there, null where nothing does.
 static const char *unsampled(const rey_scene *scene, const SensorRecord *sensor, const Param *p) {
-    if (rey_traces_particles(scene)) {
+    if (rey_particles_alone(scene)) {
         return "light tracing does not find that. The integrator 'path' does";
     }
     return p->moves_rims ? gap_of_sharp_light(&scene->view, sensor) : NULL;
@@ -47,16 +47,28 @@ static bool any_ends(const SceneView *view) {
     return found;
 }
 
-const char *rey_rims_gap(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char object[OBJECT_NAME]) {
-    const SceneView *view = &scene->view;
-    const char *gap = any_ends(view) ? unsampled(scene, sensor, p) : NULL; // far fewer functions are looked at than by shape
+// A function of which a parameter moves ends, -1: none.
+static int32_t moved_by(const SceneView *view, const Param *p) {
     const bool moves = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0 || p->moves_rims;
-    for (int64_t i = 0; i < view->shapes_count && gap; i++) {
+    for (int64_t i = 0; i < view->shapes_count; i++) {
         int32_t bsdf = view->shapes[i].bsdf;
         if (rey_bsdf_ends_within(view, bsdf) && (moves || rey_bsdf_ends_move(view, bsdf, p, p->normals == i))) {
-            rey_name_bsdf(scene, bsdf, object);
-            return gap;
+            return bsdf;
         }
     }
-    return NULL;
+    return -1;
+}
+
+bool rey_rims_moved_by(const rey_scene *scene, const Param *p) {
+    return any_ends(&scene->view) && moved_by(&scene->view, p) >= 0; // far fewer functions are looked at than by shape
+}
+
+const char *rey_rims_gap(const rey_scene *scene, const SensorRecord *sensor, const Param *p, char object[OBJECT_NAME]) {
+    const SceneView *view = &scene->view;
+    const char *gap = any_ends(view) ? unsampled(scene, sensor, p) : NULL;
+    int32_t bsdf = gap ? moved_by(view, p) : -1;
+    if (bsdf >= 0) {
+        rey_name_bsdf(scene, bsdf, object);
+    }
+    return bsdf >= 0 ? gap : NULL;
 }

@@ -20,7 +20,7 @@ enum { REASON = 3 * OBJECT_NAME };
 // What sees lines of textures that move over their surfaces but does not find them, null where nothing does.
 static const char *gap_of_lines(const rey_scene *scene) {
     return scene->view.has_media           ? "in participating media, what collisions see of them is not known"
-           : rey_traces_particles(scene) ? "light tracing does not find them, the integrator 'path' does"
+           : rey_particles_alone(scene) ? "light tracing does not find them, the integrator 'path' does"
                                            : NULL;
 }
 

@@ -104,6 +104,7 @@ typedef struct ShapeRecord {
     int32_t positions, normals, uvs;         // theta offsets, -1 = none
     int32_t to_world;                        // theta offset of a row-major 4 x 4 matrix, -1 = vertices are in the world
     int32_t table;                           // what the kind derives from to_world
+    int32_t mirrored;                        // spheres: to_world turned the inside out as it was read, which it may not do later
     int32_t segment, segment_count;          // curves: in `segments`; positions holds 4 numbers per control point
     int32_t area_cdf;                        // tables offset: triangle_count cumulative areas (mesh emitters), -1 = none
     float area;                              // surface area [scene units^2]

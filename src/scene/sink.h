@@ -23,7 +23,7 @@ typedef struct Sink {
     const int32_t *points_at;   // per shape: its vertex positions
     const int32_t *pose_at;     // per shape: its to_world
     const int32_t *instance_at; // per instance: its to_world
-    const int32_t *camera_at;   // CAMERA_ numbers
+    const int32_t *camera_at;   // CAMERA_ numbers, of batches those of each part
     const int32_t *volume_at;   // per volume: its to_world
     bool any_volumes;
     bool any_normals, any_attributes, any_places;

@@ -1,6 +1,7 @@
 // update.c: derived data of shapes.
 #include "shape/update.h"
 
+#include "shape/affine.h"
 #include "shape/normals.h"
 #include "shape/shape.h"
 
@@ -133,14 +134,25 @@ static rey_result posed_follow(rey_scene *scene, ShapeRecord *shape) {
     default:
         break;
     }
+    if (regular && shape->kind == SHAPE_SPHERE && (rey_affine_determinant(m) < 0) != shape->mirrored) {
+        return rey_fail(scene->ctx, REY_ERROR_SCENE, "the to_world of a sphere became a mirror image of what it was, which would "
+                                                     "turn the sphere inside out");
+    }
     return regular ? REY_OK : rey_fail(scene->ctx, REY_ERROR_SCENE, "a shape's to_world cannot be inverted");
 }
 
 rey_result rey_shape_update(rey_scene *scene, int32_t id) {
     ShapeRecord *shape = scene->view.shapes + id;
     rey_result result = REY_OK;
-    if (shape->segment_count > 0) {
-        return REY_OK; // control points are all there is of a curve
+    if (shape->segment_count > 0) { // control points are all there is of a curve
+        const float *points = scene->view.theta + shape->positions;
+        for (int32_t i = 0; i < shape->vertex_count; i++) {
+            if (points[4 * i + 3] < 0) {
+                return rey_fail(scene->ctx, REY_ERROR_SCENE, "the radius of a curve's control point %d is %g, expected one >= 0",
+                                (int)i, (double)points[4 * i + 3]);
+            }
+        }
+        return REY_OK;
     }
     if (shape->kind != SHAPE_MESH) {
         return posed_follow(scene, shape);

@@ -185,12 +185,68 @@ static void test_threads(void **state) {
     }
 }
 
-// Where lights lie decides which places particles reach.
+// What moves is derived along paths from the camera, which find the same light.
+static void test_moves(void **state) {
+    UNUSED(state);
+    static const char *const names[] = {"bulb.position", "sun.to_world", "sky.to_world", "metal.to_world", "camera.to_world"};
+    static const char *const files[] = {"particles.xml", "particles_path.xml"};
+    static float adjoint[NUMBERS];
+    random_numbers(adjoint, NUMBERS, 15);
+    for (int i = 0; i < COUNT_OF(names); i++) {
+        double gradient[2][16] = {{0}};
+        for (int k = 0; k < 2; k++) {
+            Room room = room_open(files[k], 2, 0);
+            rey_render_def def = def_make(16, 16, 2);
+            int param = rey_param_find(room.scene, names[i]);
+            assert_true(param >= 0);
+            ok(room, rey_vjp(room.scene, &def, (rey_selection){&param, 1}, adjoint, gradient[k], NULL, NULL));
+            room_close(room);
+        }
+        assert_memory_equal(gradient[0], gradient[1], sizeof gradient[0]);
+    }
+}
+
+// And agrees with differences of the pictures that particles make.
+static void test_moving_light(void **state) {
+    UNUSED(state);
+    enum { PICTURES_SPP = 4096 };
+    static float weights[NUMBERS], image[2][NUMBERS];
+    const float step = 0.1f, tangent[3] = {1, 0, 0};
+    double gradient[3], sets[SETS * 3], variance = 0;
+    Room room = room_open("particles.xml", 2, 0);
+    int param = rey_param_find(room.scene, "bulb.position");
+    rey_render_def def = def_make(256 * SETS, 17, SETS);
+    for (int i = 0; i < NUMBERS; i++) {
+        weights[i] = i / 3 % SIZE < SIZE / 2 ? 1.0f : 0.2f;
+    }
+    def.terms = 0;
+    ok(room, rey_vjp(room.scene, &def, (rey_selection){&param, 1}, weights, gradient, sets, NULL));
+    for (int s = 0; s < SETS; s++) {
+        variance += (sets[3 * s] - gradient[0]) * (sets[3 * s] - gradient[0]) / (SETS * (SETS - 1));
+    }
+    for (int side = 0; side < 2; side++) {
+        float place[3];
+        for (int k = 0; k < 3; k++) {
+            place[k] = rey_param_values(room.scene, param)[k] + (k == 0 && side == 0 ? -step : k == 0 ? 2 * step : 0) * tangent[0];
+        }
+        ok(room, rey_param_set(room.scene, param, place, 3));
+        rey_render_def picture = rey_default_render_def();
+        picture.spp = PICTURES_SPP;
+        ok(room, rey_render(room.scene, &picture, image[side], NULL));
+    }
+    double difference = (weighed(image[1], weights) - weighed(image[0], weights)) / (2 * (double)step);
+    print_message("bulb.position: %g +- %g, difference %g\n", gradient[0], sqrt(variance), difference);
+    assert_true(fabs(gradient[0] - difference) < 4 * sqrt(2 * variance) + 0.02 * fabs(difference));
+    assert_true(fabs(difference) > 10 * sqrt(variance));
+    room_close(room);
+}
+
+// Where light tracing finds light that such paths do not, it decides which places particles reach.
 static void test_places_are_refused(void **state) {
     UNUSED(state);
     static float adjoint[NUMBERS];
     double gradient[16];
-    Room room = room_open("particles.xml", 1, 0);
+    Room room = room_open("particles_beam.xml", 1, 0);
     rey_render_def def = def_make(1, 0, 1);
     static const char *const names[] = {"bulb.position", "sun.to_world", "sky.to_world"};
     for (int i = 0; i < COUNT_OF(names); i++) {
@@ -207,6 +263,7 @@ static void test_places_are_refused(void **state) {
 int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_reverse_is_forward), cmocka_unit_test(test_differences),
                                        cmocka_unit_test(test_path_gradient), cmocka_unit_test(test_threads),
+                                       cmocka_unit_test(test_moves), cmocka_unit_test(test_moving_light),
                                        cmocka_unit_test(test_places_are_refused)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
     return _cmocka_run_group_tests("particle_gradients", tests, count, write_pictures, remove_pictures);

@@ -171,26 +171,27 @@ static void mesh_flags_come_back(void **state) {
                             "<transform name=\"to_world\"><scale x=\"-1\" y=\"0.5\"/></transform>");
 }
 
-// What a file says nothing of, and what then depends on a number that changes, keeps its value: the beam of a spot.
-static void spots_come_back(void **state) {
-    static float before[NUMBERS], after[NUMBERS];
-    const float wider = 40;
-    Fixture *f = *state;
-    char path[128], copy[128];
-    snprintf(path, sizeof path, "%s/spot.xml", f->folder);
-    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+// A scene of a camera and `body`.
+static rey_scene *small_scene(Fixture *f, const char *body) {
+    char path[128];
+    snprintf(path, sizeof path, "%s/small.xml", f->folder);
     FILE *file = fopen(path, "w");
     assert_non_null(file);
     fprintf(file, "<scene version=\"3.0.0\"><integrator type=\"path\"/><sensor type=\"perspective\">"
                   "<transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
                   "<film type=\"hdrfilm\"><integer name=\"width\" value=\"24\"/><integer name=\"height\" value=\"24\"/></film>"
-                  "</sensor><shape type=\"rectangle\"/><emitter type=\"spot\" id=\"spot\">"
-                  "<float name=\"cutoff_angle\" value=\"25\"/>"
-                  "<transform name=\"to_world\"><lookat origin=\"0, 0, 2\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
-                  "</emitter></scene>");
+                  "</sensor>%s</scene>", body);
     assert_int_equal(fclose(file), 0);
-    rey_scene *scene = load(f, path, 0);
-    assert_int_equal(rey_param_set(scene, rey_param_find(scene, "spot.cutoff_angle.value"), &wider, 1), REY_OK);
+    return load(f, path, 0);
+}
+
+// Renders the same when it has been saved with a parameter's new values.
+static void expect_kept(Fixture *f, const char *body, const char *name, const float *values, int count) {
+    static float before[NUMBERS], after[NUMBERS];
+    char copy[128];
+    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+    rey_scene *scene = small_scene(f, body);
+    assert_int_equal(rey_param_set(scene, rey_param_find(scene, name), values, count), REY_OK);
     render(f, scene, before);
     assert_int_equal(rey_scene_save(scene, copy), REY_OK);
     rey_scene_destroy(scene);
@@ -198,6 +199,43 @@ static void spots_come_back(void **state) {
     render(f, scene, after);
     rey_scene_destroy(scene);
     assert_memory_equal(before, after, sizeof before);
+}
+
+static const char ball[] = "<shape type=\"sphere\" id=\"ball\"/><emitter type=\"constant\"/>";
+
+// What a file says nothing of, and what then depends on a number that changes, keeps its value: the beam of a spot. The last row
+// of a pose has no effect.
+static void changes_come_back(void **state) {
+    const float wider = 40, pose[16] = {0.5f, 0, 0, 1, 0, 0.5f, 0, 0, 0, 0, 0.5f, 0, 0.1f, 0, 0.2f, 1.5f};
+    expect_kept(*state, "<shape type=\"rectangle\"/><emitter type=\"spot\" id=\"spot\"><float name=\"cutoff_angle\" value=\"25\"/>"
+                        "<transform name=\"to_world\"><lookat origin=\"0, 0, 2\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
+                        "</emitter>", "spot.cutoff_angle.value", &wider, 1);
+    expect_kept(*state, ball, "ball.to_world", pose, 16);
+}
+
+// What a scene file could not say.
+static void impossible_shapes_are_refused(void **state) {
+    static float picture[NUMBERS], points[1024];
+    const float mirrored[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    Fixture *f = *state;
+    rey_render_def def = rey_default_render_def();
+    rey_scene *scene = small_scene(f, ball);
+    assert_int_equal(rey_param_set(scene, rey_param_find(scene, "ball.to_world"), mirrored, 16), REY_OK);
+    assert_int_equal(rey_render(scene, &def, picture, NULL), REY_ERROR_SCENE);
+    assert_non_null(strstr(rey_error(f->ctx), "mirror image"));
+    rey_scene_destroy(scene);
+    scene = small_scene(f, "<emitter type=\"constant\"/><shape type=\"bsplinecurve\" id=\"vine\">"
+                           "<string name=\"filename\" value=\"" RENDER_DIR "/vine.txt\"/></shape>");
+    int param = rey_param_find(scene, "vine.control_points");
+    rey_param_info info;
+    assert_int_equal(rey_param_get_info(scene, param, &info), REY_OK);
+    assert_true(info.count <= 1024);
+    memcpy(points, rey_param_values(scene, param), (size_t)info.count * sizeof *points);
+    points[3] = -0.1f;
+    assert_int_equal(rey_param_set(scene, param, points, info.count), REY_OK);
+    assert_int_equal(rey_render(scene, &def, picture, NULL), REY_ERROR_SCENE);
+    assert_non_null(strstr(rey_error(f->ctx), "expected one >= 0"));
+    rey_scene_destroy(scene);
 }
 
 // Moves every parameter a little.
@@ -339,7 +377,7 @@ int main(void) {
         cmocka_unit_test(rooms_come_back),
         cmocka_unit_test(texture_poses_come_back),
         cmocka_unit_test(mesh_flags_come_back),
-        cmocka_unit_test(spots_come_back),
+        cmocka_unit_test(changes_come_back), cmocka_unit_test(impossible_shapes_are_refused),
         cmocka_unit_test(files_are_written_once),
         cmocka_unit_test(values_load_by_name),
         cmocka_unit_test(wrong_values_are_refused),

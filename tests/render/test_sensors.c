@@ -131,6 +131,53 @@ static void test_batch(void **state) {
     assert_memory_equal(left, right, SIZE * SIZE * 3 * sizeof(float)); // one call or several: the same bits
 }
 
+// The derivative by a number of one of a batch's sensors is that sensor's own, in its columns, and 0 in the others. interior only.
+static void test_batch_moves(void **state) {
+    Fixture *f = *state;
+    static float batch[MOST], own[MOST], columns[MOST], nothing[SIZE * 3], adjoint[MOST];
+    static const struct {
+        const char *batch, *alone;
+        int sensor, column, entry;
+    } rows[] = {{"both.sensor_0.to_world", "pinhole.to_world", PINHOLE, 0, 3},
+                {"both.sensor_1.to_world", "plan.to_world", PLAN, 1, 1},
+                {"both.sensor_0.x_fov", "pinhole.x_fov", PINHOLE, 0, 0}};
+    for (int i = 0; i < MOST; i++) {
+        adjoint[i] = (float)(i % 7) - 2;
+    }
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        float tangent[16] = {0};
+        double gradient[16], forward = 0, size = 0;
+        int part = rey_param_find(f->scene, rows[i].batch), whole = rey_param_find(f->scene, rows[i].alone);
+        assert_true(part >= 0 && whole >= 0);
+        rey_render_def def = rey_default_render_def();
+        def.spp = SPP;
+        def.terms = REY_TERM_INTERIOR;
+        tangent[rows[i].entry] = 1;
+        def.sensor = BATCH;
+        assert_int_equal(rey_jvp(f->scene, &def, (rey_selection){&part, 1}, tangent, batch, NULL, NULL), REY_OK);
+        assert_int_equal(rey_vjp(f->scene, &def, (rey_selection){&part, 1}, adjoint, gradient, NULL, NULL), REY_OK);
+        def.sensor = rows[i].sensor;
+        assert_int_equal(rey_jvp(f->scene, &def, (rey_selection){&whole, 1}, tangent, own, NULL, NULL), REY_OK);
+        memset(nothing, 0, sizeof nothing);
+        for (int y = 0; y < SIZE; y++) {
+            const float *row = batch + y * 2 * SIZE * 3;
+            memcpy(columns + y * SIZE * 3, row + rows[i].column * SIZE * 3, SIZE * 3 * sizeof *row);
+            assert_memory_equal(row + (1 - rows[i].column) * SIZE * 3, nothing, SIZE * 3 * sizeof *row);
+        }
+        double found = difference(own, columns, SIZE * SIZE * 3);
+        memcpy(columns, own, sizeof columns);
+        def.seed = 1;
+        assert_int_equal(rey_jvp(f->scene, &def, (rey_selection){&whole, 1}, tangent, own, NULL, NULL), REY_OK);
+        double noise = difference(own, columns, SIZE * SIZE * 3);
+        for (int k = 0; k < 2 * SIZE * SIZE * 3; k++) {
+            forward += (double)batch[k] * (double)adjoint[k];
+            size += fabs((double)batch[k] * (double)adjoint[k]);
+        }
+        print_message("%s differs by %.5f, of other seeds by %.5f\n", rows[i].batch, found, noise);
+        assert_true(size > 0 && noise < 0.5 && found < 1.5 * noise && fabs(gradient[rows[i].entry] - forward) < 1e-5 * size);
+    }
+}
+
 static void test_saved(void **state) {
     Fixture *f = *state;
     static float before[MOST], after[MOST];
@@ -184,6 +231,7 @@ static void test_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_values), cmocka_unit_test(test_cross_section),
                                        cmocka_unit_test(test_lens),   cmocka_unit_test(test_batch),
+                                       cmocka_unit_test(test_batch_moves),
                                        cmocka_unit_test(test_saved),  cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
