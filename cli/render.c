@@ -3,6 +3,7 @@
 
 #include "base/context.h"
 
+#include <math.h>
 #include <stdio.h>
 
 static void print_json(const Session *s, const rey_stats *stats) {
@@ -31,6 +32,18 @@ static void note_darkness(const Session *s, const float *image, int channels) {
     }
 }
 
+// Samples that are not finite are left out; sums of large ones may still be beyond what a picture holds.
+static void note_overflow(const Session *s, const float *image, int channels) {
+    int64_t count = (int64_t)s->width * s->height * channels, endless = 0;
+    for (int64_t i = 0; i < count; i++) {
+        endless += i % channels < 3 && !isfinite(image[i]);
+    }
+    if (endless > 0) {
+        cli_note("warning: %lld number%s of the picture %s not finite: more light than 3.4e38", (long long)endless, PLURAL(endless),
+                 endless == 1 ? "is" : "are");
+    }
+}
+
 static rey_result render(Session *s, rey_stats *stats) {
     int channels = rey_film_channel_count(s->scene, s->def.sensor);
     float *image = rey_alloc_array(s->ctx, (size_t)s->width * (size_t)s->height, (size_t)channels * sizeof *image);
@@ -43,6 +56,7 @@ static rey_result render(Session *s, rey_stats *stats) {
     cli_progress_end(&s->progress);
     if (!result) {
         note_darkness(s, image, channels);
+        note_overflow(s, image, channels);
     }
     if (!result && s->options->output) {
         result = cli_write_film(s->ctx, s->options->output, image, s->width, s->height, channels, names,

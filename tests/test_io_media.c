@@ -121,8 +121,10 @@ static const struct {
      "the volume of a texture has 6 channels"},
     {"<bsdf type='bumpmap'><texture type='volume'>" GRID("v", "smoke.vol", "") "</texture><bsdf type='diffuse'/></bsdf>",
      "the texture of 'bumpmap' cannot be a volume"},
-    {"<shape type='rectangle'><emitter type='area'><texture type='volume' name='radiance'>" GRID("v", "smoke.vol", "")
-     "</texture></emitter></shape>", "'radiance' of a light cannot be a volume"},
+    {"<shape type='sphere'><emitter type='area'><texture type='volume' name='radiance'>" GRID("v", "smoke.vol", "")
+     "</texture></emitter></shape>", "the radiance of a light on a 'sphere' cannot be a volume"},
+    {"<emitter type='spot'><texture type='volume' name='texture'>" GRID("v", "smoke.vol", "") "</texture></emitter>",
+     "'texture' of 'spot' cannot be a volume"},
     {HETERO(GRID("sigma_t", "no.vol", "")), "no.vol"},
     {HETERO(GRID("sigma_t", "scene.xml", "")), "scene.xml: byte 0: not a VOL file"},
     {HETERO(GRID("sigma_t", "two.vol", "")), "the grid has 2 channels, expected 1, 3 or 6"},

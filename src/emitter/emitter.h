@@ -169,7 +169,9 @@ KFN TexCoord emitter_texcoord(const SceneView *scene, const EmitterRecord *e, Ve
         return texcoord(uv, NULL);
     }
     *hit = (Hit){i_set(e->shape), prim, uv.x, uv.y, v3_zero(), i_set(0)};
-    return texcoord(mesh_interaction(scene, scene->shapes[e->shape].flags, hit).uv, hit);
+    Interaction si = mesh_interaction(scene, scene->shapes[e->shape].flags, hit);
+    hit->p = si.p;
+    return texcoord(si.uv, hit);
 }
 
 // What arrives from a light sample: radiance, or of delta lights the irradiance of a facing plane.

@@ -11,7 +11,7 @@ typedef struct LightSample {
     Vec3 d;         // unit direction towards the light
     Float distance; // to the point; infinite lights: beyond the scene
     Float pdf;      // per solid angle; delta lights: 1
-    Vec2 uv;        // where the light is read, as its kind defines it; barycentrics of attributes (e->attributes)
+    Vec2 uv;        // where the light is read, as its kind defines it; barycentrics of attributes and volumes (e->attributes)
     Int prim;       // triangle of the light's mesh, else 0
     Mask valid;     // the light can be seen from there
 } LightSample;

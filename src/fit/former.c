@@ -100,7 +100,9 @@ static rey_result remove_scene(Fit *fit, const char *stem) {
     if (!result && access(path, R_OK) == 0) {
         result = rey_file_read(fit->ctx, path, &bytes, &size);
     }
-    if (!result && bytes) {
+    // As fits write it: another is somebody's own.
+    static const char beginning[] = "<scene version=\"3.0.0\">\n";
+    if (!result && bytes && !strncmp((const char *)bytes, beginning, sizeof beginning - 1)) {
         remove_data(fit, data, (const char *)bytes);
         unlink(path);
     }

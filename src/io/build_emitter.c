@@ -24,9 +24,9 @@ static rey_result colour_slot(Builder *b, rey_xml_node *node, const EmitterParam
     double value = (double)p->value;
     TRY(build_slot(b, node, p->name, use, &value, 1, path, out));
     int kind = ARRAY_AT(b->scene->build.textures, TextureNode, *out).kind;
-    if (build_is_volume(b, *out)) {
-        return rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_UNSUPPORTED, "'%s' of a light cannot be a volume",
-                            p->name);
+    if (build_is_volume(b, *out) && strcmp(node->type, "area") != 0) {
+        return rey_xml_fail(b->ctx, rey_xml_place(node, p->name), REY_ERROR_UNSUPPORTED,
+                            "'%s' of '%s' cannot be a volume, that of 'area' lights can", p->name, node->type);
     }
     bool one = kind == TEXTURE_CONSTANT || kind == TEXTURE_BLACKBODY;
     return one || p->type != EMITTER_PARAM_SPECTRUM

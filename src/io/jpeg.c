@@ -40,7 +40,7 @@ rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char
     if (setjmp(errors.back)) {
         jpeg_destroy_decompress(&jpeg);
         rey_free(ctx, row);
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: %s", name, errors.message);
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a whole JPEG file: %s", name, errors.message);
     }
     jpeg_create_decompress(&jpeg);
     jpeg_mem_src(&jpeg, bytes, size);

@@ -98,7 +98,7 @@ rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char 
     }
     png_set_read_fn(png, &reader, on_read);
     if (setjmp(png_jmpbuf(png))) {
-        result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: %s", name, reader.message);
+        result = rey_fail(ctx, REY_ERROR_FORMAT, "%s: not a whole PNG file: %s", name, reader.message);
     } else {
         result = read_samples(&reader, png, info, out);
     }

@@ -134,7 +134,7 @@ static rey_result save(const rey_scene *scene, const char *path, SavedParts part
     w.parts = parts;
     w.keeps_files = keeps_files;
     rey_result result = write_all(&w, path);
-    rey_save_free_files(&w);
+    rey_save_free_files(&w, result != REY_OK);
     rey_array_free(w.ctx, &w.edits);
     rey_free(w.ctx, w.declared);
     rey_free(w.ctx, w.first_edit);

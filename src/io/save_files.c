@@ -100,6 +100,18 @@ static rey_result data_path(Writer *w, const char *name, char path[4096]) {
                           "another file for the scene, or move what lies in %s", path, w->folder);
 }
 
+// The same, of one that is written next: a save that fails removes it.
+static rey_result new_path(Writer *w, const char *name, char path[4096]) {
+    TRY(data_path(w, name, path));
+    if (w->keeps_files) {
+        char **made = rey_array_push(w->ctx, &w->made, sizeof *made, 1);
+        char *copy = made ? rey_strdup(w->ctx, path) : NULL;
+        TRY(copy ? REY_OK : REY_ERROR_MEMORY);
+        *made = copy;
+    }
+    return REY_OK;
+}
+
 rey_result rey_save_list_files(Writer *w) {
     char path[4096];
     for (int i = 0; i < rey_xml_node_count(w->source->document); i++) {
@@ -116,7 +128,8 @@ rey_result rey_save_list_files(Writer *w) {
 }
 
 static rey_result make_folder(Writer *w) {
-    if (!w->folder_made && mkdir(w->folder, 0777) != 0 && errno != EEXIST) {
+    w->folder_new = w->folder_new || (!w->folder_made && mkdir(w->folder, 0777) == 0);
+    if (!w->folder_made && !w->folder_new && errno != EEXIST) {
         return rey_fail(w->ctx, REY_ERROR_IO, "%s: the folder could not be made: %s", w->folder, strerror(errno));
     }
     w->folder_made = true;
@@ -133,7 +146,7 @@ rey_result rey_save_copy_files(Writer *w) {
             continue;
         }
         TRY(make_folder(w));
-        TRY(data_path(w, file->name, path));
+        TRY(new_path(w, file->name, path));
         rey_result result = rey_file_read(w->ctx, file->source, &bytes, &size);
         if (result == REY_OK) {
             result = rey_file_write(w->ctx, path, bytes, size);
@@ -160,13 +173,24 @@ rey_result rey_save_new_file(Writer *w, int depth, const char *kind, const char 
         snprintf(name, sizeof name, "%s_%d%s", kind, w->number++, ending);
     } while (is_taken(w, name));
     TRY(make_folder(w));
-    TRY(data_path(w, name, path));
+    TRY(new_path(w, name, path));
     snprintf(full, sizeof full, "%s/%s", w->folder_name, name);
     rey_save_value(w, depth, "string", "filename", full);
     return REY_OK;
 }
 
-void rey_save_free_files(Writer *w) {
+void rey_save_free_files(Writer *w, bool failed) {
+    for (size_t i = 0; i < w->made.count; i++) {
+        char *path = ARRAY_AT(w->made, char *, i);
+        if (failed && path) {
+            unlink(path);
+        }
+        rey_free(w->ctx, path);
+    }
+    if (failed && w->folder_new) {
+        rmdir(w->folder);
+    }
+    rey_array_free(w->ctx, &w->made);
     for (size_t i = 0; i < w->files.count; i++) {
         rey_free(w->ctx, ARRAY_AT(w->files, DataFile, i).source);
         rey_free(w->ctx, ARRAY_AT(w->files, DataFile, i).name);

@@ -44,7 +44,8 @@ typedef struct Writer {
     int32_t *texture_sources; // per texture: entry of the source's textures, -1 = none
     Names paths;             // of nodes, by number
     int number;              // running number of the files that are written anew
-    bool folder_made;
+    bool folder_made, folder_new; // it is there; it was not before
+    Array made;              // char *: files that were not there before, where keeps_files
     bool keeps_files;        // what lies in the folder is not to be replaced
     uint8_t *declared;       // per node: the file holds it where it was declared, or where it was first referred to
     bool failed;             // out of memory while writing text
@@ -72,7 +73,7 @@ rey_result rey_save_copy_files(Writer *w);
 const char *rey_save_data_name(const Writer *w, const rey_xml_node *node); // null when the node names none
 // A path for a file that is written anew, "KIND_N.ENDING", and the line that names it.
 rey_result rey_save_new_file(Writer *w, int depth, const char *kind, const char *ending, char path[4096]);
-void rey_save_free_files(Writer *w);
+void rey_save_free_files(Writer *w, bool failed); // failed: removes those that were not there before, too
 
 // ---- edits (save_edits.c) ----------------------------------------------------------------------------------------
 

@@ -1,5 +1,4 @@
 // xml_value.c: numbers, lists of numbers and spectra in attributes.
-#define _GNU_SOURCE // strcasestr
 #include "io/xml_parts.h"
 
 #include "io/image.h"
@@ -27,9 +26,24 @@ static const char *skip_separators(const char *text) {
     return text;
 }
 
+// Is a word of the text one for what is not finite?
+static bool names_endless(const char *text) {
+    static const char *const words[] = {"inf", "infinity", "nan"};
+    bool endless = false;
+    for (const char *c = skip_separators(text); *c && !endless; c = skip_separators(c)) {
+        c += *c == '+' || *c == '-';
+        size_t length = strcspn(c, " ,\t\n\r");
+        for (int i = 0; i < COUNT_OF(words); i++) {
+            endless = endless || (length == strlen(words[i]) && strncasecmp(c, words[i], length) == 0);
+        }
+        c += length;
+    }
+    return endless;
+}
+
 // Numbers that are not finite, or not in the single precision that they end up in, are no numbers here.
 static rey_result fail_value(XmlReader *reader, const XmlAttribute *attribute, const char *expected) {
-    bool endless = strcasestr(attribute->value, "inf") || strcasestr(attribute->value, "nan");
+    bool endless = names_endless(attribute->value);
     return rey_xml_fail(reader->ctx, attribute->at, REY_ERROR_SCENE, "bad %s '%.60s%s'%s, expected %s", attribute->name,
                         attribute->value, strlen(attribute->value) > 60 ? "..." : "",
                         endless ? ": numbers are finite" : "", expected);

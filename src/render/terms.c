@@ -203,6 +203,11 @@ static const char *gap_of_lookups(const SceneView *view) {
             }
         }
     }
+    for (int64_t i = 0; i < view->emitters_count && view->volumes_count > 0; i++) {
+        if (view->emitters[i].shape >= 0 && texture_holds(view, view->emitters[i].slot[0], is_volume)) {
+            return "surfaces that shine have volumes as textures, and points that move look these up elsewhere";
+        }
+    }
     return NULL;
 }
 

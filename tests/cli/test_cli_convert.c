@@ -47,6 +47,19 @@ static void files_of_others_are_kept(void **state) {
     assert_int_equal(system("cmp -s tex.png k_data/tex.png && grep -q mine k_data/notes.txt"), 0);
 }
 
+// A conversion that fails half way leaves none of its files, so that another can write them.
+static void failures_leave_nothing(void **state) {
+    Fixture *f = *state;
+    write_words("two.xml", "<scene version='3.0.0'><shape type='obj'><string name='filename' value='one.obj'/></shape>"
+                           "<shape type='obj'><string name='filename' value='other.obj'/></shape></scene>");
+    write_words("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert_int_equal(system("(cat one.obj; yes '# long' | head -n 20000) > other.obj"), 0);
+    assert_int_not_equal(system("(ulimit -f 64; exec '" REYNOLDS_COMMAND "' convert two.xml half.xml) > out.txt 2> words.txt"), 0);
+    assert_int_equal(system("grep -q other.obj words.txt && [ ! -e half.xml ] && [ ! -e half_data ]"), 0);
+    expect(f, 0, "convert two.xml half.xml");
+    assert_int_equal(system("cmp -s one.obj half_data/one.obj"), 0);
+}
+
 static const char *const broken_scene =
     "<scene version='3.0.0'><integrator type='stokes'/><sensor type='perspective'><film type='hdrfilm'>"
     "<integer name='width' value='8'/><integer name='height' value='8'/></film><float name='zoom' value='2'/></sensor>"
@@ -98,6 +111,7 @@ int main(void) {
         cmocka_unit_test(converted_scenes_render_the_same_bits),
         cmocka_unit_test(failures_of_convert),
         cmocka_unit_test(files_of_others_are_kept),
+        cmocka_unit_test(failures_leave_nothing),
         cmocka_unit_test(lenient_reading_lists_what_it_leaves_out),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -288,7 +288,8 @@ static const RoomCase rooms[] = {{"tiles.xml", true, false},        {"edges.xml"
                                  {"moving_disk.xml", true, false},  {"moving_tube.xml", true, false},
                                  {"fog.xml", false, true},          {"smoke.xml", false, true},
                                  {"media_flakes.xml", false, true}, {"media_pair.xml", false, true},
-                                 {"dropped.xml", false, false},       {"sieve.xml", false, false}};
+                                 {"dropped.xml", false, false},       {"sieve.xml", false, false},
+                                 {"glowing.xml", false, false}};
 
 static void test_differences(void **state) {
     const RoomCase *r = *state;

@@ -78,14 +78,39 @@ static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again
 
 enum { LINES_ALIKE = -1 };
 
+// Area vectors of triangles.
+static Vec3 triangle_cross(const SceneView *scene, const Hit *hit, Mask m) {
+    Vec3 p[3];
+    Hit h = *hit;
+    h.shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m))));
+    h.prim = i_select(m, hit->prim, i_set(0));
+    triangle_load(scene, 0, &h, p);
+    return v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+}
+
+// Lanes of m in which two lines meet one triangle, or the two of a rectangle or of a face of a cube that lie in a plane, between
+// which nothing jumps.
+static Mask lines_share(const SceneView *scene, const Hit *a, const Hit *b, Mask m) {
+    m = m & mi_eq(a->shape, b->shape) & mi_eq(a->instance, b->instance);
+    Mask one = mi_eq(a->prim, b->prim), halves = m & ~one & mi_lt(i_set(-1), a->shape) & mi_eq(a->prim >> 1, b->prim >> 1);
+    if (m_any(halves)) { // meshes from files have no to_world
+        halves = halves & mi_lt(i_set(-1), SHAPE_FIELD(scene, i_select(halves, a->shape, i_set(0)), to_world));
+    }
+    if (m_any(halves)) {
+        Vec3 p = triangle_cross(scene, a, halves), q = triangle_cross(scene, b, halves);
+        Float dot = v3_dot(p, q);
+        halves = halves & m_gt(dot, f_set(0)) & m_ge(dot * dot, v3_dot(p, p) * v3_dot(q, q) * f_set((real)0.99999));
+    }
+    return m & (one | halves);
+}
+
 // The first vertex at which two lines of sight part because they meet different surfaces there, or different fields of one's
 // textures. 0: it is what the sensor sees itself, or they take different lobes, where nothing jumps on average, but thin bands may
 // lie beside, as where glass refracts rays into itself shortly before all of the light is mirrored. LINES_ALIKE: none of these.
 static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *a, const Sightline *b, Mask m) {
     Int level = i_set(LINES_ALIKE);
     for (int32_t i = 0; i < a->last && i < b->last; i++) {
-        Mask same = mi_eq(a->hit[i].shape, b->hit[i].shape) & mi_eq(a->hit[i].prim, b->hit[i].prim) &
-                    mi_eq(a->hit[i].instance, b->hit[i].instance) & mi_eq(a->behind[i], b->behind[i]);
+        Mask same = lines_share(t->scene, a->hit + i, b->hit + i, m) & mi_eq(a->behind[i], b->behind[i]);
         Vec2 unused;
         Int step;
         Mask met = m & same & mi_lt(i_set(-1), a->hit[i].shape);

@@ -154,9 +154,12 @@ static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Ve
     return c;
 }
 
+// Half of the difference of film positions that slopes are taken over, in film widths: rays turn by little more than rounding.
+#define FILM_STEP ((real)0.004)
+
 // What the film position is worth to the ray that the sensor sends to p.
 static Vec2 film_adj(const Tracer *t, Float x, Float y, Vec2 lens, Vec3 p, const Carried *c) {
-    const real step = (real)0.5;
+    const real step = FILM_STEP * (real)t->sensor->width;
     Float out[2];
     for (int k = 0; k < 2; k++) {
         real sx = k ? 0 : step, sy = k ? step : 0;
