@@ -102,6 +102,8 @@ double cli_seconds_total(void);
 void cli_catch_interrupts(void);
 // SIGTERM and SIGHUP do the same: of commands that look at the flag all the time.
 void cli_catch_terminations(void);
+// What a signal then says on standard error: what the command still does. Static text.
+void cli_say_when_interrupted(const char *words);
 bool cli_interrupted(void);
 
 typedef struct Progress {

@@ -429,6 +429,7 @@ int cli_fit(int argc, char **argv) {
         return status;
     }
     cli_catch_terminations();
+    cli_say_when_interrupted("\nreynolds: finishing what is at work, then saving; a second Ctrl-C ends at once\n");
     status = cli_context_open(&options, &session);
     if (!status) {
         char *command = command_text(argc, argv);

@@ -19,11 +19,20 @@
 enum { SHOWN_NAMES = 3 }; // of a list
 
 static volatile sig_atomic_t interrupted; // the one thing that a signal handler can reach
+static const char *volatile parting;      // and what it says at the first signal, null = nothing
 
 static void on_interrupt(int number) {
     UNUSED(number);
+    if (parting && !interrupted) {
+        int error = errno;
+        ssize_t written = write(STDERR_FILENO, parting, strlen(parting));
+        UNUSED(written);
+        errno = error;
+    }
     interrupted = 1;
 }
+
+void cli_say_when_interrupted(const char *words) { parting = words; }
 
 void cli_catch_interrupts(void) {
     struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};

@@ -251,6 +251,19 @@ static void terminations_are_interruptions(void **state) {
     }
 }
 
+// A fit says that it goes on for a moment, saves, and can be resumed.
+static void interrupted_fits_are_saved(void **state) {
+    Fixture *f = *state;
+    char command[1024];
+    write_job(f, "iterations: 100000\n");
+    snprintf(command, sizeof command, "timeout --preserve-status -s INT 1 '%s' fit job.yaml -o cut >out.txt 2>words.txt",
+             REYNOLDS_COMMAND);
+    int status = system(command);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 130);
+    assert_int_equal(system("grep -q 'then saving' words.txt && [ -s cut/checkpoint.bin ]"), 0);
+}
+
 // A stream that is closed is no place for a file: no word goes into what a fit writes.
 static void closed_streams_stay_closed(void **state) {
     Fixture *f = *state;
@@ -304,6 +317,7 @@ int main(void) {
         cmocka_unit_test(rows_of_check_stand_once),
         cmocka_unit_test(infos_say_what_is_missing),
         cmocka_unit_test(terminations_are_interruptions),
+        cmocka_unit_test(interrupted_fits_are_saved),
         cmocka_unit_test(closed_streams_stay_closed),
         cmocka_unit_test(mistakes_are_recognised),
     };
