@@ -76,8 +76,8 @@ static void test_depths(void **state) {
     }
 }
 
-// Nothing jumps between the two triangles of a rectangle: where an outline squeezes them together in a mirror, the difference of
-// both sides was up to 3 % of the derivative, 0.2 % here.
+// Nothing jumps between two triangles of one plane, as those of a rectangle: where an outline squeezes them together in a mirror,
+// the difference of both sides was up to 3 % of the derivative, 0.2 % here.
 static void test_diagonals(void **state) {
     static const char path[] = "<integrator type='path'><integer name='max_depth' value='3'/></integrator>";
     static const int terms[] = {REY_TERM_INTERIOR, REY_TERM_SPECULAR};

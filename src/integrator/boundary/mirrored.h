@@ -78,30 +78,38 @@ static Strip strip_across(const Strips *all, const SampleKey *key, int32_t again
 
 enum { LINES_ALIKE = -1 };
 
-// Area vectors of triangles.
-static Vec3 triangle_cross(const SceneView *scene, const Hit *hit, Mask m) {
-    Vec3 p[3];
-    Hit h = *hit;
-    h.shape = i_select(m, hit->shape, i_set(i_lane(hit->shape, m_first(m))));
-    h.prim = i_select(m, hit->prim, i_set(0));
-    triangle_load(scene, 0, &h, p);
-    return v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0]));
+// Lanes of m in which two triangles of a mesh lie next to each other in a plane. Where they share their vertices, with all that
+// these carry, nothing jumps between them.
+static Mask triangles_join(const SceneView *scene, const Hit *a, const Hit *b, Mask m) {
+    Vec3 p[2][3], n[2];
+    Corners c[2];
+    Int shared = i_set(0);
+    for (int k = 0; k < 2; k++) {
+        Hit h = *(k ? b : a);
+        h.shape = i_select(m, h.shape, i_set(i_lane(h.shape, m_first(m))));
+        h.prim = i_select(m, h.prim, i_set(0));
+        c[k] = mesh_corners(scene, h.shape, h.prim);
+        triangle_load(scene, 0, &h, p[k]);
+        n[k] = v3_cross(v3_sub(p[k][1], p[k][0]), v3_sub(p[k][2], p[k][0]));
+    }
+    for (int i = 0; i < 9; i++) {
+        shared = shared + i_select(mi_eq(c[0].i[i / 3], c[1].i[i % 3]), i_set(1), i_set(0));
+    }
+    Float dot = v3_dot(n[0], n[1]), flat = v3_dot(n[0], n[0]) * v3_dot(n[1], n[1]) * f_set((real)0.99999);
+    return m & mi_lt(i_set(1), shared) & m_gt(dot, f_set(0)) & m_ge(dot * dot, flat);
 }
 
-// Lanes of m in which two lines meet one triangle, or the two of a rectangle or of a face of a cube that lie in a plane, between
-// which nothing jumps.
+// Lanes of m in which two lines meet one triangle, or two between which nothing jumps.
 static Mask lines_share(const SceneView *scene, const Hit *a, const Hit *b, Mask m) {
     m = m & mi_eq(a->shape, b->shape) & mi_eq(a->instance, b->instance);
-    Mask one = mi_eq(a->prim, b->prim), halves = m & ~one & mi_lt(i_set(-1), a->shape) & mi_eq(a->prim >> 1, b->prim >> 1);
-    if (m_any(halves)) { // meshes from files have no to_world
-        halves = halves & mi_lt(i_set(-1), SHAPE_FIELD(scene, i_select(halves, a->shape, i_set(0)), to_world));
+    Mask one = mi_eq(a->prim, b->prim), apart = m & ~one & mi_lt(i_set(-1), a->shape);
+    if (!m_any(apart) || scene->attributes_count > 0) { // which may be of faces
+        return m & one;
     }
-    if (m_any(halves)) {
-        Vec3 p = triangle_cross(scene, a, halves), q = triangle_cross(scene, b, halves);
-        Float dot = v3_dot(p, q);
-        halves = halves & m_gt(dot, f_set(0)) & m_ge(dot * dot, v3_dot(p, p) * v3_dot(q, q) * f_set((real)0.99999));
-    }
-    return m & (one | halves);
+    Int shape = i_select(apart, a->shape, i_set(0)), flags = SHAPE_FIELD(scene, shape, flags);
+    apart = apart & mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_MESH));
+    apart = apart & mi_lt(i_set(0), flags & SHAPE_HAS_UVS); // else each has its own
+    return m & (one | (m_any(apart) ? triangles_join(scene, a, b, apart) : apart));
 }
 
 // The first vertex at which two lines of sight part because they meet different surfaces there, or different fields of one's
