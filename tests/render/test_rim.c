@@ -257,12 +257,10 @@ static void test_refused(void **state) {
     }
 }
 
+// Arguments: what the names of tests begin with.
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_index), cmocka_unit_test(test_turn), cmocka_unit_test(test_sharp),
-                                       cmocka_unit_test(test_moves), cmocka_unit_test(test_widths),
-                                       cmocka_unit_test(test_refused)};
-    if (argc > 1) {
-        cmocka_set_test_filter(argv[1]);
-    }
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    struct CMUnitTest tests[] = {cmocka_unit_test(test_index), cmocka_unit_test(test_turn),   cmocka_unit_test(test_sharp),
+                                 cmocka_unit_test(test_moves), cmocka_unit_test(test_widths), cmocka_unit_test(test_refused)};
+    size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
+    return _cmocka_run_group_tests("rim", tests, count, NULL, NULL);
 }
