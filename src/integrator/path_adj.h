@@ -53,12 +53,15 @@ KFN void connections_adj(const Tracer *t, const SurfaceSweep *s, const BsdfCall 
     bool moves = sink->any_places || sink->any_motion;
     Spec both = spec_scale(spec_mul(weight, s->light_weight), s->kept);
     Vec2 *at = sink->at;
+    Vec3 *point = sink->point;
     sink->at = NULL; // light samples are attached
+    sink->point = point ? &d->light_point : NULL;
     if (t->job->live_lights) {
         lights_adj(t->scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
                    spec_zero_unless(s->connected, spec_mul(both, s->f_light)), moves ? &d->light : NULL, sink);
     }
     sink->at = at;
+    sink->point = point;
     if (live & LIVE_SCATTERING) {
         Vec3 dwl = v3_zero();
         Spec df = spec_zero_unless(s->connected, spec_mul(both, s->light_value));
@@ -93,7 +96,8 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     bool uv_moves = vertex_uv_moves(s, sink);
     sink->at = uv_moves ? &d.at : NULL;
     sink->point = sink->any_motion ? &d.point : NULL;
-    if ((live & LIVE_EMISSION) || (uv_moves && s->emitter)) {
+    // Volumes are looked up where points that move lie.
+    if ((live & LIVE_EMISSION) || (s->emitter && (uv_moves || (sink->point && s->emitter->attributes)))) {
         // L += w_e Le
         LightMove seen = light_move_zero();
         emitter_adj(t->scene, s->group->emitter, texcoord(s->si.uv, &s->hit), f_set(1),

@@ -21,7 +21,7 @@
 // what light samples and the rest of the path contribute; p: of its position, beside what these ask for.
 typedef struct VertexAdj {
     Vec3 p, wi, wo;
-    Vec3 point; // where volumes are read
+    Vec3 point, light_point; // where volumes are read: there, and at the light sample
     LightMove light;
     Frame frame;
     BsdfSurface surface;
@@ -170,7 +170,7 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
         Int prim = i_select(attached, s->light_prim, i_set(0));
         Hit hit = point_hit(scene, i_select(attached, shape, i_set(-1)), prim, i_set(0), p, &n);
         Vec3 dr = segment_adj(s->light_d, s->light_distance, n, v->lit, v->light.d, &darea);
-        points_move_adj(t, &hit, dr, darea, sink, attached);
+        points_move_adj(t, &hit, v3_add(dr, v->light_point), darea, sink, attached);
         dp = v3_select(attached, v3_neg(dr), dp);
     }
     return dp;

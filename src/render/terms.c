@@ -204,8 +204,13 @@ static const char *gap_of_lookups(const SceneView *view) {
         }
     }
     for (int64_t i = 0; i < view->emitters_count && view->volumes_count > 0; i++) {
-        if (view->emitters[i].shape >= 0 && texture_holds(view, view->emitters[i].slot[0], is_volume)) {
-            return "surfaces that shine have volumes as textures, and points that move look these up elsewhere";
+        const EmitterRecord *e = view->emitters + i;
+        if (e->shape >= 0 && texture_holds(view, e->slot[0], is_jumping_volume)) {
+            return "lights have volumes of filter_type=\"nearest\" as radiance, whose jumps from voxel to voxel pass over points "
+                   "that move";
+        }
+        if (e->shape >= 0 && view->has_media && texture_holds(view, e->slot[0], is_volume)) {
+            return "in scenes with participating media, lights have volumes as radiance, which points that move look up elsewhere";
         }
     }
     return NULL;

@@ -18,7 +18,7 @@
 #define DIMENSION_TURNING_SIDE 0x80000005u
 
 // Blocks of samples that end on lights take turns with blocks that leave into a random direction.
-enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64, MOST_UPSTREAM = 32 };
+enum { SEGMENT_BLOCK = 16, MOST_RUNGS = 64, MOST_UPSTREAM = 64 };
 
 // Lights of which every point sees the same direction, or all.
 enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 << EMITTER_DIRECTIONAL };

@@ -6,7 +6,7 @@
 #include "integrator/boundary/upstream.h"
 
 // Vertices that mirror, refract or let pass; lines with more of them end.
-enum { MOST_SIGHT = 12 };
+enum { MOST_SIGHT = 64 };
 
 typedef struct Sightline {
     Hit hit[MOST_SIGHT + 1]; // shape -1: nothing
