@@ -171,6 +171,7 @@ static void test_sharp(void **state) {
 static void test_moves(void **state) {
     static const float shift[12] = {0, 1, 0.3f, 0, 1, 0.3f, 0, 1, 0.3f, 0, 1, 0.3f}, place[3] = {1, 0.3f, 0.5f};
     static const float nod[12] = {0, 0, 0.3f, 0, 0, 0.3f, 0, 0, 0.3f, 0, 0, 0.3f};
+    static const float more[12] = {0, 0, 3, 0, 0, 3, 0, 0, 3, 0, 0, 3}; // differences of small steps are noisy there
     static const float along[16] = {[3] = 1, [7] = 0.5f}, up[16] = {[11] = 1}, swing[16] = {[2] = 0.3f, [6] = 0.5f, [10] = -0.5f};
     static const SharpRow rows[] = {{"glass", "lamp", "pane.positions", &of_pane, shift, 12, 1 << 15},
                                     {"coat", "lamp", "sensor_0.to_world", &of_pane, along, 16, 1 << 15},
@@ -180,7 +181,7 @@ static void test_moves(void **state) {
                                     {"coat", "sun", "sensor_0.to_world", &of_plain_floor, along, 16, 1 << 15},
                                     {"glass", "lamp", "back.normals", &in_mirror, nod, 12, 1 << 14},
                                     {"glass", "sun", "back.positions", &in_mirror, shift, 12, 1 << 15},
-                                    {"glass", "lamp", "back.normals", &beside_mirror, nod, 12, 1 << 16}};
+                                    {"glass", "lamp", "back.normals", &beside_mirror, more, 12, 1 << 16}};
     (void)state;
     check_rows(rows, COUNT_OF(rows));
 }
