@@ -211,7 +211,8 @@ static void test_moving_light(void **state) {
     UNUSED(state);
     enum { PICTURES_SPP = 4096 };
     static float weights[NUMBERS], image[2][NUMBERS];
-    const float step = 0.1f, tangent[3] = {1, 0, 0};
+    const float step = 0.1f;
+    float place[3];
     double gradient[3], sets[SETS * 3], variance = 0;
     Room room = room_open("particles.xml", 2, 0);
     int param = rey_param_find(room.scene, "bulb.position");
@@ -224,11 +225,9 @@ static void test_moving_light(void **state) {
     for (int s = 0; s < SETS; s++) {
         variance += (sets[3 * s] - gradient[0]) * (sets[3 * s] - gradient[0]) / (SETS * (SETS - 1));
     }
-    for (int side = 0; side < 2; side++) {
-        float place[3];
-        for (int k = 0; k < 3; k++) {
-            place[k] = rey_param_values(room.scene, param)[k] + (k == 0 && side == 0 ? -step : k == 0 ? 2 * step : 0) * tangent[0];
-        }
+    memcpy(place, rey_param_values(room.scene, param), sizeof place);
+    place[0] -= step;
+    for (int side = 0; side < 2; side++, place[0] += 2 * step) {
         ok(room, rey_param_set(room.scene, param, place, 3));
         rey_render_def picture = rey_default_render_def();
         picture.spp = PICTURES_SPP;
