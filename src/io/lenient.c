@@ -45,7 +45,7 @@ static void take_back(Builder *b, const Snapshot *s) {
 #undef ARRAY
 }
 
-static rey_result remember(Builder *b, const char *text, const char *instead) {
+rey_result build_remember(Builder *b, const char *text, const char *instead) {
     size_t length = strlen(text) + strlen(instead) + 1;
     char **slot = rey_array_push(b->ctx, &b->source->ignored, sizeof *slot, 1);
     char *copy = slot ? rey_alloc(b->ctx, length) : NULL;
@@ -68,12 +68,12 @@ rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, co
     }
     take_back(b, s);
     child->ignored = child->used = true;
-    return remember(b, rey_error(b->ctx), instead);
+    return build_remember(b, rey_error(b->ctx), instead);
 }
 
 rey_result build_overlook(Builder *b, const char *instead, rey_result result) {
     bool overlook = result != REY_OK && result != REY_ERROR_MEMORY && b->lenient;
-    return overlook ? remember(b, rey_error(b->ctx), instead) : result;
+    return overlook ? build_remember(b, rey_error(b->ctx), instead) : result;
 }
 
 rey_result build_check_unused(Builder *b, rey_xml_node *node) {
@@ -81,7 +81,7 @@ rey_result build_check_unused(Builder *b, rey_xml_node *node) {
         if (!b->lenient) {
             return REY_ERROR_SCENE;
         }
-        TRY(remember(b, rey_error(b->ctx), ""));
+        TRY(build_remember(b, rey_error(b->ctx), ""));
         rey_xml_ignore_unused(node);
     }
     return REY_OK;

@@ -21,5 +21,7 @@ rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, co
 // The result of a look at what was built: where it failed and the reader is lenient, lists why, and what is done instead, and
 // returns REY_OK.
 rey_result build_overlook(Builder *b, const char *instead, rey_result result);
+// Lists what was left out, and what is done instead.
+rey_result build_remember(Builder *b, const char *text, const char *instead);
 // An error that names what nobody took; a lenient reader leaves all of that out.
 rey_result build_check_unused(Builder *b, rey_xml_node *node);

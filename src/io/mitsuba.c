@@ -350,7 +350,10 @@ static rey_result build_scene(Builder *b) {
         TRY(note_loose_light(b, root->children[i].node));
     }
     TRY(replace_integrator(b, root));
-    const char *note;
+    const char *note, *ignored;
+    for (int i = 0; (ignored = rey_xml_ignored(b->source->document, i)); i++) {
+        TRY(build_remember(b, ignored, ""));
+    }
     for (int i = 0; (note = rey_xml_note(b->source->document, i)); i++) {
         TRY(rey_scene_add_note(b->scene, "%s", note));
     }
@@ -391,6 +394,7 @@ static void source_free(void *document) {
 rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                             rey_scene **out) {
     Builder b = {.ctx = ctx, .collection = -1, .lenient = (flags & LOAD_LENIENT) != 0};
+    const int xml_flags = b.lenient ? REY_XML_SPARE | REY_XML_LENIENT : flags & LOAD_SPARE ? REY_XML_SPARE : 0;
     *out = NULL;
     TRY(rey_scene_new(ctx, &b.scene));
     b.source = rey_alloc(ctx, sizeof *b.source);
@@ -399,7 +403,7 @@ rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define
         b.source->ctx = ctx;
         b.scene->document = b.source;
         b.scene->document_free = source_free;
-        result = (flags ? rey_xml_read_spare : rey_xml_read)(ctx, path, defines, define_count, &b.source->document);
+        result = rey_xml_read_with(ctx, path, defines, define_count, xml_flags, &b.source->document);
     }
     if (result == REY_OK) {
         size_t nodes = (size_t)rey_xml_node_count(b.source->document);

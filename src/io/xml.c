@@ -44,6 +44,7 @@ void rey_xml_free(rey_context *ctx, rey_xml_document *document) {
     rey_array_free(ctx, &document->spectra);
     rey_array_free(ctx, &document->nodes);
     rey_array_free(ctx, &document->notes);
+    rey_array_free(ctx, &document->ignored);
     rey_array_free(ctx, &document->folders);
     rey_free(ctx, document->ids.slots);
     for (XmlBlock *block = document->blocks; block;) {
@@ -119,28 +120,56 @@ static void stop_on(XmlFile *file, rey_result result) {
     }
 }
 
+rey_result rey_xml_overlook(XmlReader *reader, rey_result result) {
+    if (!result || result == REY_ERROR_MEMORY || reader->result || !(reader->flags & REY_XML_LENIENT)) {
+        return result;
+    }
+    const char *error = rey_error(reader->ctx);
+    const char *kept = rey_xml_keep_text(reader->ctx, reader->document, error, strlen(error));
+    const char **slot = kept ? rey_array_push(reader->ctx, &reader->document->ignored, sizeof *slot, 1) : NULL;
+    if (!slot) {
+        return REY_ERROR_MEMORY;
+    }
+    *slot = kept;
+    return REY_OK;
+}
+
+// An element that failed before it left a trace is left out with all within it.
 static void XMLCALL on_start(void *user, const XML_Char *name, const XML_Char **attributes) {
     XmlFile *file = user;
-    if (!file->reader->result) {
-        stop_on(file, rey_xml_start_element(file, name, attributes));
+    XmlReader *reader = file->reader;
+    if (reader->result || file->skipped) {
+        file->skipped += file->skipped > 0;
+        return;
     }
+    size_t frames = reader->frames.count, nodes = reader->document->nodes.count;
+    rey_result result = rey_xml_start_element(file, name, attributes);
+    if (result && frames > file->base && reader->frames.count == frames && reader->document->nodes.count == nodes) {
+        result = rey_xml_overlook(reader, result);
+        file->skipped = !result;
+    }
+    stop_on(file, result);
 }
 
 static void XMLCALL on_end(void *user, const XML_Char *name) {
     UNUSED(name);
     XmlFile *file = user;
-    if (!file->reader->result) {
+    if (file->skipped) {
+        file->skipped--;
+    } else if (!file->reader->result) {
         stop_on(file, rey_xml_end_element(file));
     }
 }
 
 static void XMLCALL on_text(void *user, const XML_Char *text, int length) {
     XmlFile *file = user;
-    for (int i = 0; i < length && !file->reader->result; i++) {
+    for (int i = 0; i < length && !file->reader->result && !file->skipped; i++) {
         if (text[i] != ' ' && text[i] != '\t' && text[i] != '\n' && text[i] != '\r') {
-            stop_on(file, rey_xml_fail(file->reader->ctx, parser_position(file), REY_ERROR_SCENE,
-                                       "text '%.*s' between the tags, expected tags only",
-                                       length - i < 20 ? length - i : 20, text + i));
+            rey_result result = rey_xml_fail(file->reader->ctx, parser_position(file), REY_ERROR_SCENE,
+                                             "text '%.*s' between the tags, expected tags only",
+                                             length - i < 20 ? length - i : 20, text + i);
+            stop_on(file, rey_xml_overlook(file->reader, result));
+            return;
         }
     }
 }
@@ -248,7 +277,7 @@ static rey_result read_document(XmlReader *reader, const char *path, const char 
     if (!result) {
         result = rey_xml_resolve_references(reader);
     }
-    if (!result && !reader->spare_defines) {
+    if (!result && !(reader->flags & REY_XML_SPARE)) {
         result = rey_xml_check_defines(reader, at);
     }
     rey_free(reader->ctx, loaded);
@@ -256,9 +285,9 @@ static rey_result read_document(XmlReader *reader, const char *path, const char 
 }
 
 static rey_result read_scene(rey_context *ctx, const char *path, const char *text, size_t bytes,
-                             const rey_define *defines, int define_count, bool spare, rey_xml_document **out) {
+                             const rey_define *defines, int define_count, int flags, rey_xml_document **out) {
     *out = NULL;
-    XmlReader reader = {.ctx = ctx, .document = rey_alloc(ctx, sizeof(rey_xml_document)), .spare_defines = spare};
+    XmlReader reader = {.ctx = ctx, .document = rey_alloc(ctx, sizeof(rey_xml_document)), .flags = flags};
     if (!reader.document) {
         return REY_ERROR_MEMORY;
     }
@@ -278,17 +307,17 @@ static rey_result read_scene(rey_context *ctx, const char *path, const char *tex
 
 rey_result rey_xml_read(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                         rey_xml_document **out) {
-    return read_scene(ctx, path, NULL, 0, defines, define_count, false, out);
+    return read_scene(ctx, path, NULL, 0, defines, define_count, 0, out);
 }
 
-rey_result rey_xml_read_spare(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
-                              rey_xml_document **out) {
-    return read_scene(ctx, path, NULL, 0, defines, define_count, true, out);
+rey_result rey_xml_read_with(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
+                             rey_xml_document **out) {
+    return read_scene(ctx, path, NULL, 0, defines, define_count, flags, out);
 }
 
 rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *text, size_t bytes,
                                const rey_define *defines, int define_count, rey_xml_document **out) {
-    return read_scene(ctx, path, text, bytes, defines, define_count, false, out);
+    return read_scene(ctx, path, text, bytes, defines, define_count, 0, out);
 }
 
 // ---- access ------------------------------------------------------------------------------------------------------
@@ -311,6 +340,10 @@ rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id) 
 
 const char *rey_xml_note(const rey_xml_document *document, int index) {
     return (size_t)index < document->notes.count ? ARRAY_AT(document->notes, const char *, index) : NULL;
+}
+
+const char *rey_xml_ignored(const rey_xml_document *document, int index) {
+    return (size_t)index < document->ignored.count ? ARRAY_AT(document->ignored, const char *, index) : NULL;
 }
 
 const char *rey_xml_tag_name(rey_xml_tag tag) {

@@ -112,9 +112,13 @@ enum {
 // with the content), REY_ERROR_MEMORY.
 rey_result rey_xml_read(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
                         rey_xml_document **out);
-// The same; defines that the scene never uses are no error.
-rey_result rey_xml_read_spare(rey_context *ctx, const char *path, const rey_define *defines, int define_count,
-                              rey_xml_document **out);
+// The same, with flags.
+enum {
+    REY_XML_SPARE = 1,   // defines that the scene never uses are no error
+    REY_XML_LENIENT = 2, // nor are elements that cannot be read: they are left out and listed, see rey_xml_ignored
+};
+rey_result rey_xml_read_with(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
+                             rey_xml_document **out);
 // The same from memory; path names the text in messages, and its folder is where files are looked up.
 rey_result rey_xml_read_memory(rey_context *ctx, const char *path, const char *text, size_t bytes,
                                const rey_define *defines, int define_count, rey_xml_document **out);
@@ -125,6 +129,7 @@ int rey_xml_node_count(const rey_xml_document *document);
 rey_xml_node *rey_xml_node_at(const rey_xml_document *document, int index);      // order of declaration
 rey_xml_node *rey_xml_find_id(const rey_xml_document *document, const char *id); // ids and aliases; null if unknown
 const char *rey_xml_note(const rey_xml_document *document, int index); // what a user should know; null at the end
+const char *rey_xml_ignored(const rey_xml_document *document, int index); // what was left out; null at the end
 const char *rey_xml_tag_name(rey_xml_tag tag);
 const char *rey_xml_kind_name(rey_xml_kind kind);
 

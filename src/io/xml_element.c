@@ -404,7 +404,7 @@ rey_result rey_xml_end_element(XmlFile *file) {
     if (frame->node) {
         result = end_object(file, frame);
     } else if (frame->tag->class == XML_VALUE && frame->tag->which == REY_XML_TRANSFORM_VALUE) {
-        result = add_property(reader, frame->transform);
+        result = rey_xml_overlook(reader, add_property(reader, frame->transform));
         frame = rey_xml_top_frame(reader);
     }
     rey_xml_free_frame(reader->ctx, frame);

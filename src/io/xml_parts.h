@@ -30,6 +30,7 @@ struct rey_xml_document {
     Array nodes;   // rey_xml_node *
     Array folders; // const char *, in the order of the <path> tags
     Array notes;   // const char *, literals: what a user should know about how it was read
+    Array ignored; // const char *: what a lenient reader left out, and why
     Array spectra; // double *, data of spectra read from files
     XmlIds ids;
     const char *folder; // of the scene file
@@ -65,6 +66,7 @@ typedef struct XmlFile { // one file being parsed; a chain from the innermost to
     int version[3];
     size_t base; // frames that were open when it began
     int depth;
+    int skipped; // elements open since one was left out
 } XmlFile;
 
 typedef struct XmlFrame { // one open element
@@ -86,7 +88,7 @@ typedef struct XmlReader {
     XmlFile *file;     // innermost
     int file_count;
     size_t bytes_read, substituted;
-    bool spare_defines; // the caller's defines may go unused
+    int flags;          // REY_XML_SPARE, REY_XML_LENIENT
 } XmlReader;
 
 // ---- grammar (xml_grammar.c) and elements (xml_element.c) --------------------------------------------------------
@@ -136,6 +138,8 @@ rey_result rey_xml_claim_name(XmlReader *reader, XmlFrame *frame, const char *na
 
 // ---- the others --------------------------------------------------------------------------------------------------
 
+// The result of reading a part: where it failed and the reader is lenient, lists why, and the part is left out (xml.c).
+rey_result rey_xml_overlook(XmlReader *reader, rey_result result);
 // Parses one file's text into the open frames (xml.c).
 rey_result rey_xml_parse_text(XmlReader *reader, const char *name, const char *text, size_t bytes);
 // Reads a file into rey_alloc'ed memory: the scene, whose place is nowhere, or else a regular file that one names (xml_file.c).

@@ -82,9 +82,16 @@ static rey_result link_children(XmlReader *reader, rey_xml_node *node) {
         child->node = rey_xml_lookup_id(&reader->document->ids, child->ref);
         if (!child->node) {
             IdCursor cursor = {&reader->document->ids, 0};
-            return rey_xml_fail_word(reader->ctx, child->at, child->ref, next_id, &cursor,
-                                     "unknown id '%.100s' in <ref>, expected the id of an object of this scene",
-                                     child->ref);
+            rey_result result = rey_xml_fail_word(reader->ctx, child->at, child->ref, next_id, &cursor,
+                                                  "unknown id '%.100s' in <ref>, expected the id of an object of this scene",
+                                                  child->ref);
+            result = rey_xml_overlook(reader, result);
+            if (result) {
+                return result;
+            }
+            node->child_count--;
+            memmove(child, child + 1, (size_t)(node->child_count - i) * sizeof *child);
+            i--;
         }
     }
     return REY_OK;
@@ -153,6 +160,11 @@ static rey_result load_spectra(XmlReader *reader, rey_xml_node *node) {
         rey_xml_property *property = &node->properties[i];
         if (property->kind == REY_XML_SPECTRUM_VALUE && property->string) {
             result = load_spectrum(reader, property);
+            if (result && !(result = rey_xml_overlook(reader, result))) {
+                node->property_count--;
+                memmove(property, property + 1, (size_t)(node->property_count - i) * sizeof *property);
+                i--;
+            }
         }
     }
     return result;

@@ -70,11 +70,16 @@ static const char *const broken_scene =
     "<string name='filename' value='none.png'/></texture></bsdf></shape>"
     "<shape type='ellipsoids'><bsdf type='diffuse' id='kept'><rgb name='reflectance' value='0.1 0.2 0.3'/></bsdf></shape>"
     "<shape type='rectangle'><ref id='kept'/></shape><shape type='obj'><string name='filename' value='no.obj'/></shape>"
+    "<gizmo type='odd'><bsdf type='diffuse' id='inner'/>words</gizmo>words"
+    "<shape type='sphere'><float name='radius' value='abc'/><ref id='inner'/><bsdf type='conductor'>"
+    "<spectrum name='eta' filename='no.spd'/></bsdf>"
+    "<transform name='to_world'><skew value='1'/><translate z='3'/></transform></shape>"
     "</scene>";
 
 static void lenient_reading_lists_what_it_leaves_out(void **state) {
     static const char *const words[] = {"stokes",   "zoom", "haze", "sunsky", "hair",
-                                        "212: there is no medium", "none.png", "ellipsoids",  "no.obj"};
+                                        "212: there is no medium", "none.png", "ellipsoids",  "no.obj",
+                                        "<gizmo>", "text 'words' between", "'abc'", "unknown id 'inner'", "no.spd", "<skew>"};
     static const char *const commands[] = {"params broken.xml --lenient --json", "info broken.xml --lenient --json",
                                            "render broken.xml --spp 2 -o a.npy --lenient --json",
                                            "convert broken.xml mended.xml --lenient --json"};
@@ -98,7 +103,7 @@ static void lenient_reading_lists_what_it_leaves_out(void **state) {
         }
     }
     expect(f, 1, "info broken.xml");
-    assert_non_null(strstr(f->words, "stokes"));
+    assert_non_null(strstr(f->words, "unknown tag <gizmo>"));
     expect(f, 0, "check broken.xml --lenient --param kept.reflectance.value --spp 16"); // which reads it twice
     expect(f, 0, "render mended.xml --spp 2 -o b.npy");
     assert_int_equal(system("cmp -s a.npy b.npy"), 0);
