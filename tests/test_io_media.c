@@ -121,8 +121,8 @@ static const struct {
      "the volume of a texture has 6 channels"},
     {"<bsdf type='bumpmap'><texture type='volume'>" GRID("v", "smoke.vol", "") "</texture><bsdf type='diffuse'/></bsdf>",
      "the texture of 'bumpmap' cannot be a volume"},
-    {"<shape type='sphere'><emitter type='area'><texture type='volume' name='radiance'>" GRID("v", "smoke.vol", "")
-     "</texture></emitter></shape>", "the radiance of a light on a 'sphere' cannot be a volume"},
+    {"<shape type='sphere'><emitter type='directionalarea'><texture type='volume' name='radiance'>" GRID("v", "smoke.vol", "")
+     "</texture></emitter></shape>", "'radiance' of 'directionalarea' cannot be a volume"},
     {"<emitter type='spot'><texture type='volume' name='texture'>" GRID("v", "smoke.vol", "") "</texture></emitter>",
      "'texture' of 'spot' cannot be a volume"},
     {HETERO(GRID("sigma_t", "no.vol", "")), "no.vol"},

@@ -15,7 +15,7 @@ KFN LightSample area_sample(const SceneView *scene, const Light *l, Vec3 ref, Ve
     LightSample s = light_at_point(ref, si.p);
     s.pdf = l->many ? shape_pdf_many(scene, shape->kind, id, ref, s.d, &si)
                     : shape_pdf(scene, l->e->shape, ref, s.d, &si);
-    s.uv = l->e->attributes ? (Vec2){hit.u, hit.v} : si.uv;
+    s.uv = light_sample_uv(scene, l->e, &hit, &si);
     s.prim = hit.prim;
     s.valid = s.valid & m_lt(v3_dot(s.d, si.sh.n), f_set(0)) & m_gt(f_abs(v3_dot(s.d, si.ng)), f_set(1e-7f)) &
               m_gt(s.pdf, f_set(0));

@@ -163,10 +163,14 @@ KFN LightSample emitter_sample(const SceneView *scene, const EmitterRecord *e, V
     return emitter_sample_as(scene, &l, ref, u);
 }
 
-// Where the texture of a sampled light is read. hit: room for the point's triangle.
+// Where the texture of a sampled light is read. hit: room for the point that it is read at.
 KFN TexCoord emitter_texcoord(const SceneView *scene, const EmitterRecord *e, Vec2 uv, Int prim, Hit *hit) {
     if (!e->attributes) {
         return texcoord(uv, NULL);
+    }
+    if (scene->shapes[e->shape].kind != SHAPE_MESH) {
+        *hit = hit_at(e->shape, shape_point(scene, e->shape, uv));
+        return texcoord(uv, hit);
     }
     *hit = (Hit){i_set(e->shape), prim, uv.x, uv.y, v3_zero(), i_set(0)};
     Interaction si = mesh_interaction(scene, scene->shapes[e->shape].flags, hit);

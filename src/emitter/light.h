@@ -11,10 +11,15 @@ typedef struct LightSample {
     Vec3 d;         // unit direction towards the light
     Float distance; // to the point; infinite lights: beyond the scene
     Float pdf;      // per solid angle; delta lights: 1
-    Vec2 uv;        // where the light is read, as its kind defines it; barycentrics of attributes and volumes (e->attributes)
+    Vec2 uv;        // where the light is read, as its kind defines it; light_sample_uv on surfaces
     Int prim;       // triangle of the light's mesh, else 0
     Mask valid;     // the light can be seen from there
 } LightSample;
+
+// Where a sampled surface is read: its texture coordinates; on meshes, of attributes and volumes, the barycentrics.
+KFN Vec2 light_sample_uv(const SceneView *scene, const EmitterRecord *e, const Hit *hit, const Interaction *si) {
+    return e->attributes && scene->shapes[e->shape].kind == SHAPE_MESH ? (Vec2){hit->u, hit->v} : si->uv;
+}
 
 typedef struct Light {
     const EmitterRecord *e; // the light, or one of the family

@@ -29,7 +29,7 @@ static NOINLINE ParticleStart start_surface(const SceneView *scene, const Emitte
     Interaction si = shape_interaction(scene, shape->kind, shape->flags, &hit);
     Float rcp = f_safe_rcp(start_area_pdf(scene, e->shape, &si));
     ParticleStart s = {.d = si.sh.n, .prim = hit.prim, .factor = rcp, .valid = m_set(true)};
-    s.uv = e->attributes ? (Vec2){hit.u, hit.v} : si.uv;
+    s.uv = light_sample_uv(scene, e, &hit, &si);
     if (e->kind != EMITTER_DIRECTIONALAREA) {
         Vec3 local = warp_cosine_hemisphere(u2);
         s.d = frame_to_world(&si.sh, local);

@@ -90,7 +90,7 @@ static void mark_emitters(Builder *b) {
         EmitterRecord *e = &ARRAY_AT(b->scene->build.emitters, EmitterRecord, i);
         if (e->shape >= 0) {
             const ShapeRecord *shape = &ARRAY_AT(b->scene->build.shapes, ShapeRecord, e->shape);
-            e->attributes = shape->kind == SHAPE_MESH && (reads_attributes(b, e->slot[0], -1) || build_is_volume(b, e->slot[0]));
+            e->attributes = build_is_volume(b, e->slot[0]) || (shape->kind == SHAPE_MESH && reads_attributes(b, e->slot[0], -1));
         }
     }
 }

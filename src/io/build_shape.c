@@ -279,13 +279,6 @@ rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, in
         TRY(build_forgive(b, &s, emitter, "", build_emitter(b, emitter->node, id, name, &shape->emitter), &left_out));
         emitter = left_out ? NULL : emitter;
     }
-    // Light samples tell where on a surface they lie by its triangle.
-    if (emitter && shape->kind != SHAPE_MESH &&
-        build_is_volume(b, ARRAY_AT(b->scene->build.emitters, EmitterRecord, shape->emitter).slot[0])) {
-        return rey_xml_fail(b->ctx, emitter->at, REY_ERROR_UNSUPPORTED,
-                            "the radiance of a light on a '%s' cannot be a volume, that of meshes, rectangles and cubes can",
-                            node->type);
-    }
     if (shape->kind == SHAPE_MESH && (emitter || sensor || (shape->flags & SHAPE_UNSEEN))) {
         shape->area_cdf = rey_scene_append(b->scene, &b->scene->build.tables, sizeof(float), shape->triangle_count);
         TRY(shape->area_cdf < 0 ? REY_ERROR_MEMORY : REY_OK);

@@ -121,7 +121,7 @@ typedef struct EmitterRecord {
     int32_t kind, shape;   // kind: emitter/kinds.inl; shape: of lights that are one, else -1
     int32_t slot[MAX_EMITTER_SLOTS]; // in the order of the kind's parameter list: textures, or theta offsets of places
     int32_t table;         // what the kind derives from its parameters, -1 = nothing
-    int32_t attributes;    // its texture reads mesh attributes or a volume, so samples say where by barycentrics
+    int32_t attributes;    // its texture reads mesh attributes or a volume: where, emitter_texcoord says
     int32_t family;        // lights of one family are handled in one call, with their numbers gathered; -1 = alone
     float weight;          // sampling weight, normalised: the probability of being chosen
 } EmitterRecord;

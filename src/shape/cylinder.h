@@ -100,13 +100,17 @@ KFN Interaction cylinder_interaction(const SceneView *scene, int32_t flags, cons
     return si;
 }
 
+// Where uv lies.
+KFN Vec3 cylinder_point(const SceneView *scene, Int at, Vec2 uv) {
+    Float sine, cosine;
+    f_sincos(TWO_PI * uv.x, &sine, &cosine);
+    return pose_to_world(scene, at, v3(cosine, sine, uv.y));
+}
+
 // Uniform over uv.
 KFN Hit cylinder_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
-    Int at = i_set(scene->shapes[id].table);
-    Float sine, cosine;
     UNUSED(ref);
-    f_sincos(TWO_PI * u.x, &sine, &cosine);
-    return hit_at(id, pose_to_world(scene, at, v3(cosine, sine, u.y)));
+    return hit_at(id, cylinder_point(scene, i_set(scene->shapes[id].table), u));
 }
 
 KFN Float cylinder_pdf(const SceneView *scene, int32_t id, Vec3 ref, Vec3 d, const Interaction *si) {

@@ -65,6 +65,13 @@ KFN Interaction disk_interaction(const SceneView *scene, int32_t flags, const Hi
     return si;
 }
 
+// Where uv lies.
+KFN Vec3 disk_point(const SceneView *scene, Int at, Vec2 uv) {
+    Float sine, cosine;
+    f_sincos(TWO_PI * uv.y, &sine, &cosine);
+    return pose_to_world(scene, at, v3(uv.x * cosine, uv.x * sine, f_set(0)));
+}
+
 // Uniform over the area.
 KFN Hit disk_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     const float *t = scene->tables + scene->shapes[id].table;

@@ -64,6 +64,15 @@ KFN Hit shape_sample(const SceneView *scene, int32_t id, Vec3 ref, Vec2 u) {
     }
 }
 
+// Where uv lies on shape `id`, of those that give light and are no meshes.
+KFN Vec3 shape_point(const SceneView *scene, int32_t id, Vec2 uv) {
+    const int32_t kind = scene->shapes[id].kind;
+    Int at = i_set(scene->shapes[id].table);
+    return kind == SHAPE_SPHERE ? sphere_point(scene, at, uv)
+           : kind == SHAPE_DISK ? disk_point(scene, at, uv)
+                                : cylinder_point(scene, at, uv);
+}
+
 // Kinds whose points and numbers move.h knows how to move; all slide.
 KFN bool shape_moves(int32_t kind) {
     return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK || kind == SHAPE_CYLINDER ||

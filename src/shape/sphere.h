@@ -59,6 +59,17 @@ KFN Interaction sphere_interaction(const SceneView *scene, int32_t flags, const 
     return si;
 }
 
+// Where uv lies.
+KFN Vec3 sphere_point(const SceneView *scene, Int at, Vec2 uv) {
+    Float sine, cosine, r, z;
+    f_sincos(TWO_PI * uv.x, &sine, &cosine);
+    f_sincos(PI * uv.y, &r, &z);
+    Vec3 n = v3_scale(table_v3(scene, at + 4), r * cosine);
+    n = v3_madd(n, r * sine, table_v3(scene, at + 7));
+    n = v3_madd(n, z, table_v3(scene, at + 10));
+    return v3_madd(table_v3(scene, at), table_at(scene, at + 3), n);
+}
+
 // The cone of directions that a sphere subtends from a point outside.
 typedef struct SphereCone {
     Vec3 to_centre;

@@ -289,7 +289,7 @@ static const RoomCase rooms[] = {{"tiles.xml", true, false},        {"edges.xml"
                                  {"fog.xml", false, true},          {"smoke.xml", false, true},
                                  {"media_flakes.xml", false, true}, {"media_pair.xml", false, true},
                                  {"dropped.xml", false, false},       {"sieve.xml", false, false},
-                                 {"glowing.xml", false, false}};
+                                 {"glowing.xml", false, false},      {"glowing_round.xml", false, false}};
 
 static void test_differences(void **state) {
     const RoomCase *r = *state;

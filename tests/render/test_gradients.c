@@ -272,7 +272,7 @@ static void test_difference_noise(void **state) {
         ONE_ROOM(test, "edges.xml"), ONE_ROOM(test, "moving_ball.xml"), ONE_ROOM(test, "moving_box.xml"), \
         ONE_ROOM(test, "moving_dome.xml"), ONE_ROOM(test, "moving_disk.xml"), ONE_ROOM(test, "fog.xml"), \
         ONE_ROOM(test, "smoke.xml"), ONE_ROOM(test, "media_pair.xml"), ONE_ROOM(test, "dropped.xml"),                     \
-        ONE_ROOM(test, "sieve.xml"), ONE_ROOM(test, "glowing.xml")
+        ONE_ROOM(test, "sieve.xml"), ONE_ROOM(test, "glowing.xml"), ONE_ROOM(test, "glowing_round.xml")
 
 int main(void) {
     const struct CMUnitTest tests[] = {
