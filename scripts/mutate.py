@@ -74,6 +74,8 @@ TESTS = [("src/integrator/kept.h", DROPPED), ("src/emitter/envmap.h", ["test_lig
          ("src/integrator/boundary/facet.h", ["test_edge_curves", BOUNDARY + " turning_"]),
          ("src/integrator/boundary/segments.h", [BOUNDARY + " boundary_near"] + EDGES),
          ("src/integrator/boundary/edge.h", ["test_edge_points", "test_edge_curves"] + EDGES),
+         ("src/integrator/boundary/round.h", ["test_edge_points", BOUNDARY + " boundary_rope.xml lamp", BOUNDARY + " boundary_rope.xml camera",
+                                              BOUNDARY + " boundary_group.xml camera"] + EDGES),
          ("src/integrator/boundary/view.h", ["test_edge_points"] + EDGES),
          ("src/integrator/boundary/turning.h", [BOUNDARY + " turning_"]),
          ("src/integrator/boundary/chained.h", [BOUNDARY + " mirror_"]),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "accel/spheres.h"
+#include "accel/tubes.h"
 
 #include <embree3/rtcore.h>
 
@@ -80,6 +81,9 @@ KFN Hit packet_closest(const SceneView *scene, const Ray *ray, Int sphere, Mask 
     }
     found = mi_lt(i_set(-1), hit.shape);
     hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
+    if (scene->segments_count) {
+        tubes_refine(scene, ray, &hit, m);
+    }
     return hit;
 }
 

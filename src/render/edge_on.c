@@ -185,10 +185,23 @@ static bool border_jumps_at(const SceneView *view, const ShapeRecord *shape, con
            (shape->exterior >= 0 && jumps_at(view, shape->exterior, face));
 }
 
+// A pose of a shapegroup's space in the world.
+static void pose_within(const float *instance, const float *own, float out[12]) {
+    for (int i = 0; i < 12; i++) {
+        const float *row = instance + 4 * (i / 4);
+        out[i] = row[0] * own[i % 4] + row[1] * own[4 + i % 4] + row[2] * own[8 + i % 4] + (i % 4 == 3 ? row[3] : 0);
+    }
+}
+
 // The same of a shape, where an instance has it: its flat parts, and what is flat along the axis of a cylinder.
 static bool shape_runs_along(const SceneView *view, const ShapeRecord *shape, const float *instance, const Beam *beam) {
     static const float around[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
     const float *pose = shape->to_world >= 0 ? view->theta + shape->to_world : NULL;
+    float both[12];
+    if (pose && instance) {
+        pose_within(instance, pose, both);
+        pose = both;
+    }
     if (shape->kind == SHAPE_DISK) {
         Face face = face_of(pose, around, 4);
         return runs_along(beam, &face) && border_jumps_at(view, shape, &face);

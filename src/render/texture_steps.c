@@ -107,11 +107,10 @@ const char *rey_lines_unknown(const SceneView *view, const int32_t *to_uv_at, in
     }
     for (int32_t i = 0; i < (int32_t)view->shapes_count; i++) {
         const ShapeRecord *s = view->shapes + i;
-        bool known = s->kind == SHAPE_MESH || (s->collection < 0 && (s->kind == SHAPE_SPHERE || s->kind == SHAPE_DISK ||
-                                                                     s->kind == SHAPE_CYLINDER));
+        bool known = s->kind == SHAPE_MESH || s->kind == SHAPE_SPHERE || s->kind == SHAPE_DISK || s->kind == SHAPE_CYLINDER;
         if (!known && (bsdf_has_lines(view, to_uv_at, s->bsdf) || emitter_has_lines(view, to_uv_at, s->emitter))) {
             *shape = i;
-            return "the lines along which textures jump on curves, grids of distances and round shapes in shapegroups";
+            return "the lines along which textures jump on curves and grids of distances";
         }
     }
     return NULL;

@@ -12,6 +12,20 @@ typedef struct CurvePoint {
     Float r, r1;
 } CurvePoint;
 
+// Weights of the control points in value, first, second and third derivative.
+typedef struct CurveWeights {
+    Float b[BSPLINE_POINTS], b1[BSPLINE_POINTS], b2[BSPLINE_POINTS], b3[BSPLINE_POINTS];
+} CurveWeights;
+
+KFN CurveWeights bspline_weights(Float v) {
+    Float w = 1.0f - v, v2 = v * v;
+    return (CurveWeights){{w * w * w * (1.0f / 6), (3.0f * v2 * v - 6.0f * v2 + 4.0f) * (1.0f / 6),
+                           (-3.0f * v2 * v + 3.0f * v2 + 3.0f * v + 1.0f) * (1.0f / 6), v2 * v * (1.0f / 6)},
+                          {-0.5f * w * w, 0.5f * (3.0f * v2 - 4.0f * v), 0.5f * (-3.0f * v2 + 2.0f * v + 1.0f), 0.5f * v2},
+                          {w, 3.0f * v - 2.0f, 1.0f - 3.0f * v, v},
+                          {f_set(-1), f_set(3), f_set(-3), f_set(1)}};
+}
+
 // Sums control points [first, first + n) of a shape with the weights of value, first and second derivative.
 KFN CurvePoint curve_sum(const SceneView *scene, const Hit *hit, int n, const Float *b, const Float *b1, const Float *b2) {
     Int segment = SHAPE_FIELD(scene, hit->shape, segment) + hit->prim;
@@ -59,12 +73,8 @@ KFN Interaction curve_finish(int32_t flags, Interaction si) {
 
 // Swept circle p = c + r e, e perpendicular to T = c' / |c'|: n is parallel to e - T r' / (|c'| - r (c'' . e) / |c'|).
 KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
-    Float v = hit->u, w = 1.0f - v, v2 = v * v;
-    Float b[4] = {w * w * w * (1.0f / 6), (3.0f * v2 * v - 6.0f * v2 + 4.0f) * (1.0f / 6),
-                  (-3.0f * v2 * v + 3.0f * v2 + 3.0f * v + 1.0f) * (1.0f / 6), v2 * v * (1.0f / 6)};
-    Float b1[4] = {-0.5f * w * w, 0.5f * (3.0f * v2 - 4.0f * v), 0.5f * (-3.0f * v2 + 2.0f * v + 1.0f), 0.5f * v2};
-    Float b2[4] = {w, 3.0f * v - 2.0f, 1.0f - 3.0f * v, v};
-    CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, b, b1, b2);
+    CurveWeights w = bspline_weights(hit->u);
+    CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
     Float speed = v3_length(p.c1);
     Vec3 tangent = v3_scale(p.c1, f_safe_rcp(speed)), away = v3_sub(hit->p, p.c);
     Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));

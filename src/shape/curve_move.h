@@ -30,20 +30,6 @@ KFN void curve_frame_adj(Vec3 tangent, Vec3 ds, Vec3 dt, Vec3 *dtangent) {
     dtangent->y = dtangent->y - dlevel.x;
 }
 
-// Weights of the control points in value, first, second and third derivative.
-typedef struct CurveWeights {
-    Float b[BSPLINE_POINTS], b1[BSPLINE_POINTS], b2[BSPLINE_POINTS], b3[BSPLINE_POINTS];
-} CurveWeights;
-
-KFN CurveWeights bspline_weights(Float v) {
-    Float w = 1.0f - v, v2 = v * v;
-    return (CurveWeights){{w * w * w * (1.0f / 6), (3.0f * v2 * v - 6.0f * v2 + 4.0f) * (1.0f / 6),
-                           (-3.0f * v2 * v + 3.0f * v2 + 3.0f * v + 1.0f) * (1.0f / 6), v2 * v * (1.0f / 6)},
-                          {-0.5f * w * w, 0.5f * (3.0f * v2 - 4.0f * v), 0.5f * (-3.0f * v2 + 2.0f * v + 1.0f), 0.5f * v2},
-                          {w, 3.0f * v - 2.0f, 1.0f - 3.0f * v, v},
-                          {f_set(-1), f_set(3), f_set(-3), f_set(1)}};
-}
-
 // The tube at a hit: tangent, unit vectors away from the axis and around it, and the former's coordinates in the frame
 // about the tangent, which attached points keep.
 typedef struct CurveAxes {

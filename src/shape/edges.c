@@ -283,14 +283,30 @@ static rey_result mesh_terminators(rey_scene *scene, int32_t id, Array *edges) {
     return result;
 }
 
-// Another curve, in pieces.
-static rey_result curve_edges(rey_scene *scene, int32_t id, int32_t kind, int32_t end, Array *edges) {
-    const int32_t pieces = kind == EDGE_SIDE ? 8 : 64;
+// A curve of a round shape, in pieces.
+static rey_result round_edges(rey_scene *scene, int32_t id, int32_t kind, int32_t end, Array *edges) {
+    const int32_t pieces = kind == EDGE_SIDE || scene->view.shapes[id].collection >= 0 ? 8 : 64;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < pieces && result == REY_OK; i++) {
         EdgeRecord e = {.kind = kind, .shape = id, .corner = end, .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE,
                         .first = (float)i / (float)pieces, .last = (float)(i + 1) / (float)pieces};
         result = push_edge(scene, edges, e);
+    }
+    return result;
+}
+
+// Both sides of every segment of a B-spline curve, and the circles where control points do not go on.
+static rey_result tube_edges(rey_scene *scene, int32_t id, Array *edges) {
+    const ShapeRecord *shape = scene->view.shapes + id;
+    const int32_t *first = scene->view.segments + shape->segment;
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < shape->segment_count; i++) {
+        bool begins = i == 0 || first[i - 1] + 1 != first[i], last = i + 1 == shape->segment_count || first[i + 1] != first[i] + 1;
+        for (int32_t k = 0; k < 4 && result == REY_OK; k++) {
+            EdgeRecord e = {.kind = k < 2 ? EDGE_TUBE : EDGE_TUBE_END, .shape = id, .prim = i, .corner = k % 2,
+                            .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};
+            result = k < 2 || (k == 2 ? begins : last) ? push_edge(scene, edges, e) : REY_OK;
+        }
     }
     return result;
 }
@@ -313,16 +329,19 @@ rey_result rey_edges_find(rey_scene *scene, const Array *steps, Array *edges, Ar
             result = result == REY_OK ? mesh_terminators(scene, id, edges) : result;
             break;
         case SHAPE_SPHERE:
-            result = curve_edges(scene, id, EDGE_OUTLINE, 0, edges);
+            result = round_edges(scene, id, EDGE_OUTLINE, 0, edges);
             break;
         case SHAPE_CYLINDER:
             for (int32_t end = 0; end < 2 && result == REY_OK; end++) {
-                result = curve_edges(scene, id, EDGE_SIDE, end, edges);
-                result = result == REY_OK ? curve_edges(scene, id, EDGE_RIM, end, edges) : result;
+                result = round_edges(scene, id, EDGE_SIDE, end, edges);
+                result = result == REY_OK ? round_edges(scene, id, EDGE_RIM, end, edges) : result;
             }
             break;
         case SHAPE_DISK:
-            result = curve_edges(scene, id, EDGE_RIM, 0, edges);
+            result = round_edges(scene, id, EDGE_RIM, 0, edges);
+            break;
+        case SHAPE_BSPLINE:
+            result = tube_edges(scene, id, edges);
             break;
         default:
             break;

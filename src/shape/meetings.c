@@ -4,6 +4,7 @@
 #include "shape/shape.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #define TOUCH 1e-4 // of the smaller triangle's size
 
@@ -40,17 +41,36 @@ static Quadric quadric_of_cylinder(const float *table) {
     return q;
 }
 
+// One of a shapegroup's space, without a linear part, in the world: M becomes A^T M A, A the linear part of the inverse, times a
+// length. table: rows of to_world and of its inverse.
+static Quadric quadric_of_instance(const float *table, const Quadric *own) {
+    const float *m = own->matrix, *a = table + 12;
+    const float full[3][3] = {{m[0], m[5], m[4]}, {m[5], m[1], m[3]}, {m[4], m[3], m[2]}};
+    static const int at[6][2] = {{0, 0}, {1, 1}, {2, 2}, {1, 2}, {2, 0}, {0, 1}};
+    float size = 1 / sqrtf(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+    Quadric q = {.constant = own->constant * size};
+    for (int k = 0; k < 3; k++) {
+        const float *row = table + 4 * k, *c = own->centre;
+        q.centre[k] = row[0] * c[0] + row[1] * c[1] + row[2] * c[2] + row[3];
+    }
+    for (int k = 0; k < 6; k++) {
+        for (int i = 0; i < 9; i++) {
+            q.matrix[k] += size * a[4 * (i / 3) + at[k][0]] * full[i / 3][i % 3] * a[4 * (i % 3) + at[k][1]];
+        }
+    }
+    return q;
+}
+
 static Quadric quadric_of(const Pieces *s, const Body *body, const Triangle *t) {
     const SceneView *view = &s->scene->view;
     const ShapeRecord *shape = body->shape < 0 ? NULL : view->shapes + body->shape;
     if (!shape && s->borders[body->instance].round) {
         return s->borders[body->instance].cone;
     }
-    if (shape && shape->kind == SHAPE_SPHERE) {
-        return quadric_of_sphere(view->tables + shape->table);
-    }
-    if (shape && shape->kind == SHAPE_CYLINDER) {
-        return quadric_of_cylinder(view->tables + shape->table);
+    if (shape && (shape->kind == SHAPE_SPHERE || shape->kind == SHAPE_CYLINDER)) {
+        const float *table = view->tables + shape->table;
+        Quadric q = shape->kind == SHAPE_SPHERE ? quadric_of_sphere(table) : quadric_of_cylinder(table);
+        return shape->collection < 0 ? q : quadric_of_instance(view->tables + view->instances[body->instance].table, &q);
     }
     return quadric_of_plane(t);
 }
@@ -106,6 +126,18 @@ static bool share_vertex(const SceneView *view, const ShapeRecord *shape, int32_
     return false;
 }
 
+// So do the segments of a strand.
+static bool share_strand(const SceneView *view, const ShapeRecord *shape, int32_t a, int32_t b) {
+    const int32_t *first = view->segments + shape->segment;
+    return abs(first[a / REY_TUBE_PIECES] - first[b / REY_TUBE_PIECES]) <= 1;
+}
+
+// Whether two pieces of one body may meet.
+static bool may_meet_itself(const SceneView *view, const ShapeRecord *shape, int32_t a, int32_t b) {
+    return shape->kind == SHAPE_MESH ? !share_vertex(view, shape, a, b)
+                                     : shape->kind == SHAPE_BSPLINE && !share_strand(view, shape, a, b);
+}
+
 static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     const SceneView *view = &s->scene->view;
@@ -115,8 +147,7 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
         return REY_OK;
     }
     const ShapeRecord *shape = view->shapes + body[0]->shape;
-    if (piece[0]->body == piece[1]->body &&
-        (shape->kind != SHAPE_MESH || share_vertex(view, shape, piece[0]->triangle, piece[1]->triangle))) {
+    if (piece[0]->body == piece[1]->body && !may_meet_itself(view, shape, piece[0]->triangle, piece[1]->triangle)) {
         return REY_OK;
     }
     Triangle t[2] = {rey_piece_triangle(s, piece[0]), rey_piece_triangle(s, piece[1])};
@@ -125,18 +156,20 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     if (!rey_triangles_meet(t, t + 1, rey_triangle_passes, TOUCH, ends)) {
         return REY_OK;
     }
-    bool round = false;
+    bool round = false, tube = false;
     for (int i = 0; i < 2; i++) {
         const LightBorder *border = body[i]->shape < 0 ? s->borders + body[i]->instance : NULL;
-        bool mesh = border ? !border->round : view->shapes[body[i]->shape].kind == SHAPE_MESH;
+        const int32_t kind = border ? -1 : view->shapes[body[i]->shape].kind;
+        bool mesh = border ? !border->round : kind == SHAPE_MESH;
         m.shape[i] = body[i]->shape;
         m.instance[i] = border ? 0 : body[i]->instance;
         m.prim[i] = border ? border->light : mesh ? piece[i]->triangle : 0;
         m.surface[i] = quadric_of(s, body[i], t + i);
         round |= !mesh;
+        tube |= kind == SHAPE_BSPLINE;
     }
     double near = 0.1 * fmin(t[0].size, t[1].size);
-    if (round && !(meet_at(m.surface, ends[0], near) && meet_at(m.surface, ends[1], near))) {
+    if (round && !tube && !(meet_at(m.surface, ends[0], near) && meet_at(m.surface, ends[1], near))) {
         return REY_OK;
     }
     for (int i = 0; i < 6; i++) {

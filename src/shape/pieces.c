@@ -1,4 +1,4 @@
-// pieces.c: round surfaces are cut into triangles to find where they may meet.
+// pieces.c: round surfaces are cut into triangles to find where they may meet. Those of tubes are outside of them.
 #include "shape/pieces.h"
 
 #include "shape/affine.h"
@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { AROUND = 64, STACKS = 32 };
+enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 8, TUBE_STACKS = 4 };
 
 static void affine_point(const float *m, const double p[3], double out[3]) {
     for (int k = 0; k < 3; k++) {
@@ -31,6 +31,8 @@ static int32_t triangles_of(const SceneView *view, int32_t id) {
         return 2 * AROUND;
     case SHAPE_DISK:
         return AROUND;
+    case SHAPE_BSPLINE:
+        return REY_TUBE_PIECES * shape->segment_count;
     default:
         return 0;
     }
@@ -64,6 +66,61 @@ static void round_corner(const SceneView *view, const ShapeRecord *shape, int32_
     }
 }
 
+// Unit vector along v less its part along the unit vector t.
+static void across_of(const double v[3], const double t[3], double out[3]) {
+    double along = dot3(v, t), length2 = 0;
+    for (int k = 0; k < 3; k++) {
+        out[k] = v[k] - along * t[k];
+        length2 += out[k] * out[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        out[k] = length2 > 0 ? out[k] / sqrt(length2) : 0;
+    }
+}
+
+// Centre, unit tangent and radius of a segment at position u.
+static double tube_axis(const float *p, double u, double c[3], double tangent[3]) {
+    double w = 1 - u, b[4] = {w * w * w / 6, (3 * u * u * u - 6 * u * u + 4) / 6, (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6,
+                              u * u * u / 6};
+    double d[4] = {-0.5 * w * w, 0.5 * (3 * u * u - 4 * u), 0.5 * (-3 * u * u + 2 * u + 1), 0.5 * u * u}, sum[4] = {0}, v[3] = {0};
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 4; k++) {
+            sum[k] += b[i] * (double)p[4 * i + k];
+        }
+        for (int k = 0; k < 3; k++) {
+            v[k] += d[i] * (double)p[4 * i + k];
+        }
+    }
+    double length = sqrt(dot3(v, v));
+    for (int k = 0; k < 3; k++) {
+        c[k] = sum[k];
+        tangent[k] = length > 0 ? v[k] / length : 0;
+    }
+    return sum[3];
+}
+
+// Of a tube's triangle: nodes around the axis count from a vector that goes along it without turning about it.
+static void tube_corner(const SceneView *view, const ShapeRecord *shape, int32_t triangle, int corner, double p[3]) {
+    static const int32_t corners[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
+    int32_t cell = triangle % REY_TUBE_PIECES / 2;
+    const int32_t *at = corners[triangle % 2][corner];
+    const int32_t column = cell % TUBE_AROUND + at[0], row = cell / TUBE_AROUND + at[1];
+    const float *points = view->theta + shape->positions +
+                          4 * (int64_t)view->segments[shape->segment + triangle / REY_TUBE_PIECES];
+    const double pi = 3.14159265358979323846, phi = 2 * pi * column / TUBE_AROUND;
+    double c[3], t[3], e[3], f[3], radius = tube_axis(points, 0, c, t);
+    double least[3] = {fabs(t[0]) < 0.5, fabs(t[0]) >= 0.5, 0};
+    across_of(least, t, e);
+    for (int32_t i = 1; i <= row; i++) {
+        radius = tube_axis(points, (double)i / TUBE_STACKS, c, t);
+        across_of(e, t, e);
+    }
+    cross3(t, e, f);
+    for (int k = 0; k < 3; k++) {
+        p[k] = c[k] + radius / cos(pi / TUBE_AROUND) * (cos(phi) * e[k] + sin(phi) * f[k]);
+    }
+}
+
 const int32_t *rey_mesh_triangle(const SceneView *view, const ShapeRecord *shape, int32_t triangle) {
     return view->triangles + 3 * ((int64_t)shape->triangle + triangle);
 }
@@ -77,12 +134,17 @@ static void corner_of(const Pieces *s, const Body *body, int32_t triangle, int k
         return;
     }
     const ShapeRecord *shape = view->shapes + body->shape;
-    if (shape->kind != SHAPE_MESH) {
-        round_corner(view, shape, triangle, k, p);
-        return;
+    double q[3];
+    if (shape->kind == SHAPE_MESH) {
+        const float *own = view->theta + shape->positions + 3 * (int64_t)rey_mesh_triangle(view, shape, triangle)[k];
+        for (int c = 0; c < 3; c++) {
+            q[c] = (double)own[c];
+        }
+    } else if (shape->kind == SHAPE_BSPLINE) {
+        tube_corner(view, shape, triangle, k, q);
+    } else {
+        round_corner(view, shape, triangle, k, q);
     }
-    const float *own = view->theta + shape->positions + 3 * (int64_t)rey_mesh_triangle(view, shape, triangle)[k];
-    double q[3] = {(double)own[0], (double)own[1], (double)own[2]};
     if (shape->collection >= 0) {
         affine_point(view->theta + view->instances[body->instance].to_world, q, p);
     } else {
@@ -211,7 +273,8 @@ static rey_result add_body(Pieces *s, int32_t shape, int32_t instance) {
     }
     widen(s, box);
     box->moves = s->moves(s->user, shape, shape < 0 ? s->borders[instance].light : instance);
-    body->meets = s->itself && shape >= 0 && box->moves && s->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
+    const int32_t kind = shape >= 0 ? s->scene->view.shapes[shape].kind : -1;
+    body->meets = s->itself && box->moves && (kind == SHAPE_MESH || kind == SHAPE_BSPLINE); // itself
     return REY_OK;
 }
 

@@ -25,6 +25,9 @@ typedef struct Body {
     int32_t meets; // may meet another
 } Body;
 
+// So many triangles stand for one segment of a tube.
+enum { REY_TUBE_PIECES = 64 };
+
 // A triangle of a body's mesh, or of those that stand for a round shape.
 typedef struct Piece {
     int32_t body, triangle;

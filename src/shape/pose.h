@@ -72,6 +72,10 @@ KFN Vec3 pose_to_local(const SceneView *scene, Int at, Vec3 p) {
     return v3(r[0], r[1], r[2]);
 }
 
+KFN Vec3 pose_direction_to_local(const SceneView *scene, Int at, Vec3 d) {
+    return v3(v3_dot(table_v3(scene, at + 12), d), v3_dot(table_v3(scene, at + 16), d), v3_dot(table_v3(scene, at + 20), d));
+}
+
 KFN Vec3 pose_column(const SceneView *scene, Int at, int column) {
     return v3(table_at(scene, at + column), table_at(scene, at + (4 + column)), table_at(scene, at + (8 + column)));
 }

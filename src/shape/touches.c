@@ -2,6 +2,7 @@
 #include "shape/touches.h"
 
 #include "shape/pieces.h"
+#include "shape/shape.h"
 
 #include <math.h>
 
@@ -41,11 +42,16 @@ static bool parts(const Triangle *a, const Triangle *b, const double n[3]) {
     return false;
 }
 
+static bool is_tube(const Pieces *s, const Piece *piece) {
+    const int32_t shape = ARRAY_AT(s->bodies, Body, piece->body).shape;
+    return shape >= 0 && s->scene->view.shapes[shape].kind == SHAPE_BSPLINE;
+}
+
 static rey_result pieces_touch(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     Touches *touches = (Touches *)(uintptr_t)s->user;
     const Piece *piece[2] = {&ARRAY_AT(s->pieces, Piece, first), &ARRAY_AT(s->pieces, Piece, second)};
-    if (touches->found || piece[0]->body == piece[1]->body) {
+    if (touches->found || piece[0]->body == piece[1]->body || is_tube(s, piece[0]) || is_tube(s, piece[1])) {
         return REY_OK;
     }
     Triangle a = rey_piece_triangle(s, piece[0]), b = rey_piece_triangle(s, piece[1]);

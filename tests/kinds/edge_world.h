@@ -12,9 +12,10 @@
 
 #include <cmocka.h>
 
-enum { POSITIONS, NORMALS = 12, POSE = 24, INSTANCE = 40, CAMERA = 56, FOV = 72, PRINCIPAL = 73, LENS = 75, NUMBERS = 77 };
+enum { POSITIONS, NORMALS = 12, POSE = 24, INSTANCE = 40, CAMERA = 56, FOV = 72, PRINCIPAL = 73, LENS = 75, CONTROLS = 77,
+       NUMBERS = 93 };
 enum { INSTANCE_AT = 24, TABLES = 48, ROUNDS = 50 };
-enum { MESH, INSTANCED, DISK, CYLINDER, SPHERE, SHAPES };
+enum { MESH, INSTANCED, DISK, CYLINDER, SPHERE, TUBE, SHAPES };
 
 typedef struct World {
     SceneView scene;
@@ -26,7 +27,7 @@ typedef struct World {
     MeetingRecord meeting;
     BoundaryJob job;
     float theta[NUMBERS], tables[TABLES], spheres[SPHERE_TABLE + TABLES], cdf[2];
-    int32_t triangles[6];
+    int32_t triangles[6], segments[1];
 } World;
 
 // Which shapes move.
@@ -37,8 +38,8 @@ static inline const int32_t *world_live(void) {
 
 // A reverse sink of all numbers of theta; instance_at: where the instance's begin, or -1.
 static inline Sink world_sink(double *gradient, const int32_t *instance_at) {
-    static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1};
-    static const int32_t normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1}, pose_at[SHAPES] = {-1, -1, POSE, -1, -1};
+    static const int32_t points_at[SHAPES] = {POSITIONS, POSITIONS, -1, -1, -1, -1};
+    static const int32_t normals_at[SHAPES] = {NORMALS, NORMALS, -1, -1, -1, -1}, pose_at[SHAPES] = {-1, -1, POSE, -1, -1, -1};
     static const int32_t camera_at[CAMERA_NUMBERS] = {CAMERA, FOV, PRINCIPAL, PRINCIPAL + 1, -1, -1};
     return (Sink){.gradient = gradient,
                   .points_at = points_at,
@@ -86,6 +87,13 @@ static inline void world_make(World *w, uint64_t *random) {
             w->theta[POSE + 16 * i + (k < 3 ? 5 * k : 0)] += k < 3 ? 2.5f : 0;
         }
     }
+    for (int i = 0; i < 4; i++) { // control points of a tube that bends and widens
+        float *point = w->theta + CONTROLS + 4 * i;
+        point[0] = 0.8f * (float)i + 0.1f * point[0];
+        point[1] *= 0.2f;
+        point[2] *= 0.2f;
+        point[3] = 0.3f + 0.1f * point[3];
+    }
     assert_true(pose_table(w->theta + POSE, w->tables) && pose_table(w->theta + INSTANCE, w->tables + INSTANCE_AT));
     const float sphere[4] = {uniform(random), uniform(random), uniform(random), 1.2f + 0.5f * uniform(random)};
     memcpy(w->spheres, w->tables, sizeof w->tables);
@@ -100,6 +108,7 @@ static inline void world_make(World *w, uint64_t *random) {
     w->shapes[DISK] = (ShapeRecord){.kind = SHAPE_DISK, .to_world = POSE, .collection = -1};
     w->shapes[CYLINDER] = (ShapeRecord){.kind = SHAPE_CYLINDER, .to_world = POSE, .collection = -1};
     w->shapes[SPHERE] = (ShapeRecord){.kind = SHAPE_SPHERE, .table = TABLES, .collection = -1};
+    w->shapes[TUBE] = (ShapeRecord){.kind = SHAPE_BSPLINE, .positions = CONTROLS, .segment_count = 1, .collection = -1};
     for (int i = 0; i < SHAPES; i++) {
         w->shapes[i].group = i;
         w->groups[i] = (Group){.shape_kind = w->shapes[i].kind, .shape_flags = w->shapes[i].flags, .emitter = -1};
@@ -115,6 +124,7 @@ static inline void world_make(World *w, uint64_t *random) {
     w->scene.groups = w->groups;
     w->scene.instances = &w->instance;
     w->scene.triangles = w->triangles;
+    w->scene.segments = w->segments;
 }
 
 static inline EdgePoint point_of(const World *w, float u, Vec3 eye, bool parallel) {

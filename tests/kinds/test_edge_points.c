@@ -137,9 +137,87 @@ static void test_outlines(void **state) {
             assert_true(v3_length(v3_sub(point_of(&w, u, eye, parallel).p, e.p)) > 0.5f);
         }
         Vec3 middle = sphere ? table_v3(&w.scene, TABLES) : pose_to_world(&w.scene, 0, v3(0, 0, 0.5f));
-        assert_near_v3("middle", edge_reference(&w.scene, &e), middle, 1e-5);
+        assert_near_v3("middle", edge_reference(&e), middle, 1e-5);
     }
     assert_true(judged > ROUNDS / 2);
+}
+
+static void test_tubes(void **state) {
+    (void)state;
+    uint64_t random = 4;
+    int judged = 0;
+    for (int round = 0; round < ROUNDS; round++) {
+        World w;
+        world_make(&w, &random);
+        const bool parallel = round % 2, side = round / 2 % 2;
+        float u = 0.5f + 0.4f * uniform(&random), t = 0.1f + 0.7f * u;
+        w.edges[1].kind = EDGE_TUBE;
+        w.edges[1].shape = TUBE;
+        w.edges[1].corner = side;
+        Vec3 eye = v3(0.4f * uniform(&random), 1, uniform(&random)); // not along the tube
+        eye = parallel ? v3_normalize(eye) : v3_add(v3(1.2f, 0, 0), v3_scale(eye, 4));
+        EdgePoint e = point_of(&w, u, eye, parallel);
+        CurveWeights b = bspline_weights(t);
+        CurvePoint c = curve_sum(&w.scene, &e.hit, BSPLINE_POINTS, b.b, b.b1, b.b2);
+        Vec3 view = v3_normalize(towards_eye(eye, parallel, e.p)), away = v3_sub(e.p, c.c);
+        Vec3 n = bspline_interaction(&w.scene, 0, &e.hit).ng;
+        assert_near("position", e.hit.u, t, 1e-6);
+        assert_near_v3("middle", edge_reference(&e), c.c, 1e-5);
+        assert_near("distance from the axis", v3_length(away), c.r, 1e-5);
+        assert_near("foot", v3_dot(away, c.c1), 0, 1e-5);
+        assert_near("normal along the view", v3_dot(n, view), 0, 2e-5);
+        assert_near("into the tube", v3_dot(v3_normalize(e.side[0]), n), v3_dot(e.outside, e.outside) > 0 ? 1 : -1, 1e-5);
+        check_tangent(&w, &e, u, eye, parallel);
+        Hit inner = e.hit;
+        inner.p = e.inner;
+        assert_near("distance of the inner point", v3_length(v3_sub(e.inner, c.c)), c.r, 1e-5);
+        assert_near("angle beside it", v3_dot(bspline_interaction(&w.scene, 0, &inner).ng, view), OUTLINE_TURN, 0.3 * OUTLINE_TURN);
+        w.edges[1].corner = !side;
+        assert_true(v3_length(v3_sub(point_of(&w, u, eye, parallel).p, e.p)) > c.r);
+        judged += v3_length(e.tangent) > 0;
+        // The ends are circles that bound the tube, seen from outside of it.
+        w.edges[1].kind = EDGE_TUBE_END;
+        e = point_of(&w, u, v3_zero(), false);
+        Interaction si = bspline_interaction(&w.scene, 0, &e.hit);
+        assert_near("end", e.hit.u, !side, 0);
+        assert_near_v3("point of the end", si.p, e.p, 1e-5);
+        assert_near_v3("seen from", e.outside, si.ng, 1e-5);
+        assert_near("along the tube", v3_dot(v3_normalize(e.side[0]), v3_normalize(si.dp_dv)), side ? 1 : -1, 1e-5);
+        check_tangent(&w, &e, u, v3_zero(), false);
+    }
+    assert_true(judged > ROUNDS / 2);
+}
+
+// In a shapegroup all is as in the group's own space, through the instance.
+static void test_instanced(void **state) {
+    (void)state;
+    static const int32_t kinds[5][2] = {{EDGE_RIM, DISK}, {EDGE_RIM, CYLINDER}, {EDGE_SIDE, CYLINDER}, {EDGE_OUTLINE, SPHERE},
+                                        {EDGE_TUBE, TUBE}};
+    uint64_t random = 5;
+    for (int round = 0; round < ROUNDS; round++) {
+        World w;
+        world_make(&w, &random);
+        const bool parallel = round % 2;
+        float u = 0.5f + 0.4f * uniform(&random);
+        w.edges[1].kind = kinds[round % 5][0];
+        w.edges[1].shape = kinds[round % 5][1];
+        Vec3 eye = v3_scale(v3_normalize(random_vector(&random)), parallel ? 1 : 12);
+        EdgePoint own = point_of(&w, u, eye, parallel);
+        w.shapes[w.edges[1].shape].collection = 0;
+        eye = parallel ? instance_vector(&w.scene, INSTANCE_AT, eye) : pose_to_world(&w.scene, INSTANCE_AT, eye);
+        EdgePoint e = point_of(&w, u, eye, parallel);
+        float size = 1 + v3_length(e.p) + v3_length(e.tangent);
+        if (v3_length(own.tangent) == 0) {
+            continue; // an eye in the cylinder
+        }
+        assert_near_v3("point", e.p, pose_to_world(&w.scene, INSTANCE_AT, own.p), 1e-4 * size);
+        assert_near_v3("tangent", e.tangent, instance_vector(&w.scene, INSTANCE_AT, own.tangent), 1e-3 * size);
+        assert_near_v3("side", e.side[0], instance_vector(&w.scene, INSTANCE_AT, own.side[0]), 1e-4 * size);
+        if (e.round) {
+            assert_near_v3("inner point", e.inner, pose_to_world(&w.scene, INSTANCE_AT, own.inner), 1e-4 * size);
+            assert_near_v3("middle", edge_reference(&e), pose_to_world(&w.scene, INSTANCE_AT, own.middle), 1e-4 * size);
+        }
+    }
 }
 
 static void test_choice(void **state) {
@@ -195,7 +273,8 @@ static void test_views(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_mesh_edges), cmocka_unit_test(test_rims),
-                                       cmocka_unit_test(test_outlines), cmocka_unit_test(test_choice),
+                                       cmocka_unit_test(test_outlines), cmocka_unit_test(test_tubes),
+                                       cmocka_unit_test(test_instanced), cmocka_unit_test(test_choice),
                                        cmocka_unit_test(test_views)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,10 +2,10 @@
 #pragma once
 
 // A motion of a parameter: of a pose, a turn (degrees) or shift of what it places; of others, the same step for all numbers,
-// or of vertices a shift along x that grows with z.
+// or of vertices a shift along x that grows with z; of control points, a shift that turns round along the curve, and their radii.
 typedef struct Motion {
     const char *room, *param;
-    enum { SHIFT, TURN, GROW, ADD, SHEAR } sort;
+    enum { SHIFT, TURN, GROW, ADD, SHEAR, BEND } sort;
     float axis[3];
     double h;
     int effort; // times the usual samples
@@ -37,6 +37,16 @@ static const Motion motions[] = {
     {"glowing_round.xml", "coin.to_world", SHIFT, {0.3f, 0.2f, 1}, 0.03, 1},
     {"glowing_round.xml", "tube.to_world", SHIFT, {0.3f, 0.2f, 1}, 0.03, 2},
     {"glowing_round.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
+    {"boundary_group.xml", "left.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.03, 6},
+    {"boundary_group.xml", "right.to_world", TURN, {0.2f, 0.3f, 1}, 1, 3},
+    {"boundary_group.xml", "group.ball.to_world", SHIFT, {0, 0.3f, 1}, 0.02, 3},
+    {"boundary_group.xml", "group.coin.to_world", SHIFT, {1, 0, 0.2f}, 0.02, 2},
+    {"boundary_group.xml", "group.tube.to_world", SHIFT, {0, 1, 0.2f}, 0.02, 10},
+    {"boundary_group.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
+    {"boundary_rope.xml", "rope.control_points", BEND, {0.1f, 0.3f, 1}, 0.02, 3},
+    {"boundary_rope.xml", "lamp.to_world", SHIFT, {1, 0.5f, 0}, 0.03, 1},
+    {"boundary_rope.xml", "floor.to_world", SHIFT, {0.2f, 0, 1}, 0.02, 1},
+    {"boundary_rope.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
     {"boundary_near.xml", "ball.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.02, 1},
     {"boundary_plan.xml", "tube.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1},
     {"boundary_plan.xml", "ball.to_world", GROW, {0.8f, -0.3f, 0.3f}, 0.02, 1},

@@ -50,6 +50,9 @@ static int tangent_of(Room room, const Motion *m, int param, float *start, float
         case SHEAR:
             tangent[i] = i % 3 == 0 ? start[i + 2] : 0.2f;
             break;
+        case BEND:
+            tangent[i] = column < 3 ? m->axis[column] * (1 - 0.1f * (float)row) : 0.03f;
+            break;
         }
     }
     return n;
@@ -250,6 +253,31 @@ static void test_refused(void **state) {
     room_close(room);
 }
 
+// Nor where mirrors show tubes, or tubes pass through something.
+static void test_refused_tubes(void **state) {
+    UNUSED(state);
+    static const char *const words[2] = {"mirrors, glass and participating media show of the outlines of curves",
+                                         "as 'floor' and 'rope' do"};
+    static float image[NUMBERS];
+    for (int i = 0; i < 2; i++) {
+        Room room = room_open(i ? "boundary_rope.xml" : "mirrored_rope.xml", 1, 0);
+        int param = rey_param_find(room.scene, "camera.to_world"), floor = rey_param_find(room.scene, "floor.to_world");
+        float tangent[MOST] = {0}, pose[16];
+        memcpy(pose, rey_param_values(room.scene, floor), sizeof pose);
+        pose[11] = 0.9f;
+        rey_render_def def = def_make(16, 1, 1);
+        def.terms = 0;
+        tangent[3] = 1;
+        if (i) {
+            ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL));
+            ok(room, rey_param_set(room.scene, floor, pose, 16));
+        }
+        assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+        assert_non_null(strstr(rey_error(room.ctx), words[i]));
+        room_close(room);
+    }
+}
+
 // Lines of textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show.
 static void test_refused_lines(void **state) {
     UNUSED(state);
@@ -271,7 +299,7 @@ static void test_refused_lines(void **state) {
 
 // Arguments: what the names of rooms, parameters in them, or other tests begin with.
 int main(int argc, char **argv) {
-    struct CMUnitTest tests[2 * COUNT_OF(motions) + 3];
+    struct CMUnitTest tests[2 * COUNT_OF(motions) + 4];
     static char names[COUNT_OF(motions)][64];
     size_t count = 0;
     for (int i = 0; i < COUNT_OF(motions); i++) {
@@ -282,6 +310,7 @@ int main(int argc, char **argv) {
     }
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_bits);
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_refused);
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_refused_tubes);
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(test_refused_lines);
     count = tests_asked(tests, count, argc, argv);
     return _cmocka_run_group_tests("boundary", tests, count, write_pictures, remove_pictures);

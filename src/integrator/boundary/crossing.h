@@ -76,10 +76,6 @@ static Miss miss_sphere(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) 
     return out;
 }
 
-KFN Vec3 pose_direction_to_local(const SceneView *scene, Int at, Vec3 d) {
-    return v3(v3_dot(table_v3(scene, at + 12), d), v3_dot(table_v3(scene, at + 16), d), v3_dot(table_v3(scene, at + 20), d));
-}
-
 // The unit circle at a height, next to a point.
 static void miss_rim(const SceneView *scene, Int at, Vec3 q, Float height, Vec3 d, Float inside, Miss *out, Mask m) {
     Float r = f_safe_rcp(f_sqrt(q.x * q.x + q.y * q.y)), x = q.x * r, y = q.y * r;
@@ -117,6 +113,29 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
     return out;
 }
 
+static Miss miss_round(const SceneView *scene, int32_t kind, const Hit *own, Vec3 o, Vec3 d) {
+    switch (kind) {
+    case SHAPE_SPHERE:
+        return miss_sphere(scene, own, o, d);
+    case SHAPE_DISK:
+        return miss_disk(scene, own, o, d);
+    case SHAPE_CYLINDER:
+        return miss_cylinder(scene, own, o, d);
+    default:
+        return (Miss){.edge = *own, .n = v3_zero(), .inside = f_set(1)};
+    }
+}
+
+// Through the group's own space.
+static Miss miss_instance(const SceneView *scene, int32_t kind, const Hit *own, Vec3 o, Vec3 d) {
+    Int at = instance_table(scene, own);
+    Hit local = instance_hit(scene, own);
+    Miss out = miss_round(scene, kind, &local, pose_to_local(scene, at, o), v3_normalize(pose_direction_to_local(scene, at, d)));
+    out.edge.p = pose_to_world(scene, at, out.edge.p);
+    out.n = pose_normal(scene, at, out.n);
+    return out;
+}
+
 // The edges of the surfaces that other rays meet at `own`, next to rays.
 static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
@@ -127,21 +146,12 @@ static NOINLINE Miss surfaces_miss(const Tracer *t, const Hit *own, Vec3 o, Vec3
         Mask mine = take_group(scene, own, &left, &id, &h);
         const Group *group = scene->groups + id;
         Miss one = {.edge = h, .n = v3_zero(), .inside = f_set(1)};
-        switch (group->shape_kind) {
-        case SHAPE_MESH:
+        if (group->shape_kind == SHAPE_MESH) {
             one = miss_triangle(scene, group->shape_flags, &h, o, d);
-            break;
-        case SHAPE_SPHERE:
-            one = miss_sphere(scene, &h, o, d);
-            break;
-        case SHAPE_DISK:
-            one = miss_disk(scene, &h, o, d);
-            break;
-        case SHAPE_CYLINDER:
-            one = miss_cylinder(scene, &h, o, d);
-            break;
-        default:
-            break;
+        } else if (group->shape_flags & SHAPE_INSTANCED) {
+            one = miss_instance(scene, group->shape_kind, &h, o, d);
+        } else {
+            one = miss_round(scene, group->shape_kind, &h, o, d);
         }
         Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &h);
         out.normal = v3_select(mine, si.ng, out.normal);

@@ -1,68 +1,9 @@
 // edge.h: points of the curves along which pictures jump, one curve per lane.
 #pragma once
 
-#include "integrator/boundary/boundary_job.h"
 #include "integrator/boundary/facet.h"
 #include "integrator/boundary/mark.h"
-#include "integrator/path_move.h"
-
-// A point x(t) of an edge, attached to its surface.
-typedef struct EdgePoint {
-    Hit hit;
-    Vec3 p, tangent;    // tangent: dx/dt
-    Vec3 side[2];       // from the edge into its surfaces; the second one only where it is not open
-    Mask open, crease;
-    Int other;          // the second triangle, or EDGE_
-    Int fan, fan_count; // see EdgeRecord; 0 where none
-    Vec3 origin;        // of a mesh's edge: its first vertex, in its own space
-    Mask round;         // which points it has depends on the eye
-    Vec3 inner;         // of round ones: the point beside it whose normal is turned to the eye by OUTLINE_TURN
-    Float probability;  // of the edge, over the part of its parameter that counts: dP/dt
-    // Where the shading normal n turns away from the viewer, along F = n . view = 0: n, the vector to the viewer, and how far
-    // over the surface F rises by 1. Of lines of textures, F is the step that is a whole number there, and `rise` that of it.
-    // Elsewhere 0.
-    Vec3 normal, view, rise;
-    Mask meeting;       // where the surface passes through that of the hit `met`, or through a light's border, where its
-                        // shape is -1 and its prim the light; across: the normals of both
-    Hit met;
-    Vec3 across[2];
-    Mask mark;          // a line of its surface's texture; beside: the points on both sides of it, the first one at side[0]
-    Hit beside[2];
-    Vec2 nudge[2];      // what is added to their uv
-    Mask half;          // it lies on the surface's end, and moves with to_uv alone
-    Int line;           // number of its mark, where its to_uv is selected, else -1
-    Vec2 uv;
-} EdgePoint;
-
-// How narrow what is looked for on the film may be [pixels]: rounding of directions is some hundred times smaller.
-KFN real film_resolution(const SensorRecord *sensor) {
-    return sensor->width > 25 ? (real)4e-6 * (real)sensor->width : (real)1e-4;
-}
-
-// Which sample of its random numbers a slot stands for.
-KFN void slot_number(Tracer *t, int32_t k, int64_t number) {
-    t->ws.pixel[k] = (int32_t)(number / BOUNDARY_PER_SET);
-    t->ws.sample[k] = (int32_t)(number % BOUNDARY_PER_SET);
-}
-
-// The slots i... of a batch stand for the samples first + i...
-KFN void batch_numbers(Tracer *t, int32_t i, int64_t first) {
-    for (int32_t k = i; k < i + LANES; k++) {
-        slot_number(t, k, first + k);
-    }
-}
-
-// Radians.
-#define OUTLINE_TURN 1e-3f
-// Half the angle between two directions on both sides of the plane at right angles to a normal.
-#define NORMAL_TURN 1e-4f
-
-#define EDGE_FIELD(job, i, field)                                                                                      \
-    i_gather((const int32_t *)(job)->edges,                                                                            \
-             (i) * (int32_t)(sizeof(EdgeRecord) / 4) + (int32_t)(offsetof(EdgeRecord, field) / 4))
-#define EDGE_FLOAT(job, i, field)                                                                                      \
-    f_gather((const float *)(job)->edges,                                                                              \
-             (i) * (int32_t)(sizeof(EdgeRecord) / 4) + (int32_t)(offsetof(EdgeRecord, field) / 4))
+#include "integrator/boundary/round.h"
 
 #define MEETING_INT(job, i, field)                                                                                     \
     i_gather((const int32_t *)(job)->meetings,                                                                         \
@@ -70,25 +11,6 @@ KFN void batch_numbers(Tracer *t, int32_t i, int64_t first) {
 #define MEETING_FLOAT(job, i, field, k)                                                                                \
     f_gather((const float *)(job)->meetings,                                                                           \
              (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4) + (k))
-
-KFN Int edge_choose(const BoundaryJob *b, Float u, Float *probability) {
-    Int low = i_set(0), high = i_set(b->edge_count - 1);
-    for (int32_t left = b->edge_count; left > 1; left = (left + 1) / 2) {
-        Int middle = (low + high) >> 1;
-        Mask right = m_le(f_gather(b->cdf, middle), u) & mi_lt(low, high);
-        low = i_select(right, middle + 1, low);
-        high = i_select(right, high, i_max(middle, low));
-    }
-    Float before = f_select(mi_lt(i_set(0), low), f_gather(b->cdf, i_max(low - 1, i_set(0))), f_set(0));
-    *probability = f_gather(b->cdf, low) - before;
-    return low;
-}
-
-// Vectors of a shapegroup's space in the world.
-KFN Vec3 edge_to_world(const SceneView *scene, const Hit *hit, Vec3 v) {
-    Int at = instance_table(scene, hit);
-    return v3(v3_dot(table_v3(scene, at), v), v3_dot(table_v3(scene, at + 4), v), v3_dot(table_v3(scene, at + 8), v));
-}
 
 static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
     Int corner = i_select(m, EDGE_FIELD(b, e, corner), i_set(0));
@@ -110,7 +32,7 @@ static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Fl
         hit.instance = i_select(inside, hit.instance, i_set(0));
         p = v3_select(inside, pose_to_world(scene, instance_table(scene, &hit), p), p);
         for (int k = 1; k < 4; k++) {
-            v[k] = v3_select(inside, edge_to_world(scene, &hit, v[k]), v[k]);
+            v[k] = v3_select(inside, instance_vector(scene, instance_table(scene, &hit), v[k]), v[k]);
         }
     }
     out->hit.prim = i_select(m, hit.prim, out->hit.prim);
@@ -122,73 +44,6 @@ static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->side[0] = v3_select(m, v[2], out->side[0]);
     out->side[1] = v3_select(m, v[3], out->side[1]);
     out->open = out->open & ~(m & mi_lt(i_set(-1), opposite));
-}
-
-// The end of a cylinder, or the rim of a disk: the unit circle at z = end through the pose.
-static void edge_of_rim(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
-    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
-    Int at = SHAPE_FIELD(scene, shape, table);
-    Float sine, cosine, end = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(0));
-    f_sincos(TWO_PI * t, &sine, &cosine);
-    Vec3 x = pose_column(scene, at, 0), y = pose_column(scene, at, 1);
-    Vec3 p = pose_to_world(scene, at, v3(cosine, sine, end));
-    Vec3 tangent = v3_scale(v3_madd(v3_scale(x, -sine), cosine, y), f_set(TWO_PI));
-    out->p = v3_select(m, p, out->p);
-    out->tangent = v3_select(m, tangent, out->tangent);
-    // Into the surface: a disk's centre, along a cylinder.
-    Vec3 inwards = v3_neg(v3_madd(v3_scale(x, cosine), sine, y)), axis = pose_column(scene, at, 2);
-    Mask disk = mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_DISK));
-    inwards = v3_select(disk, inwards, v3_scale(axis, f_select(m_gt(end, f_set(0)), f_set(-1), f_set(1))));
-    out->side[0] = v3_select(m, inwards, out->side[0]);
-}
-
-// The outline of a sphere, seen from `eye`, or along the direction `eye` where the view is parallel.
-static void edge_of_outline(const SceneView *scene, Float t, Vec3 eye, bool parallel, Mask m, EdgePoint *out) {
-    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
-    Int at = SHAPE_FIELD(scene, shape, table);
-    Vec3 centre = table_v3(scene, at), away = parallel ? v3_neg(eye) : v3_sub(eye, centre);
-    Float radius = table_at(scene, at + 3), distance = v3_length(away), sine, cosine;
-    Frame frame = frame_from_normal(v3_scale(away, f_safe_rcp(distance)));
-    Float near = parallel ? f_set(0) : radius * f_safe_rcp(distance); // cosine of the angle of the cone to the axis
-    Float wide = radius * f_safe_sqrt(1.0f - near * near);
-    f_sincos(TWO_PI * t, &sine, &cosine);
-    Vec3 local = v3(wide * cosine, wide * sine, radius * near);
-    Vec3 tangent = frame_to_world(&frame, v3(wide * sine * -TWO_PI, wide * cosine * TWO_PI, f_set(0)));
-    m = m & m_lt(near, f_set(1));
-    Vec3 outwards = frame_to_world(&frame, local);
-    out->p = v3_select(m, v3_add(centre, outwards), out->p);
-    out->tangent = v3_select(m, tangent, out->tangent);
-    out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
-    Vec3 view = v3_normalize(v3_sub(away, parallel ? v3_zero() : outwards));
-    Vec3 turned = v3_normalize(v3_madd(outwards, OUTLINE_TURN * radius, view));
-    out->inner = v3_select(m, v3_madd(centre, radius, turned), out->inner);
-}
-
-// A side of a cylinder, seen from `eye` or along it: the line at the angle at which the view touches the unit circle.
-static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Vec3 eye, bool parallel, Mask m,
-                         EdgePoint *out) {
-    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
-    Int at = SHAPE_FIELD(scene, shape, table);
-    Vec3 rows[2] = {table_v3(scene, at + 12), table_v3(scene, at + 16)};
-    Float x = v3_dot(rows[0], eye), y = v3_dot(rows[1], eye), near = f_set(0);
-    if (!parallel) {
-        x = x + table_at(scene, at + 15);
-        y = y + table_at(scene, at + 19);
-        near = f_safe_rcp(f_sqrt(x * x + y * y));
-    }
-    m = m & m_lt(near, f_set(1));
-    // The point turned from the direction (x, y) by +- acos(near).
-    Float r = f_safe_rcp(f_sqrt(x * x + y * y)), wide = f_safe_sqrt(1.0f - near * near);
-    wide = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), wide, -wide);
-    Float cx = (x * near - y * wide) * r, cy = (y * near + x * wide) * r;
-    out->p = v3_select(m, pose_to_world(scene, at, v3(cx, cy, t)), out->p);
-    out->tangent = v3_select(m, pose_column(scene, at, 2), out->tangent);
-    Vec3 outwards = v3_madd(v3_scale(pose_column(scene, at, 0), cx), cy, pose_column(scene, at, 1));
-    out->side[0] = v3_select(m, v3_neg(outwards), out->side[0]);
-    // Turned to the middle of what the eye sees: (x, y), which parallel views look along.
-    Float turn = (parallel ? -OUTLINE_TURN : OUTLINE_TURN) * r, nx = cx + turn * x, ny = cy + turn * y;
-    Float unit = f_safe_rcp(f_sqrt(nx * nx + ny * ny));
-    out->inner = v3_select(m, pose_to_world(scene, at, v3(nx * unit, ny * unit, t)), out->inner);
 }
 
 // Where a shading normal is at right angles to the direction to `eye`, or to `eye` itself where the view is parallel.
@@ -343,29 +198,20 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.probability = out.probability * f_safe_rcp(range);
     out.p = out.tangent = out.side[0] = out.side[1] = v3_zero();
     out.normal = out.view = out.rise = out.across[0] = out.across[1] = v3_zero();
-    out.inner = v3_zero();
+    out.inner = out.middle = out.outside = v3_zero();
     out.open = m_set(true);
     out.other = EDGE_FIELD(b, e, other);
     out.fan = EDGE_FIELD(b, e, fan);
     out.fan_count = EDGE_FIELD(b, e, fan_count);
     out.origin = v3_zero();
     out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
-    Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE));
-    Mask side = mi_eq(kind, i_set(EDGE_SIDE)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
+    Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
     out.meeting = mi_eq(kind, i_set(EDGE_MEETING));
     out.met = out.hit;
     if (m_any(mesh)) {
         edge_of_mesh(scene, b, e, t, mesh, &out);
     }
-    if (m_any(rim)) {
-        edge_of_rim(scene, b, e, t, rim, &out);
-    }
-    if (m_any(outline)) {
-        edge_of_outline(scene, t, eye, parallel, outline, &out);
-    }
-    if (m_any(side)) {
-        edge_of_side(scene, b, e, t, eye, parallel, side, &out);
-    }
+    edge_of_round(scene, b, e, kind, t, eye, parallel, &out);
     if (m_any(terminator)) {
         out.hit.prim = i_select(terminator, EDGE_FIELD(b, e, prim), out.hit.prim);
         edge_of_terminator(scene, t, eye, parallel, terminator, &out);
@@ -381,22 +227,12 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     if (m_any(out.mark)) {
         edge_of_mark(scene, b, e, t, out.mark, &out);
     }
-    out.round = outline | side;
     out.hit.p = out.p;
     return out;
 }
 
 // The middle of the surfaces of round edges, and the point itself of others.
-KFN Vec3 edge_reference(const SceneView *scene, const EdgePoint *e) {
-    if (!m_any(e->round)) {
-        return e->p;
-    }
-    Int shape = i_select(e->round, e->hit.shape, i_set(i_lane(e->hit.shape, m_first(e->round))));
-    Int at = SHAPE_FIELD(scene, shape, table);
-    Mask sphere = mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_SPHERE));
-    Vec3 middle = v3_select(sphere, table_v3(scene, at), pose_to_world(scene, at, v3(f_set(0), f_set(0), f_set(0.5f))));
-    return v3_select(e->round, middle, e->p);
-}
+KFN Vec3 edge_reference(const EdgePoint *e) { return v3_select(e->round, e->middle, e->p); }
 
 // How far a surface at an edge rises above the plane with the unit normal n through it; 0 where it lies in the plane as far as
 // floats can tell.
@@ -434,7 +270,7 @@ static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, con
         Mask inside = left & mi_lt(i_set(-1), SHAPE_FIELD(scene, hit.shape, collection));
         if (m_any(inside)) {
             hit.instance = i_select(inside, hit.instance, i_set(0));
-            side = v3_select(inside, edge_to_world(scene, &hit, side), side);
+            side = v3_select(inside, instance_vector(scene, instance_table(scene, &hit), side), side);
         }
         silhouette = silhouette & (~left | edge_goes_with(e, side, n, d, first));
     }
@@ -473,7 +309,9 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n,
             Mask other = met & mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
             faces = faces | (e->meeting & met_near & other);
         }
-        own[side] = (silhouette & own[side]) | faces;
+        // Of a rim that is seen edge-on, one half hides the other.
+        Mask rim = mi_eq(e->other, i_set(EDGE_ANY)) & ~e->round;
+        own[side] = (silhouette & own[side] & (~rim | near)) | faces;
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
         grazed[side] = ~clear[side] & m_gt(found, reach * (1.0f - 2e-2f));
     }

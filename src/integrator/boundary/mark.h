@@ -15,16 +15,17 @@ static MarkPoint mark_on_mesh(const SceneView *scene, const Hit *hit) {
     Vec3 a = theta_v3(scene, positions + c.i[0] * 3);
     MarkPoint at = {a, v3_sub(theta_v3(scene, positions + c.i[1] * 3), a), v3_sub(theta_v3(scene, positions + c.i[2] * 3), a)};
     at.p = v3_madd(v3_madd(a, hit->u, at.du), hit->v, at.dv);
-    Mask inside = mi_lt(i_set(-1), SHAPE_FIELD(scene, hit->shape, collection));
-    if (m_any(inside)) {
-        Hit h = *hit;
-        h.instance = i_select(inside, h.instance, i_set(0));
-        Int table = instance_table(scene, &h);
-        at.p = v3_select(inside, pose_to_world(scene, table, at.p), at.p);
-        at.du = v3_select(inside, instance_vector(scene, table, at.du), at.du);
-        at.dv = v3_select(inside, instance_vector(scene, table, at.dv), at.dv);
-    }
     return at;
+}
+
+// From a shapegroup's space to the world, in lanes of shapes that stand in one.
+static void mark_through_instance(const SceneView *scene, const Hit *hit, Mask inside, MarkPoint *at) {
+    Hit h = *hit;
+    h.instance = i_select(inside, h.instance, i_set(0));
+    Int table = instance_table(scene, &h);
+    at->p = v3_select(inside, pose_to_world(scene, table, at->p), at->p);
+    at->du = v3_select(inside, instance_vector(scene, table, at->du), at->du);
+    at->dv = v3_select(inside, instance_vector(scene, table, at->dv), at->dv);
 }
 
 // uv = (phi / 2 pi, theta / pi)
@@ -125,6 +126,10 @@ static Vec3 mark_at(const SceneView *scene, const BoundaryJob *b, Int number, Fl
         Int own = i_select(turned, table, i_set(i_lane(table, m_first(turned))));
         other = mark_on_turned(scene, own, mi_eq(kind, i_set(SHAPE_DISK)), u, v);
         p = (MarkPoint){v3_select(turned, other.p, p.p), v3_select(turned, other.du, p.du), v3_select(turned, other.dv, p.dv)};
+    }
+    Mask inside = m & mi_lt(i_set(-1), SHAPE_FIELD(scene, shape, collection));
+    if (m_any(inside)) {
+        mark_through_instance(scene, hit, inside, &p);
     }
     hit->u = f_select(mesh, u, hit->u);
     hit->v = f_select(mesh, v, hit->v);

@@ -271,8 +271,8 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
             Mask inside = round & (side ? above : ~above);
             const Workspace *ws = &t->ws;
             Hit hit = {i_select(inside, s.edge.hit.shape, i_load(ws->hit_shape + at)),
-                       i_select(inside, i_set(0), i_load(ws->hit_prim + at)),
-                       f_zero_unless(~inside, f_load(ws->hit_u + at)),
+                       i_select(inside, s.edge.hit.prim, i_load(ws->hit_prim + at)),
+                       f_select(inside, s.edge.hit.u, f_load(ws->hit_u + at)),
                        f_zero_unless(~inside, f_load(ws->hit_v + at)),
                        v3_select(inside, s.edge.inner, record_v3(ws->hit_x, ws->hit_y, ws->hit_z, at)),
                        i_select(inside, s.edge.hit.instance, i_load(ws->hit_instance + at))};

@@ -59,7 +59,7 @@ static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     Mask ends = mi_lt(i_set(-1), hit.shape);
     Float length = f_select(ends, v3_dot(v3_sub(hit.p, ray.o), ray.d), f_set(INFINITY));
     s->edge = edge_sample(scene, b, u, v3_zero(), false);
-    Focus focus = focus_look(edge_reference(scene, &s->edge), ray.o, ray.d, length);
+    Focus focus = focus_look(edge_reference(&s->edge), ray.o, ray.d, length);
     Float distance = focus_distance(&focus, rng_1d(&key, DIMENSION_SEGMENT_LIGHT));
     Vec3 near = v3_madd(ray.o, distance, ray.d);
     if (m_any(s->edge.round)) {

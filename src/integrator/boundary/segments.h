@@ -129,7 +129,7 @@ static void segment_to_light(const Tracer *t, const BoundaryJob *b, const Sample
     const SceneView *scene = t->scene;
     Float choice;
     Vec2 at = rng_2d(key, DIMENSION_SEGMENT_END);
-    Vec3 reference = edge_reference(scene, &s->edge);
+    Vec3 reference = edge_reference(&s->edge);
     Int light = emitter_choose(scene, rng_1d(key, DIMENSION_SEGMENT_LIGHT), &choice);
     LightSample l = lights_sample(scene, light, s->m, reference, at, &s->light);
     Int shape = EMITTER_FIELD(scene, light, shape), kind = EMITTER_FIELD(scene, light, kind);
@@ -169,7 +169,7 @@ static void segment_to_light(const Tracer *t, const BoundaryJob *b, const Sample
 static void segment_to_anywhere(const Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 u, Segment *s) {
     s->d = warp_uniform_sphere(rng_2d(key, DIMENSION_SEGMENT_END));
     if (m_any(s->edge.round)) {
-        s->edge = edge_sample(t->scene, b, u, segment_far_eye(t->scene, edge_reference(t->scene, &s->edge), s->d), false);
+        s->edge = edge_sample(t->scene, b, u, segment_far_eye(t->scene, edge_reference(&s->edge), s->d), false);
     }
     s->light = spec_set(f_set(4 * PI));
     s->distance = f_set(INFINITY);
@@ -185,7 +185,9 @@ static void segment_measure(const Tracer *t, const BoundaryJob *b, bool lit, Flo
     s->weight = length * share * f_safe_rcp(s->edge.probability);
     s->silhouette = edge_is_silhouette(t->scene, b, &s->edge, n, s->d);
     Mask jumps = boundary_is_paired(b->kind) && !lit ? s->silhouette | s->edge.crease : s->silhouette;
-    s->m = s->m & jumps & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
+    const EdgePoint *e = &s->edge;
+    Mask shown = m_le(v3_dot(e->outside, e->outside), f_set(0)) | m_lt(v3_dot(e->outside, s->d), f_set(0));
+    s->m = s->m & jumps & shown & m_gt(f_abs(into), f_set(0)) & m_gt(s->weight, f_set(0)) & m_finite(s->weight) &
            m_gt(s->edge.probability, f_set(0));
 }
 

@@ -1,0 +1,69 @@
+// tubes.h: where rays meet tubes, more exactly than Embree says. It iterates until the point is near the tube; what a normal makes with
+// a ray that grazes is then no better than a thousandth, and derivatives divide by that.
+#pragma once
+
+#include "scene/ray.h"
+#include "shape/shape.h"
+
+// The least cosine between rays and normals: what rounding leaves of it.
+#define TUBE_GRAZE 1e-3f
+// How far beyond the ends of a segment feet may lie: the next segment goes on likewise.
+#define TUBE_BEYOND 0.02f
+
+// One step along rays at x, x and d in the space of the curve. With c(u) the foot of x, (x - c) . c' = 0, the rays meet the tube where
+// f(t) = |x + t d - c|^2 - r^2 is 0, which is a quadratic in t but for how the curve bends: its root at which they enter. Returns t.
+// Rays of *misses do not get there.
+KFN Float tube_step(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d, Mask *misses) {
+    CurvePoint p;
+    for (int i = 0; i < 2; i++) {
+        CurveWeights w = bspline_weights(hit->u);
+        p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+        Vec3 away = v3_sub(x, p.c);
+        Float step = v3_dot(away, p.c1) * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
+        step = f_clamp(step, f_set((real)-0.1), f_set((real)0.1));
+        hit->u = f_clamp(hit->u + step, f_set(-TUBE_BEYOND), f_set(1 + TUBE_BEYOND));
+    }
+    CurveWeights w = bspline_weights(hit->u);
+    p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    Vec3 away = v3_sub(x, p.c);
+    Float along = v3_dot(d, p.c1), u1 = along * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
+    // halves of f' and f''
+    Float f = v3_dot(away, away) - p.r * p.r, f1 = v3_dot(away, d) - p.r * p.r1 * u1;
+    Float f2 = v3_dot(d, d) - along * u1 - p.r1 * p.r1 * u1 * u1, root2 = f1 * f1 - f * f2;
+    *misses = m_lt(root2, TUBE_GRAZE * TUBE_GRAZE * v3_dot(d, d) * p.r * p.r);
+    return (-f1 - f_zero_unless(~*misses, f_safe_sqrt(root2))) * f_safe_rcp(f2);
+}
+
+// In lanes of m that met B-spline curves: moves hits along their rays, by no more than a tube's radius. Those few that Embree lets
+// meet a tube that they miss are put on the side that faces them: where they touch it they would count without bound.
+static NOINLINE void tubes_refine(const SceneView *scene, const Ray *ray, Hit *hit, Mask m) {
+    Int shape = i_max(hit->shape, i_set(0));
+    m = m & mi_lt(i_set(-1), hit->shape) & mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_BSPLINE));
+    if (!m_any(m)) {
+        return;
+    }
+    Int first = i_set(i_lane(shape, m_first(m))), at = i_set(0);
+    Hit h = {i_select(m, shape, first), i_select(m, hit->prim, i_set(0)), hit->u, f_set(0), hit->p,
+             i_select(m, hit->instance, i_set(0))};
+    Vec3 d = ray->d;
+    Mask inside = m & mi_lt(i_set(-1), SHAPE_FIELD(scene, h.shape, collection)), misses;
+    if (m_any(inside)) {
+        at = instance_table(scene, &h);
+        h.p = v3_select(inside, pose_to_local(scene, at, h.p), h.p);
+        d = v3_select(inside, pose_direction_to_local(scene, at, d), d);
+    }
+    Float moved = tube_step(scene, &h, h.p, d, &misses);
+    moved = moved + tube_step(scene, &h, v3_madd(h.p, moved, d), d, &misses);
+    CurveWeights w = bspline_weights(h.u);
+    CurvePoint p = curve_sum(scene, &h, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    m = m & m_lt(moved * moved * v3_dot(d, d), p.r * p.r);
+    misses = misses & m;
+    hit->u = f_select(m, h.u, hit->u);
+    hit->p = v3_select(m, v3_madd(hit->p, moved, ray->d), hit->p);
+    if (m_any(misses)) {
+        Vec3 across = v3_normalize(v3_madd(d, -v3_dot(d, p.c1) * f_safe_rcp(v3_dot(p.c1, p.c1)), p.c1));
+        Vec3 facing = v3_madd(p.c, -p.r, across);
+        facing = m_any(inside) ? v3_select(inside, pose_to_world(scene, at, facing), facing) : facing;
+        hit->p = v3_select(misses, facing, hit->p);
+    }
+}
