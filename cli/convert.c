@@ -29,6 +29,14 @@ static void say_what_was_written(const char *path) {
     }
 }
 
+// What was left out may be missed by who reads the scene with less patience.
+static rey_result read_back(const Session *s) {
+    rey_scene *scene = NULL;
+    rey_result result = s->options->lenient ? rey_scene_load(s->ctx, s->options->files[1], NULL, 0, &scene) : REY_OK;
+    rey_scene_destroy(scene);
+    return result;
+}
+
 int cli_convert(int argc, char **argv) {
     Options options;
     Session session;
@@ -46,6 +54,9 @@ int cli_convert(int argc, char **argv) {
     if (!status) {
         rey_result result = rey_mitsuba_save_anew(session.scene, options.files[1]);
         if (result) {
+            status = cli_report_failure(&options, session.ctx, result);
+        } else if ((result = read_back(&session))) {
+            cli_note("%s was written, and cannot be read without --lenient:", options.files[1]);
             status = cli_report_failure(&options, session.ctx, result);
         } else if (options.json) {
             print_json(&session);

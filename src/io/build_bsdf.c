@@ -152,6 +152,13 @@ static rey_result height_scale_slot(Builder *b, rey_xml_node *node, const ParamD
     return build_constant(b, node, p->name, slot_use(p), &value, 1, path, out);
 }
 
+// Nothing takes the place of what must be given.
+static rey_result refuse_left_out(Builder *b, const rey_xml_node *node, const char *name) {
+    const rey_xml_child *child = rey_xml_child_named(node, name);
+    bool lost = child && child->ignored;
+    return lost ? rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "'%s' has no '%s' that can be read", node->type, name) : REY_OK;
+}
+
 static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *kind, const char *path, BsdfNode *bsdf) {
     for (int i = 0; i < kind->param_count; i++) {
         const ParamDesc *p = &kind->params[i];
@@ -188,6 +195,7 @@ static rey_result build_slots(Builder *b, rey_xml_node *node, const BsdfKind *ki
         default:
             TRY(strcmp(p->option, "required") == 0 ? rey_xml_require(b->ctx, node, p->name) : REY_OK);
             TRY(build_slot(b, node, p->name, slot_use(p), &value, 1, name, &bsdf->slot[i]));
+            TRY(strcmp(p->option, "required") == 0 ? refuse_left_out(b, node, p->name) : REY_OK);
             TRY(p->type == PARAM_NORMAL ? refuse_attribute(b, node, bsdf->slot[i]) : REY_OK);
         }
     }

@@ -277,6 +277,13 @@ rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, in
         Snapshot s = build_snapshot(b);
         bool left_out;
         TRY(build_forgive(b, &s, emitter, "", build_emitter(b, emitter->node, id, name, &shape->emitter), &left_out));
+        if (left_out && !bsdf) { // the default of shapes that shine is black
+            const BsdfNode *own = &ARRAY_AT(b->scene->build.bsdfs, BsdfNode, shape->bsdf);
+            const TextureNode *colour = &ARRAY_AT(b->scene->build.textures, TextureNode, own->slot[0]);
+            for (int c = 0; c < 3; c++) {
+                ARRAY_AT(b->scene->build.theta, float, colour->theta + c) = 0.5f;
+            }
+        }
         emitter = left_out ? NULL : emitter;
     }
     if (shape->kind == SHAPE_MESH && (emitter || sensor || (shape->flags & SHAPE_UNSEEN))) {

@@ -313,6 +313,8 @@ rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureU
         if (!left_out) {
             return REY_OK;
         }
+        double rgb[3] = {value[0], count == 3 ? value[1] : value[0], count == 3 ? value[2] : value[0]};
+        return build_constant(b, node, name, use, rgb, use.real ? 1 : 3, path, out);
     }
     rey_xml_property *p = rey_xml_find(node, name);
     bool number = p && (p->kind == REY_XML_FLOAT_VALUE || p->kind == REY_XML_INTEGER_VALUE);

@@ -71,6 +71,52 @@ rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, co
     return build_remember(b, rey_error(b->ctx), instead);
 }
 
+// The places of parts that a sensor does without.
+#define OPTIONAL_PARTS (REY_XML_BIT(REY_XML_FILM) | REY_XML_BIT(REY_XML_RFILTER) | REY_XML_BIT(REY_XML_SAMPLER))
+
+static bool stands_at(rey_xml_position at, const char *error) {
+    char place[4096];
+    int length = snprintf(place, sizeof place, "%s:%d:%d: ", at.file, at.line, at.column);
+    return length < (int)sizeof place && strncmp(error, place, (size_t)length) == 0;
+}
+
+// Takes the property or part that an error names out of a node, or out of what stands within it.
+static bool take_out(rey_xml_node *node, const char *error) {
+    for (int i = 0; i < node->property_count; i++) {
+        rey_xml_property *p = node->properties + i;
+        if (stands_at(p->at, error) && strcmp(p->name, "filename") != 0) { // without it there is nothing
+            node->property_count--;
+            memmove(p, p + 1, (size_t)(node->property_count - i) * sizeof *p);
+            return true;
+        }
+    }
+    for (int i = 0; i < node->child_count; i++) {
+        rey_xml_child *child = node->children + i;
+        if (child->ref || child->ignored) {
+            continue;
+        }
+        if ((REY_XML_BIT(child->node->tag) & OPTIONAL_PARTS) && stands_at(child->node->at, error)) {
+            child->ignored = child->used = true;
+            node->child_count--;
+            memmove(child, child + 1, (size_t)(node->child_count - i) * sizeof *child);
+            return true;
+        }
+        if (take_out(child->node, error)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+rey_result build_take_out(Builder *b, const Snapshot *s, rey_xml_node *node, rey_result result, bool *again) {
+    *again = result != REY_OK && result != REY_ERROR_MEMORY && b->lenient && take_out(node, rey_error(b->ctx));
+    if (!*again) {
+        return result;
+    }
+    take_back(b, s);
+    return build_remember(b, rey_error(b->ctx), "");
+}
+
 rey_result build_overlook(Builder *b, const char *instead, rey_result result) {
     bool overlook = result != REY_OK && result != REY_ERROR_MEMORY && b->lenient;
     return overlook ? build_remember(b, rey_error(b->ctx), instead) : result;

@@ -18,6 +18,9 @@ Snapshot build_snapshot(const Builder *b);
 // snapshot, marks the child as left out and returns REY_OK; else returns the result. *left_out may be null.
 rey_result build_forgive(Builder *b, const Snapshot *s, rey_xml_child *child, const char *instead, rey_result result,
                          bool *left_out);
+// The result of building a node: where it failed, the reader is lenient, and one of its properties, or a part that it does without,
+// is to blame, takes that out of it, takes back what was built since the snapshot, and returns REY_OK with *again = true.
+rey_result build_take_out(Builder *b, const Snapshot *s, rey_xml_node *node, rey_result result, bool *again);
 // The result of a look at what was built: where it failed and the reader is lenient, lists why, and what is done instead, and
 // returns REY_OK.
 rey_result build_overlook(Builder *b, const char *instead, rey_result result);

@@ -344,7 +344,15 @@ static rey_result build_scene(Builder *b) {
     for (int i = 0; i < root->child_count; i++) {
         Snapshot s = build_snapshot(b);
         rey_xml_child *child = &root->children[i];
-        TRY(build_forgive(b, &s, child, "", build_child(b, child, counts), NULL));
+        int before[REY_XML_TAG_COUNT];
+        rey_result result;
+        memcpy(before, counts, sizeof before);
+        for (bool again = true; again;) {
+            memcpy(counts, before, sizeof before);
+            result = build_child(b, child, counts);
+            result = build_take_out(b, &s, child->node, result, &again);
+        }
+        TRY(build_forgive(b, &s, child, "", result, NULL));
     }
     for (int i = 0; i < root->child_count; i++) {
         TRY(note_loose_light(b, root->children[i].node));

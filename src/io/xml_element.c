@@ -154,7 +154,9 @@ static rey_result begin_object(XmlFile *file, const XmlTag *tag, const XmlAttrib
         node->type = "scene";
     }
     if (!result && node->id) {
-        result = rey_xml_add_id(reader, node->id, node, rey_xml_attribute_named(attributes, "id")->at);
+        rey_result known = rey_xml_add_id(reader, node->id, node, rey_xml_attribute_named(attributes, "id")->at);
+        node->id = known ? NULL : node->id;
+        result = rey_xml_overlook(reader, known);
     }
     XmlFrame *parent = rey_xml_object_frame(reader);
     if (!result && parent) {

@@ -151,7 +151,11 @@ rey_result rey_xml_take_attributes(XmlFile *file, const XmlTag *tag, const char 
             continue; // of version 0.x: the plugin decides what a colour is meant as
         }
         if (!takes(&known, name)) {
-            return unknown_attribute(file, &known, name);
+            rey_result unknown = rey_xml_overlook(file->reader, unknown_attribute(file, &known, name));
+            if (unknown) {
+                return unknown;
+            }
+            continue;
         }
         XmlAttribute *item = &out->items[out->count++];
         item->name = name;

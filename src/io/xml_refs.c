@@ -73,6 +73,11 @@ static const char *next_id(void *user, int i) { // called with i = 0, 1, 2, ...
     return NULL;
 }
 
+static void remove_child(rey_xml_node *node, int i) {
+    node->child_count--;
+    memmove(node->children + i, node->children + i + 1, (size_t)(node->child_count - i) * sizeof *node->children);
+}
+
 static rey_result link_children(XmlReader *reader, rey_xml_node *node) {
     for (int i = 0; i < node->child_count; i++) {
         rey_xml_child *child = &node->children[i];
@@ -89,9 +94,7 @@ static rey_result link_children(XmlReader *reader, rey_xml_node *node) {
             if (result) {
                 return result;
             }
-            node->child_count--;
-            memmove(child, child + 1, (size_t)(node->child_count - i) * sizeof *child);
-            i--;
+            remove_child(node, i--);
         }
     }
     return REY_OK;
@@ -106,8 +109,14 @@ static rey_result measure(XmlReader *reader, rey_xml_node *node, int depth) {
     for (int i = 0; i < node->child_count; i++) {
         rey_xml_child *child = &node->children[i];
         if (child->node->height == OPEN) {
-            return rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE, "reference cycle: '%.100s' contains itself",
-                                child->ref ? child->ref : "object");
+            rey_result result = rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE,
+                                             "reference cycle: '%.100s' contains itself", child->ref ? child->ref : "object");
+            result = rey_xml_overlook(reader, result);
+            if (result) {
+                return result;
+            }
+            remove_child(node, i--);
+            continue;
         }
         if (depth >= REY_XML_DEEPEST) {
             return rey_xml_fail(reader->ctx, child->at, REY_ERROR_SCENE,

@@ -3,6 +3,9 @@
 
 #include <math.h>
 
+// Of the inverse's numbers: squares of longer vectors are beyond floats.
+#define LARGEST 1e17
+
 double rey_affine_determinant(const float m[16]) {
     double a = m[0], b = m[1], c = m[2], d = m[4], e = m[5], f = m[6], g = m[8], h = m[9], i = m[10];
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
@@ -22,6 +25,11 @@ bool rey_affine_inverse(const float m[16], double r[12]) {
             r[row * 4 + col] = n[row * 3 + col] * s;
         }
         r[row * 4 + 3] = -(r[row * 4] * m[3] + r[row * 4 + 1] * m[7] + r[row * 4 + 2] * m[11]);
+    }
+    for (int k = 0; k < 12; k++) {
+        if (!(fabs(r[k]) <= LARGEST)) {
+            return false;
+        }
     }
     return true;
 }

@@ -111,6 +111,53 @@ static void lenient_reading_lists_what_it_leaves_out(void **state) {
     assert_non_null(strstr(f->out, "0.1, 0.2, 0.3"));
 }
 
+// What cannot be read takes as little with it as it can, and what is written reads back to the same picture.
+static void lenient_reading_keeps_the_rest(void **state) {
+    static const struct {
+        const char *line, *word, *kept; // a part of a scene; what is named; what `info` or `params` still has
+    } cases[] = {
+        {"<shape type='sphere' colour='red' id='ball'/>", "unknown attribute 'colour'", "ball.bsdf.reflectance"},
+        {"<bsdf type='diffuse' id='same'/><shape type='sphere' id='ball'/><bsdf type='diffuse' id='same'/>", "duplicate id 'same'",
+         "ball.bsdf.reflectance"},
+        {"<bsdf type='mask' id='hole'><ref id='hole'/></bsdf><shape type='sphere' id='ball'/>", "contains itself",
+         "ball.bsdf.reflectance"},
+        {"<shape type='sphere' id='ball'><bsdf type='mask'><texture type='bitmap' name='opacity'><string name='filename' "
+         "value='no.png'/></texture><bsdf type='roughconductor'/></bsdf></shape>", "no.png", "alpha"},
+        {"<shape type='sphere' id='ball'><bsdf type='normalmap'><texture type='bitmap' name='normalmap'><string name='filename' "
+         "value='no.png'/></texture><bsdf type='roughconductor'/></bsdf></shape>", "no 'normalmap' that can be read",
+         "ball.bsdf.reflectance"},
+        {"<shape type='sphere' id='ball'><emitter type='constant'/></shape>", "constant", "ball.bsdf.reflectance"},
+        {"<shape type='sphere' id='ball'><float name='radius' value='-2'/></shape>", "radius", "ball.to_world"}};
+    static const char *const sensors[][2] = {{"<float name='fov' value='190'/>", "fov is 190"},
+                                             {"<string name='fov_axis' value='q'/>", "'fov_axis'"},
+                                             {"<sampler type='odd'/>", "sampler 'odd'"},
+                                             {"<sampler type='independent'><integer name='sample_count' value='-3'/></sampler>",
+                                              "sample_count"}};
+    Fixture *f = *state;
+    char text[2048];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases + sizeof sensors / sizeof *sensors; i++) {
+        bool sensor = i >= sizeof cases / sizeof *cases;
+        const char *const *own = sensors[sensor ? i - sizeof cases / sizeof *cases : 0];
+        snprintf(text, sizeof text, "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'>%s<film "
+                 "type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/>%s</film></sensor>"
+                 "<emitter type='constant'/>%s</scene>", sensor ? own[0] : "", sensor ? "<rfilter type='odd'/>" : "",
+                 sensor ? "<shape type='sphere' id='ball'/>" : cases[i].line);
+        write_words("less.xml", text);
+        expect(f, 1, "info less.xml");
+        expect_words(f, 0, "params less.xml --lenient", sensor ? own[1] : cases[i].word);
+        assert_non_null(strstr(f->out, sensor ? "ball.bsdf.reflectance" : cases[i].kept));
+        expect(f, 0, "render less.xml --lenient --spp 4 -o a.npy");
+        expect(f, 0, "convert less.xml kept.xml --lenient");
+        expect(f, 0, "render kept.xml --spp 4 -o b.npy");
+        assert_int_equal(system("cmp -s a.npy b.npy"), 0);
+    }
+    // An attribute that no mesh has reads as 0, which no file says.
+    write_words("less.xml", "<scene version='3.0.0'><sensor type='perspective'/><shape type='cube'><bsdf type='diffuse'><texture "
+                            "type='mesh_attribute' name='reflectance'><string name='name' value='vertex_no'/></texture></bsdf>"
+                            "</shape></scene>");
+    expect_words(f, 1, "convert less.xml kept.xml --lenient", "cannot be read without --lenient");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(converted_scenes_render_the_same_bits),
@@ -118,6 +165,7 @@ int main(void) {
         cmocka_unit_test(files_of_others_are_kept),
         cmocka_unit_test(failures_leave_nothing),
         cmocka_unit_test(lenient_reading_lists_what_it_leaves_out),
+        cmocka_unit_test(lenient_reading_keeps_the_rest),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
