@@ -10,7 +10,12 @@
 
 static const double MOST_MOVED = 1e18; // farther away, coordinates have no squares in single precision
 
-// Steps that the bounds of the parameters allow along the direction, forwards (sign 1) or backwards (-1).
+static bool ends_with(const char *text, const char *end) {
+    size_t n = strlen(text), m = strlen(end);
+    return n >= m && strcmp(text + n - m, end) == 0;
+}
+
+// Steps that the bounds of the parameters, and those of radii, allow along the direction, forwards (sign 1) or backwards (-1).
 static double room(const rey_scene *scene, const float *original, const Direction *d, double sign) {
     double most = INFINITY;
     for (int k = 0; k < d->count; k++) {
@@ -20,10 +25,11 @@ static double room(const rey_scene *scene, const float *original, const Directio
         }
         for (int64_t i = d->offsets[k]; i < d->offsets[k + 1]; i++) {
             double t = sign * (double)d->tangent[i], v = (double)original[i];
+            bool radius = ends_with(info.name, ".control_points") && (i - d->offsets[k]) % 4 == 3;
             if (t > 0) {
                 most = fmin(most, ((double)info.high - v) / t);
             } else if (t < 0) {
-                most = fmin(most, ((double)info.low - v) / t);
+                most = fmin(most, ((radius ? 0 : (double)info.low) - v) / t);
             }
         }
     }
@@ -36,8 +42,8 @@ static bool is_turning_pose(const rey_scene *scene, const Direction *d, int k) {
     rey_param_info info;
     bool turns = false;
     if (rey_param_get_info(scene, d->params[k], &info) == REY_OK) {
-        const char *dot = strrchr(info.name, '.');
-        for (int64_t i = 0; dot && strcmp(dot, ".to_world") == 0 && i < info.count; i++) {
+        bool pose = ends_with(info.name, ".to_world");
+        for (int64_t i = 0; pose && i < info.count; i++) {
             turns |= i % 4 != 3 && d->tangent[d->offsets[k] + i] != 0;
         }
     }

@@ -1,5 +1,5 @@
-// tubes.h: where rays meet tubes, more exactly than Embree says. It iterates until the point is near the tube; what a normal makes with
-// a ray that grazes is then no better than a thousandth, and derivatives divide by that.
+// tubes.h: where rays meet tubes, more exactly than Embree says. It iterates until the point is near the tube; what a normal makes
+// with a ray that grazes is then no better than a thousandth, and derivatives divide by that.
 #pragma once
 
 #include "scene/ray.h"
@@ -7,24 +7,12 @@
 
 // The least cosine between rays and normals: what rounding leaves of it.
 #define TUBE_GRAZE 1e-3f
-// How far beyond the ends of a segment feet may lie: the next segment goes on likewise.
-#define TUBE_BEYOND 0.02f
 
-// One step along rays at x, x and d in the space of the curve. With c(u) the foot of x, (x - c) . c' = 0, the rays meet the tube where
-// f(t) = |x + t d - c|^2 - r^2 is 0, which is a quadratic in t but for how the curve bends: its root at which they enter. Returns t.
-// Rays of *misses do not get there.
+// One step along rays at x, x and d in the space of the curve. With c(u) the foot of x, (x - c) . c' = 0, the rays meet the tube
+// where f(t) = |x + t d - c|^2 - r^2 is 0, which is a quadratic in t but for how the curve bends: its root at which they enter.
+// Returns t. Rays of *misses do not get there.
 KFN Float tube_step(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d, Mask *misses) {
-    CurvePoint p;
-    for (int i = 0; i < 2; i++) {
-        CurveWeights w = bspline_weights(hit->u);
-        p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
-        Vec3 away = v3_sub(x, p.c);
-        Float step = v3_dot(away, p.c1) * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
-        step = f_clamp(step, f_set((real)-0.1), f_set((real)0.1));
-        hit->u = f_clamp(hit->u + step, f_set(-TUBE_BEYOND), f_set(1 + TUBE_BEYOND));
-    }
-    CurveWeights w = bspline_weights(hit->u);
-    p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    CurvePoint p = bspline_foot(scene, hit, x, 2);
     Vec3 away = v3_sub(x, p.c);
     Float along = v3_dot(d, p.c1), u1 = along * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
     // halves of f' and f''

@@ -73,14 +73,20 @@ typedef struct Landing {
     const Group *group;
 } Landing;
 
-// Lanes of m whose ray reaches the sensor; lights that hide do not stand in the way.
-KFN Mask particle_open(Tracer *t, const Ray *ray, Mask m) {
+// Lanes of m in which nothing stands in the way of rays, nor do lights that hide.
+KFN Mask rays_open(Tracer *t, const Ray *ray, Mask m) {
     t->job->rays += m_count(m);
     if (t->scene->hide_emitters) {
         Hit hit = trace_past_emitters(t, *ray, m, trace_closest(t->scene, ray, m, false));
         return m & mi_lt(hit.shape, i_set(0));
     }
     return m & m_gt(spec_max(trace_transmittance(t->scene, ray, m)), f_set(0));
+}
+
+// Lanes of m whose ray reaches the sensor. Tubes stop rays from outside alone: what counts is what the sensor's ray meets.
+KFN Mask particle_open(Tracer *t, const Ray *ray, Mask m) {
+    Ray back = {v3_madd(ray->o, ray->tmax, ray->d), v3_neg(ray->d), ray->tmax};
+    return rays_open(t, t->scene->segments_count ? &back : ray, m);
 }
 
 // What the sensor sees of a vertex: the place of the light sample is the position on the film.

@@ -131,7 +131,7 @@ static Vec3 rays_find_adj(const Tracer *t, const Hit *hit, Vec3 d, const Surface
     return drag;
 }
 
-// A point of a surface, such as a light sample, as a hit: of meshes with the barycentrics there.
+// A point of a surface, such as a light sample, as a hit: of meshes with the barycentrics there, of tubes with the position.
 KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec3 p, Vec3 *n) {
     Hit hit = {shape, prim, f_set(0), f_set(0), p, instance};
     *n = v3_zero();
@@ -153,6 +153,12 @@ KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec
             h.v = v3_dot(v3_cross(corner.dp_du, q), cross) * r;
             hit.u = f_select(mine, h.u, hit.u);
             hit.v = f_select(mine, h.v, hit.v);
+        } else if (group->shape_kind == SHAPE_BSPLINE) {
+            Vec3 away;
+            Hit own = group->shape_flags & SHAPE_INSTANCED ? instance_hit(scene, &h) : h;
+            bspline_distance(scene, &own, own.p, &away);
+            h.u = own.u;
+            hit.u = f_select(mine, h.u, hit.u);
         }
         *n = v3_select(mine, shape_interaction(scene, group->shape_kind, group->shape_flags, &h).ng, *n);
     }

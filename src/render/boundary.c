@@ -12,6 +12,7 @@
 #include "render/texture_steps.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
+#include "shape/pieces.h"
 #include "shape/shape.h"
 
 #include <stdio.h>
@@ -88,35 +89,20 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
     return true;
 }
 
-static rey_result refuse_meeting(rey_scene *scene, int term, const MeetingRecord *m) {
-    char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a light"};
-    for (int k = 0; k < 2 && m->shape[k] >= 0; k++) {
-        rey_name_shape(scene, m->shape[k], names[k]);
-    }
-    snprintf(text, sizeof text, "the curves along which surfaces pass through each other, as '%s' and '%s' do", names[0], names[1]);
-    return refuse(scene, term, text, NULL);
-}
-
-// Where tubes pass through something is not known.
-static rey_result check_tubes(Render *r, int term) {
-    const SceneView *view = &r->scene->view;
-    rey_result result = view->segments_count > 0 ? rey_boundary_meetings(r) : REY_OK;
-    for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
-        const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, i);
-        for (int k = 0; k < 2 && m->shape[k] >= 0 && result == REY_OK; k++) {
-            result = view->shapes[m->shape[k]].kind == SHAPE_BSPLINE ? refuse_meeting(r->scene, term, m) : REY_OK;
-        }
-    }
-    return result;
-}
-
 // Chains, and collisions that ride along with surfaces, may see all curves along which surfaces, and borders of light, pass
 // through each other, also those that stand still.
 static rey_result check_meetings(rey_scene *scene, int term) {
     Array meetings = {0};
     rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
     if (result == REY_OK && meetings.count > 0) {
-        result = refuse_meeting(scene, term, &ARRAY_AT(meetings, MeetingRecord, 0));
+        const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, 0);
+        char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a light"};
+        for (int k = 0; k < 2 && m->shape[k] >= 0; k++) {
+            rey_name_shape(scene, m->shape[k], names[k]);
+        }
+        snprintf(text, sizeof text, "the curves along which surfaces pass through each other, as '%s' and '%s' do", names[0],
+                 names[1]);
+        result = refuse(scene, term, text, NULL);
     }
     rey_array_free(scene->ctx, &meetings);
     return result;
@@ -166,7 +152,7 @@ static const char *left_out(const SceneView *view, int term) {
 }
 
 // Whether a term of a selection can be computed; records why not.
-static rey_result boundary_check(Render *r, int term) {
+static rey_result boundary_check(const Render *r, int term) {
     rey_scene *scene = r->scene;
     const SceneView *view = &scene->view;
     const SensorRecord *sensor = r->plan.sensor;
@@ -197,6 +183,11 @@ static rey_result boundary_check(Render *r, int term) {
             return refuse(scene, term, tube ? "what mirrors, glass and participating media show of the outlines of curves"
                                             : "the outlines of polylines and grids of distances", name);
         }
+        if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, shape)) {
+            rey_name_shape(scene, (int32_t)i, name);
+            return refuse(scene, term, "the outlines of curves that bend more sharply than their radius, and so through themselves",
+                          name);
+        }
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
         bool steep = rey_light_is_steep(view, view->emitters + i), moves = r->job.any_motion;
@@ -213,9 +204,7 @@ static rey_result boundary_check(Render *r, int term) {
                           name);
         }
     }
-    return r->job.rides                ? check_rides(scene, term)
-           : term == REY_TERM_SPECULAR ? check_meetings(scene, term)
-                                       : check_tubes(r, term);
+    return r->job.rides ? check_rides(scene, term) : term == REY_TERM_SPECULAR ? check_meetings(scene, term) : REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {

@@ -148,15 +148,14 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     return factor * rey_edge_in_world(r, e);
 }
 
-rey_result rey_boundary_meetings(Render *r) {
-    bool found = r->meetings_found;
+static rey_result find_meetings(Render *r) {
     r->meetings_found = true;
-    return found ? REY_OK : rey_meetings_with_borders(r->scene, moves_on_film, r, &r->meetings);
+    return rey_meetings_with_borders(r->scene, moves_on_film, r, &r->meetings);
 }
 
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
 static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
-    rey_result result = rey_boundary_meetings(r);
+    rey_result result = r->meetings_found ? REY_OK : find_meetings(r);
     for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
         EdgeRecord e = {.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
                         .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};

@@ -3,9 +3,6 @@
 
 #include "render/boundary.h"
 
-// Finds the curves along which surfaces pass through each other, of which the selection moves one, unless they are found.
-rey_result rey_boundary_meetings(Render *r);
-
 // Fills the plan's edges and their cumulative probabilities; edge_count 0 = nothing that jumps can move. What the sensor sees
 // of edges that move, by its length on the film; silhouettes that any vertex may see, by length and by the angle that they are
 // silhouettes in; or triangles, by area and by the angle between their normals.

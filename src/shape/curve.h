@@ -10,6 +10,7 @@ enum { BSPLINE_POINTS = 4, LINEAR_POINTS = 2 };
 typedef struct CurvePoint {
     Vec3 c, c1, c2;
     Float r, r1;
+    Float size; // of what the control points span
 } CurvePoint;
 
 // Weights of the control points in value, first, second and third derivative.
@@ -26,19 +27,24 @@ KFN CurveWeights bspline_weights(Float v) {
                           {f_set(-1), f_set(3), f_set(-3), f_set(1)}};
 }
 
-// Sums control points [first, first + n) of a shape with the weights of value, first and second derivative.
+// Sums control points [first, first + n) of a shape with the weights of value, first and second derivative. The sums of the latter
+// are 0: from one of the points on, so that points that are one stay so.
 KFN CurvePoint curve_sum(const SceneView *scene, const Hit *hit, int n, const Float *b, const Float *b1, const Float *b2) {
     Int segment = SHAPE_FIELD(scene, hit->shape, segment) + hit->prim;
     Int at = SHAPE_FIELD(scene, hit->shape, positions) + i_gather(scene->segments, segment) * 4;
-    CurvePoint p = {v3_zero(), v3_zero(), v3_zero(), f_set(0), f_set(0)};
+    CurvePoint p = {v3_zero(), v3_zero(), v3_zero(), f_set(0), f_set(0), f_set(0)};
+    Vec3 base = v3(theta_at(scene, at + 4), theta_at(scene, at + 5), theta_at(scene, at + 6));
+    Float base_r = theta_at(scene, at + 7);
     for (int k = 0; k < n; k++) {
         Vec3 c = v3(theta_at(scene, at + 4 * k), theta_at(scene, at + (4 * k + 1)), theta_at(scene, at + (4 * k + 2)));
         Float r = theta_at(scene, at + (4 * k + 3));
+        Vec3 from = v3_sub(c, base);
         p.c = v3_madd(p.c, b[k], c);
-        p.c1 = v3_madd(p.c1, b1[k], c);
-        p.c2 = v3_madd(p.c2, b2[k], c);
+        p.c1 = v3_madd(p.c1, b1[k], from);
+        p.c2 = v3_madd(p.c2, b2[k], from);
         p.r = p.r + b[k] * r;
-        p.r1 = p.r1 + b1[k] * r;
+        p.r1 = p.r1 + b1[k] * (r - base_r);
+        p.size = p.size + f_abs(from.x) + f_abs(from.y) + f_abs(from.z);
     }
     return p;
 }
@@ -86,6 +92,37 @@ KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const
     si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
     si.dp_dv = curve_along(scene, hit, v3_madd(v3_scale(tangent, stretch), p.r1, e));
     return curve_finish(flags, si);
+}
+
+// How far beyond the ends of a segment feet may lie: the next segment goes on likewise.
+#define TUBE_BEYOND 0.02f
+
+// The foot of x on a segment, where (x - c) . c' = 0: moves hit->u there by Newton's method.
+KFN CurvePoint bspline_foot(const SceneView *scene, Hit *hit, Vec3 x, int steps) {
+    for (int i = 0;; i++) {
+        CurveWeights w = bspline_weights(hit->u);
+        CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+        if (i == steps) {
+            return p;
+        }
+        Vec3 away = v3_sub(x, p.c);
+        Float step = v3_dot(away, p.c1) * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
+        step = f_clamp(step, f_set((real)-0.25), f_set((real)0.25));
+        hit->u = f_clamp(hit->u + step, f_set(-TUBE_BEYOND), f_set(1 + TUBE_BEYOND));
+    }
+}
+
+// Where nothing is known of the foot.
+enum { BSPLINE_SEARCH = 6 };
+
+// Distance of x from a tube, and its gradient, in the space of the curve. hit->u is set.
+KFN Float bspline_distance(const SceneView *scene, Hit *hit, Vec3 x, Vec3 *gradient) {
+    hit->u = f_set((real)0.5);
+    CurvePoint p = bspline_foot(scene, hit, x, BSPLINE_SEARCH);
+    Vec3 away = v3_sub(x, p.c);
+    Float distance = v3_length(away), slope = f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
+    *gradient = v3_madd(v3_scale(away, f_safe_rcp(distance)), -p.r1 * slope, p.c1);
+    return distance - p.r;
 }
 
 // Cone that touches the spheres at both ends, and those spheres: the normal points away from the sphere of the family

@@ -35,13 +35,14 @@ KFN void curve_frame_adj(Vec3 tangent, Vec3 ds, Vec3 dt, Vec3 *dtangent) {
 typedef struct CurveAxes {
     CurvePoint p;
     Vec3 tangent, e, around;
-    Float speed, x, y;
+    Float speed, rcp, x, y; // rcp: one over speed, for derivatives: 0 where a curve begins at control points that are one
 } CurveAxes;
 
 KFN CurveAxes curve_axes(CurvePoint p, Vec3 point) {
     CurveAxes c;
     c.p = p;
     c.speed = v3_length(p.c1);
+    c.rcp = f_zero_unless(m_gt(c.speed, 3e-6f * p.size), f_safe_rcp(c.speed));
     c.tangent = v3_scale(p.c1, f_safe_rcp(c.speed));
     Vec3 away = v3_sub(point, p.c);
     c.e = v3_normalize(v3_madd(away, -v3_dot(away, c.tangent), c.tangent));
@@ -75,7 +76,7 @@ KFN void curve_finish_adj(const SceneView *scene, const Hit *hit, const CurveAxe
     // e = x s + y t
     curve_frame_adj(c->tangent, v3_scale(d->e, c->x), v3_scale(d->e, c->y), &d->tangent);
     // tangent = c1 / speed
-    v3_normalize_adj(c->p.c1, d->tangent, &d->c1);
+    v3_normalize_adj(c->p.c1, v3_select(m_gt(c->rcp, f_set(0)), d->tangent, v3_zero()), &d->c1);
     d->c1 = v3_madd(d->c1, d->speed, c->tangent);
     Int segment = SHAPE_FIELD(scene, hit->shape, segment) + hit->prim;
     Int begin = i_gather(sink->points_at, hit->shape);
@@ -100,7 +101,7 @@ KFN void bspline_move_adj(const SceneView *scene, int32_t flags, const Hit *hit,
     CurveAxes c = bspline_axes(scene, hit, &w);
     const CurvePoint *p = &c.p;
     CurveAdj out = curve_adj_zero();
-    Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1), rcp = f_safe_rcp(c.speed), bend = v3_dot(p->c2, c.e) * rcp;
+    Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1), rcp = c.rcp, bend = v3_dot(p->c2, c.e) * rcp;
     Float stretch = c.speed - p->r * bend, dstretch;
     // p = c + r e
     out.c = d->p;
@@ -143,9 +144,9 @@ KFN Float curve_twist(const CurveAxes *c, Vec3 dtangent) {
 KFN void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     CurveWeights w = bspline_weights(hit->u);
     CurveAxes c = bspline_axes(scene, hit, &w);
-    CurvePoint p = c.p, higher = curve_sum(scene, hit, BSPLINE_POINTS, w.b3, w.b2, w.b);
-    Vec3 c3 = higher.c;
-    Float r2 = higher.r1, rcp = f_safe_rcp(c.speed), n = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count));
+    CurvePoint p = c.p, higher = curve_sum(scene, hit, BSPLINE_POINTS, w.b2, w.b3, w.b2);
+    Vec3 c3 = higher.c1;
+    Float r2 = higher.r, rcp = c.rcp, n = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count));
     Float sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1), bend = v3_dot(p.c2, c.e) * rcp, stretch = c.speed - p.r * bend;
     Vec3 v = v3_madd(v3_scale(c.e, stretch), -p.r1, c.tangent);
     // around: e goes along `around`, that along -e

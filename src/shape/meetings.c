@@ -4,7 +4,6 @@
 #include "shape/shape.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #define TOUCH 1e-4 // of the smaller triangle's size
 
@@ -89,13 +88,59 @@ static double quadric_value(const Quadric *q, const double x[3], double gradient
     return value;
 }
 
+// Distance of x from a tube's segment.
+static double tube_value(const float *points, const double x[3], double gradient[3]) {
+    double u = 0.5, away[3], distance, slope;
+    TubePoint at;
+    for (int i = 0;; i++) {
+        at = rey_tube_at(points, u);
+        for (int k = 0; k < 3; k++) {
+            away[k] = x[k] - at.c[0][k];
+        }
+        slope = dot3(at.c[1], at.c[1]) - dot3(away, at.c[2]);
+        if (i == 6) {
+            break;
+        }
+        double step = fmax(-0.25, fmin(0.25, dot3(away, at.c[1]) / slope));
+        u = fmax(-(double)TUBE_BEYOND, fmin(1 + (double)TUBE_BEYOND, u + (isfinite(step) ? step : 0)));
+    }
+    distance = sqrt(dot3(away, away));
+    for (int k = 0; k < 3; k++) {
+        gradient[k] = away[k] / distance - at.r[1] / slope * at.c[1][k];
+    }
+    return distance - at.r[0];
+}
+
+// The value of a meeting's surface, and its gradient.
+static double surface_value(const SceneView *view, const MeetingRecord *m, int which, const double x[3], double gradient[3]) {
+    const ShapeRecord *shape = m->shape[which] < 0 ? NULL : view->shapes + m->shape[which];
+    if (!shape || shape->kind != SHAPE_BSPLINE) {
+        return quadric_value(m->surface + which, x, gradient);
+    }
+    const float *points = rey_tube_points(view, shape, m->prim[which]);
+    if (shape->collection < 0) {
+        return tube_value(points, x, gradient);
+    }
+    const float *inverse = view->tables + view->instances[m->instance[which]].table + 12;
+    double own[3], slope[3];
+    for (int k = 0; k < 3; k++) {
+        const float *row = inverse + 4 * k;
+        own[k] = (double)row[0] * x[0] + (double)row[1] * x[1] + (double)row[2] * x[2] + (double)row[3];
+    }
+    double value = tube_value(points, own, slope);
+    for (int k = 0; k < 3; k++) {
+        gradient[k] = (double)inverse[k] * slope[0] + (double)inverse[4 + k] * slope[1] + (double)inverse[8 + k] * slope[2];
+    }
+    return value;
+}
+
 // Brings a point to both surfaces by the shortest steps; false where they do not meet nearby.
-static bool meet_at(const Quadric surface[2], double x[3], double near) {
+static bool meet_at(const SceneView *view, const MeetingRecord *m, double x[3], double near) {
     double start[3] = {x[0], x[1], x[2]}, off2 = 0;
     for (int i = 0; i < 8; i++) {
         double g[2][3], f[2];
         for (int s = 0; s < 2; s++) {
-            f[s] = quadric_value(surface + s, x, g[s]);
+            f[s] = surface_value(view, m, s, x, g[s]);
         }
         double aa = dot3(g[0], g[0]), ab = dot3(g[0], g[1]), bb = dot3(g[1], g[1]), det = aa * bb - ab * ab;
         if (!(det > 1e-12 * aa * bb)) {
@@ -126,18 +171,6 @@ static bool share_vertex(const SceneView *view, const ShapeRecord *shape, int32_
     return false;
 }
 
-// So do the segments of a strand.
-static bool share_strand(const SceneView *view, const ShapeRecord *shape, int32_t a, int32_t b) {
-    const int32_t *first = view->segments + shape->segment;
-    return abs(first[a / REY_TUBE_PIECES] - first[b / REY_TUBE_PIECES]) <= 1;
-}
-
-// Whether two pieces of one body may meet.
-static bool may_meet_itself(const SceneView *view, const ShapeRecord *shape, int32_t a, int32_t b) {
-    return shape->kind == SHAPE_MESH ? !share_vertex(view, shape, a, b)
-                                     : shape->kind == SHAPE_BSPLINE && !share_strand(view, shape, a, b);
-}
-
 static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     const SceneView *view = &s->scene->view;
@@ -147,7 +180,9 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
         return REY_OK;
     }
     const ShapeRecord *shape = view->shapes + body[0]->shape;
-    if (piece[0]->body == piece[1]->body && !may_meet_itself(view, shape, piece[0]->triangle, piece[1]->triangle)) {
+    bool itself = piece[0]->body == piece[1]->body;
+    if (rey_bodies_join(view, body[0], body[1]) ||
+        (itself && (shape->kind != SHAPE_MESH || share_vertex(view, shape, piece[0]->triangle, piece[1]->triangle)))) {
         return REY_OK;
     }
     Triangle t[2] = {rey_piece_triangle(s, piece[0]), rey_piece_triangle(s, piece[1])};
@@ -163,13 +198,16 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
         bool mesh = border ? !border->round : kind == SHAPE_MESH;
         m.shape[i] = body[i]->shape;
         m.instance[i] = border ? 0 : body[i]->instance;
-        m.prim[i] = border ? border->light : mesh ? piece[i]->triangle : 0;
+        m.prim[i] = border                  ? border->light
+                    : mesh                  ? piece[i]->triangle
+                    : kind == SHAPE_BSPLINE ? piece[i]->triangle / REY_TUBE_PIECES
+                                            : 0;
         m.surface[i] = quadric_of(s, body[i], t + i);
         round |= !mesh;
         tube |= kind == SHAPE_BSPLINE;
     }
-    double near = 0.1 * fmin(t[0].size, t[1].size);
-    if (round && !tube && !(meet_at(m.surface, ends[0], near) && meet_at(m.surface, ends[1], near))) {
+    double near = (tube ? 0.5 : 0.1) * fmin(t[0].size, t[1].size); // tubes' triangles lie outside of them
+    if (round && !(meet_at(view, &m, ends[0], near) && meet_at(view, &m, ends[1], near))) {
         return REY_OK;
     }
     for (int i = 0; i < 6; i++) {

@@ -3,7 +3,7 @@
 
 #include "scene/scene.h"
 
-// A surface near a curve: f(x) = y . M y / 2 + n . y + constant = 0 with y = x - centre, so that a plane has M = 0.
+// A surface near a curve, tubes excepted: f(x) = y . M y / 2 + n . y + constant = 0 with y = x - centre, so that a plane has M = 0.
 typedef struct Quadric {
     float centre[3], linear[3], constant;
     float matrix[6]; // xx yy zz yz zx xy
@@ -19,7 +19,7 @@ typedef struct LightBorder {
 
 // A piece of such a curve, close to the straight line between its ends.
 typedef struct MeetingRecord {
-    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, and prim its light
+    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, and prim its light; prim of meshes and tubes: triangle, segment
     int32_t instance[2]; // of shapes with SHAPE_INSTANCED, else 0
     float ends[6];       // two points
     Quadric surface[2];
@@ -29,7 +29,7 @@ typedef struct MeetingRecord {
 typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
 
 // Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without
-// passing through, to 1e-4 of its size, does not meet. Of tubes, records say that they may pass through something, not where, and
-// the segments of a strand do not count. Grids of distances and polylines have none yet.
+// passing through, to 1e-4 of its size, does not meet, nor do the segments of a strand. Grids of distances and polylines have none
+// yet.
 rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
                              const void *user, Array *meetings);

@@ -5,9 +5,10 @@
 #include "shape/shape.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 8, TUBE_STACKS = 4 };
+enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 16, TUBE_STACKS = 4 };
 
 static void affine_point(const float *m, const double p[3], double out[3]) {
     for (int k = 0; k < 3; k++) {
@@ -32,7 +33,7 @@ static int32_t triangles_of(const SceneView *view, int32_t id) {
     case SHAPE_DISK:
         return AROUND;
     case SHAPE_BSPLINE:
-        return REY_TUBE_PIECES * shape->segment_count;
+        return REY_TUBE_PIECES; // of a segment
     default:
         return 0;
     }
@@ -78,25 +79,45 @@ static void across_of(const double v[3], const double t[3], double out[3]) {
     }
 }
 
-// Centre, unit tangent and radius of a segment at position u.
-static double tube_axis(const float *p, double u, double c[3], double tangent[3]) {
-    double w = 1 - u, b[4] = {w * w * w / 6, (3 * u * u * u - 6 * u * u + 4) / 6, (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6,
-                              u * u * u / 6};
-    double d[4] = {-0.5 * w * w, 0.5 * (3 * u * u - 4 * u), 0.5 * (-3 * u * u + 2 * u + 1), 0.5 * u * u}, sum[4] = {0}, v[3] = {0};
-    for (int i = 0; i < 4; i++) {
-        for (int k = 0; k < 4; k++) {
-            sum[k] += b[i] * (double)p[4 * i + k];
-        }
-        for (int k = 0; k < 3; k++) {
-            v[k] += d[i] * (double)p[4 * i + k];
+TubePoint rey_tube_at(const float *p, double u) {
+    double w = 1 - u;
+    const double b[3][4] = {{w * w * w / 6, (3 * u * u * u - 6 * u * u + 4) / 6, (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6,
+                             u * u * u / 6},
+                            {-0.5 * w * w, 0.5 * (3 * u * u - 4 * u), 0.5 * (-3 * u * u + 2 * u + 1), 0.5 * u * u},
+                            {w, 3 * u - 2, 1 - 3 * u, u}};
+    TubePoint t = {.r = {0}};
+    for (int d = 0; d < 3; d++) {
+        for (int i = 0; i < 4; i++) {
+            for (int k = 0; k < 3; k++) {
+                t.c[d][k] += b[d][i] * (double)p[4 * i + k];
+            }
+            t.r[d] += b[d][i] * (double)p[4 * i + 3];
         }
     }
-    double length = sqrt(dot3(v, v));
+    return t;
+}
+
+bool rey_tube_folds(const SceneView *view, const ShapeRecord *shape) {
+    for (int32_t i = 0; i < 8 * shape->segment_count; i++) {
+        TubePoint at = rey_tube_at(rey_tube_points(view, shape, i / 8), 0.125 * (i % 8) + 0.0625);
+        double speed2 = dot3(at.c[1], at.c[1]), along = dot3(at.c[1], at.c[2]), bend2 = dot3(at.c[2], at.c[2]);
+        bend2 -= speed2 > 0 ? along * along / speed2 : 0;
+        if (speed2 * speed2 < at.r[0] * at.r[0] * bend2) {
+            return true;
+        }
+    }
+    return false;
+}
+
+const float *rey_tube_points(const SceneView *view, const ShapeRecord *shape, int32_t segment) {
+    return view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
+}
+
+static void tangent_of(const TubePoint *at, double t[3]) {
+    double length = sqrt(dot3(at->c[1], at->c[1]));
     for (int k = 0; k < 3; k++) {
-        c[k] = sum[k];
-        tangent[k] = length > 0 ? v[k] / length : 0;
+        t[k] = length > 0 ? at->c[1][k] / length : 0;
     }
-    return sum[3];
 }
 
 // Of a tube's triangle: nodes around the axis count from a vector that goes along it without turning about it.
@@ -105,19 +126,21 @@ static void tube_corner(const SceneView *view, const ShapeRecord *shape, int32_t
     int32_t cell = triangle % REY_TUBE_PIECES / 2;
     const int32_t *at = corners[triangle % 2][corner];
     const int32_t column = cell % TUBE_AROUND + at[0], row = cell / TUBE_AROUND + at[1];
-    const float *points = view->theta + shape->positions +
-                          4 * (int64_t)view->segments[shape->segment + triangle / REY_TUBE_PIECES];
+    const float *points = rey_tube_points(view, shape, triangle / REY_TUBE_PIECES);
     const double pi = 3.14159265358979323846, phi = 2 * pi * column / TUBE_AROUND;
-    double c[3], t[3], e[3], f[3], radius = tube_axis(points, 0, c, t);
-    double least[3] = {fabs(t[0]) < 0.5, fabs(t[0]) >= 0.5, 0};
+    TubePoint axis = rey_tube_at(points, 0);
+    double t[3], e[3], f[3];
+    tangent_of(&axis, t);
+    const double least[3] = {fabs(t[0]) < 0.5, fabs(t[0]) >= 0.5, 0};
     across_of(least, t, e);
     for (int32_t i = 1; i <= row; i++) {
-        radius = tube_axis(points, (double)i / TUBE_STACKS, c, t);
+        axis = rey_tube_at(points, (double)i / TUBE_STACKS);
+        tangent_of(&axis, t);
         across_of(e, t, e);
     }
     cross3(t, e, f);
     for (int k = 0; k < 3; k++) {
-        p[k] = c[k] + radius / cos(pi / TUBE_AROUND) * (cos(phi) * e[k] + sin(phi) * f[k]);
+        p[k] = axis.c[0][k] + axis.r[0] / cos(pi / TUBE_AROUND) * (cos(phi) * e[k] + sin(phi) * f[k]);
     }
 }
 
@@ -251,31 +274,99 @@ static void widen(const Pieces *s, Box *box) {
     }
 }
 
-static rey_result add_body(Pieces *s, int32_t shape, int32_t instance) {
+static Box box_of_triangles(const Pieces *s, const Body *body) {
+    Box box = box_of_points(NULL, 0);
+    for (int32_t i = 0; i < triangles_of(&s->scene->view, body->shape); i++) {
+        double p[3][3];
+        for (int k = 0; k < 3; k++) {
+            corner_of(s, body, i, k, p[k]);
+        }
+        Box one = box_of_points((const double(*)[3])p, 3);
+        for (int k = 0; k < 3; k++) {
+            box.low[k] = fminf(box.low[k], one.low[k]);
+            box.high[k] = fmaxf(box.high[k], one.high[k]);
+        }
+    }
+    return box;
+}
+
+// Corner i of a box through an affine map, null: as it is.
+static void box_corner(const double low[3], const double high[3], int i, const float *m, double p[3]) {
+    const double q[3] = {i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]};
+    if (m) {
+        affine_point(m, q, p);
+    } else {
+        memcpy(p, q, sizeof q);
+    }
+}
+
+static Box box_of_round(const SceneView *view, const Body *body) {
+    const ShapeRecord *shape = view->shapes + body->shape;
+    double low[3] = {-1, -1, 0}, high[3] = {1, 1, shape->kind == SHAPE_CYLINDER};
+    const float *m = view->theta + shape->to_world;
+    if (shape->kind == SHAPE_SPHERE) {
+        const float *table = view->tables + shape->table;
+        for (int k = 0; k < 3; k++) {
+            low[k] = (double)table[k] - (double)table[3];
+            high[k] = (double)table[k] + (double)table[3];
+        }
+        m = NULL;
+    } else if (shape->kind == SHAPE_BSPLINE) {
+        const double room = 1 / cos(3.14159265358979323846 / TUBE_AROUND);
+        for (int k = 0; k < 3; k++) {
+            low[k] = INFINITY;
+            high[k] = -INFINITY;
+            for (int32_t i = 0; i < BSPLINE_POINTS; i++) {
+                const float *p = rey_tube_points(view, shape, body->segment) + 4 * i;
+                low[k] = fmin(low[k], (double)p[k] - room * (double)p[3]);
+                high[k] = fmax(high[k], (double)p[k] + room * (double)p[3]);
+            }
+        }
+        m = NULL;
+    }
+    const float *instance = shape->collection >= 0 ? view->theta + view->instances[body->instance].to_world : NULL;
+    double corners[8][3];
+    for (int i = 0; i < 8; i++) {
+        box_corner(low, high, i, m, corners[i]);
+        if (instance) {
+            double own[3];
+            memcpy(own, corners[i], sizeof own);
+            affine_point(instance, own, corners[i]);
+        }
+    }
+    return box_of_points((const double(*)[3])corners, 8);
+}
+
+static rey_result add_body(Pieces *s, int32_t shape, int32_t instance, int32_t segment) {
     rey_context *ctx = s->scene->ctx;
     Body *body = rey_array_push(ctx, &s->bodies, sizeof *body, 1);
     Box *box = rey_array_push(ctx, &s->body_boxes, sizeof *box, 1);
     if (!body || !box) {
         return REY_ERROR_MEMORY;
     }
-    *body = (Body){shape, instance, 0};
-    *box = box_of_points(NULL, 0);
-    for (int32_t i = 0; i < triangles_of(&s->scene->view, shape); i++) {
-        double p[3][3];
-        for (int k = 0; k < 3; k++) {
-            corner_of(s, body, i, k, p[k]);
-        }
-        Box one = box_of_points(p, 3);
-        for (int k = 0; k < 3; k++) {
-            box->low[k] = fminf(box->low[k], one.low[k]);
-            box->high[k] = fmaxf(box->high[k], one.high[k]);
-        }
+    *body = (Body){shape, instance, segment, 0};
+    if (shape < 0 || s->scene->view.shapes[shape].kind == SHAPE_MESH) {
+        *box = box_of_triangles(s, body);
+    } else {
+        *box = box_of_round(&s->scene->view, body);
     }
     widen(s, box);
     box->moves = s->moves(s->user, shape, shape < 0 ? s->borders[instance].light : instance);
-    const int32_t kind = shape >= 0 ? s->scene->view.shapes[shape].kind : -1;
-    body->meets = s->itself && box->moves && (kind == SHAPE_MESH || kind == SHAPE_BSPLINE); // itself
+    body->meets = s->itself && shape >= 0 && box->moves && s->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
     return REY_OK;
+}
+
+// Each segment of a tube is a body, lest all of a head of hair is cut up.
+static rey_result add_shape(Pieces *s, int32_t shape, int32_t instance) {
+    const ShapeRecord *record = s->scene->view.shapes + shape;
+    if (record->kind != SHAPE_BSPLINE) {
+        return add_body(s, shape, instance, -1);
+    }
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < record->segment_count && result == REY_OK; i++) {
+        result = add_body(s, shape, instance, i);
+    }
+    return result;
 }
 
 static rey_result add_bodies(Pieces *s) {
@@ -287,22 +378,32 @@ static rey_result add_bodies(Pieces *s) {
             continue;
         }
         if (shape->collection < 0) {
-            result = add_body(s, id, 0);
+            result = add_shape(s, id, 0);
         }
         for (int32_t i = 0; i < view->instances_count && shape->collection >= 0 && result == REY_OK; i++) {
-            result = view->instances[i].group == shape->collection ? add_body(s, id, i) : REY_OK;
+            result = view->instances[i].group == shape->collection ? add_shape(s, id, i) : REY_OK;
         }
     }
     for (int32_t i = 0; i < s->border_count && result == REY_OK; i++) {
-        result = add_body(s, -1, i);
+        result = add_body(s, -1, i, -1);
     }
     return result;
 }
 
+bool rey_bodies_join(const SceneView *view, const Body *a, const Body *b) {
+    if (a->segment < 0 || b->segment < 0 || a->shape != b->shape || a->instance != b->instance) {
+        return false;
+    }
+    const int32_t *first = view->segments + view->shapes[a->shape].segment;
+    return abs(first[a->segment] - first[b->segment]) <= 1;
+}
+
 static rey_result bodies_overlap(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
-    ARRAY_AT(s->bodies, Body, first).meets = 1;
-    ARRAY_AT(s->bodies, Body, second).meets = 1;
+    Body *a = &ARRAY_AT(s->bodies, Body, first), *b = &ARRAY_AT(s->bodies, Body, second);
+    bool meet = !rey_bodies_join(&s->scene->view, a, b);
+    a->meets |= meet;
+    b->meets |= meet;
     return REY_OK;
 }
 
@@ -321,10 +422,11 @@ static rey_result add_pieces(Pieces *s) {
         }
         for (int32_t i = 0; i < n; i++) {
             double p[3][3];
+            const int32_t triangle = i + (body->segment < 0 ? 0 : REY_TUBE_PIECES * body->segment);
             for (int k = 0; k < 3; k++) {
-                corner_of(s, body, i, k, p[k]);
+                corner_of(s, body, triangle, k, p[k]);
             }
-            pieces[i] = (Piece){b, i};
+            pieces[i] = (Piece){b, triangle};
             boxes[i] = box_of_points(p, 3);
             widen(s, boxes + i);
             boxes[i].moves = ARRAY_AT(s->body_boxes, Box, b).moves;

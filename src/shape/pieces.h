@@ -19,14 +19,25 @@ typedef struct Pieces {
     Array *found;             // what the caller makes of it
 } Pieces;
 
-// A shape, or an instance of one; shape -1: the border of a light with the number `instance`.
+// A shape, or an instance of one, of tubes a segment; shape -1: the border of a light with the number `instance`.
 typedef struct Body {
     int32_t shape, instance;
-    int32_t meets; // may meet another
+    int32_t segment; // of a tube, else -1
+    int32_t meets;   // may meet another
 } Body;
 
 // So many triangles stand for one segment of a tube.
-enum { REY_TUBE_PIECES = 64 };
+enum { REY_TUBE_PIECES = 128 };
+
+// Centre and radius of a tube's segment, and their first and second derivatives.
+typedef struct TubePoint {
+    double c[3][3], r[3];
+} TubePoint;
+// p: the segment's control points.
+TubePoint rey_tube_at(const float *p, double u);
+// Whether it bends somewhere more sharply than its radius, so that it passes through itself there.
+bool rey_tube_folds(const SceneView *view, const ShapeRecord *shape);
+const float *rey_tube_points(const SceneView *view, const ShapeRecord *shape, int32_t segment);
 
 // A triangle of a body's mesh, or of those that stand for a round shape.
 typedef struct Piece {
@@ -46,6 +57,9 @@ static inline void cross3(const double a[3], const double b[3], double out[3]) {
         out[k] = a[i] * b[j] - a[j] * b[i];
     }
 }
+
+// Whether two bodies are segments of one strand that follow each other, or the same one.
+bool rey_bodies_join(const SceneView *view, const Body *a, const Body *b);
 
 // Calls `overlap` with the search and the numbers of pieces whose boxes overlap.
 rey_result rey_pieces_overlap(Pieces *s, OverlapFn *overlap);

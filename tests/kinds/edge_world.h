@@ -27,7 +27,7 @@ typedef struct World {
     MeetingRecord meeting;
     BoundaryJob job;
     float theta[NUMBERS], tables[TABLES], spheres[SPHERE_TABLE + TABLES], cdf[2];
-    int32_t triangles[6], segments[1];
+    int32_t triangles[6], segments[2];
 } World;
 
 // Which shapes move.
@@ -108,7 +108,7 @@ static inline void world_make(World *w, uint64_t *random) {
     w->shapes[DISK] = (ShapeRecord){.kind = SHAPE_DISK, .to_world = POSE, .collection = -1};
     w->shapes[CYLINDER] = (ShapeRecord){.kind = SHAPE_CYLINDER, .to_world = POSE, .collection = -1};
     w->shapes[SPHERE] = (ShapeRecord){.kind = SHAPE_SPHERE, .table = TABLES, .collection = -1};
-    w->shapes[TUBE] = (ShapeRecord){.kind = SHAPE_BSPLINE, .positions = CONTROLS, .segment_count = 1, .collection = -1};
+    w->shapes[TUBE] = (ShapeRecord){.kind = SHAPE_BSPLINE, .positions = CONTROLS, .segment_count = 2, .collection = -1};
     for (int i = 0; i < SHAPES; i++) {
         w->shapes[i].group = i;
         w->groups[i] = (Group){.shape_kind = w->shapes[i].kind, .shape_flags = w->shapes[i].flags, .emitter = -1};

@@ -188,19 +188,54 @@ static void test_tubes(void **state) {
     assert_true(judged > ROUNDS / 2);
 }
 
+// Where the surface is hollow along the view, points before and behind lie within the tube.
+static void test_hollow(void **state) {
+    (void)state;
+    uint64_t random = 6;
+    int judged[2] = {0, 0};
+    for (int round = 0; round < 20 * ROUNDS; round++) {
+        World w;
+        world_make(&w, &random);
+        const bool parallel = round % 2;
+        for (int i = 0; i < 4; i++) { // a sharp bend
+            w.theta[CONTROLS + 4 * i + 1] += i % 2 ? 0.8f : -0.8f;
+        }
+        w.edges[1].kind = EDGE_TUBE;
+        w.edges[1].shape = TUBE;
+        w.edges[1].corner = round / 2 % 2;
+        Vec3 eye = v3_normalize(random_vector(&random));
+        eye = parallel ? eye : v3_add(v3(1.2f, 0, 0), v3_scale(eye, 4));
+        EdgePoint e = point_of(&w, 0.5f + 0.4f * uniform(&random), eye, parallel);
+        Hit hit = e.hit;
+        Vec3 view = v3_normalize(towards_eye(eye, parallel, e.p)), slope;
+        const float step = 0.02f;
+        float ahead = bspline_distance(&w.scene, &hit, v3_madd(e.p, step, view), &slope);
+        float behind = bspline_distance(&w.scene, &hit, v3_madd(e.p, -step, view), &slope);
+        if (v3_length(e.tangent) > 0 && fabsf(ahead + behind) > 1e-5f && fabsf(ahead - behind) < fabsf(ahead + behind)) {
+            bool hollow = ahead + behind < 0;
+            assert_true((v3_dot(e.outside, e.outside) > 0) == hollow);
+            if (hollow) { // no ray along it counts
+                assert_true(v3_dot(e.outside, view) > 0);
+            }
+            judged[hollow]++;
+        }
+    }
+    assert_true(judged[0] > ROUNDS && judged[1] > 20);
+}
+
 // In a shapegroup all is as in the group's own space, through the instance.
 static void test_instanced(void **state) {
     (void)state;
-    static const int32_t kinds[5][2] = {{EDGE_RIM, DISK}, {EDGE_RIM, CYLINDER}, {EDGE_SIDE, CYLINDER}, {EDGE_OUTLINE, SPHERE},
-                                        {EDGE_TUBE, TUBE}};
+    static const int32_t kinds[6][2] = {{EDGE_RIM, DISK}, {EDGE_RIM, CYLINDER}, {EDGE_SIDE, CYLINDER}, {EDGE_OUTLINE, SPHERE},
+                                        {EDGE_TUBE, TUBE}, {EDGE_TUBE_END, TUBE}};
     uint64_t random = 5;
     for (int round = 0; round < ROUNDS; round++) {
         World w;
         world_make(&w, &random);
-        const bool parallel = round % 2;
+        const bool parallel = round / 6 % 2;
         float u = 0.5f + 0.4f * uniform(&random);
-        w.edges[1].kind = kinds[round % 5][0];
-        w.edges[1].shape = kinds[round % 5][1];
+        w.edges[1].kind = kinds[round % 6][0];
+        w.edges[1].shape = kinds[round % 6][1];
         Vec3 eye = v3_scale(v3_normalize(random_vector(&random)), parallel ? 1 : 12);
         EdgePoint own = point_of(&w, u, eye, parallel);
         w.shapes[w.edges[1].shape].collection = 0;
@@ -213,6 +248,9 @@ static void test_instanced(void **state) {
         assert_near_v3("point", e.p, pose_to_world(&w.scene, INSTANCE_AT, own.p), 1e-4 * size);
         assert_near_v3("tangent", e.tangent, instance_vector(&w.scene, INSTANCE_AT, own.tangent), 1e-3 * size);
         assert_near_v3("side", e.side[0], instance_vector(&w.scene, INSTANCE_AT, own.side[0]), 1e-4 * size);
+        if (w.edges[1].kind == EDGE_TUBE_END) {
+            assert_near_v3("seen from", e.outside, pose_normal(&w.scene, INSTANCE_AT, own.outside), 1e-5);
+        }
         if (e.round) {
             assert_near_v3("inner point", e.inner, pose_to_world(&w.scene, INSTANCE_AT, own.inner), 1e-4 * size);
             assert_near_v3("middle", edge_reference(&e), pose_to_world(&w.scene, INSTANCE_AT, own.middle), 1e-4 * size);
@@ -274,6 +312,7 @@ static void test_views(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_mesh_edges), cmocka_unit_test(test_rims),
                                        cmocka_unit_test(test_outlines), cmocka_unit_test(test_tubes),
+                                       cmocka_unit_test(test_hollow),
                                        cmocka_unit_test(test_instanced), cmocka_unit_test(test_choice),
                                        cmocka_unit_test(test_views)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -201,7 +201,7 @@ static void test_modes(void **state) {
         for (int i = 0; i < NUMBERS; i++) {
             forward += (double)image[i] * (double)ramp[i];
             size += fabs((double)image[i] * (double)ramp[i]);
-            least += 1e-10 * fabs((double)ramp[i]); // of terms that are 0 but for rounding
+            least += 1e-9 * fabs((double)ramp[i]); // of terms that are 0 but for rounding
         }
         for (int i = 0; i < n; i++) {
             reverse += gradient[i] * (double)tangent[i];
@@ -253,29 +253,19 @@ static void test_refused(void **state) {
     room_close(room);
 }
 
-// Nor where mirrors show tubes, or tubes pass through something.
+// Nor where mirrors show tubes.
 static void test_refused_tubes(void **state) {
     UNUSED(state);
-    static const char *const words[2] = {"mirrors, glass and participating media show of the outlines of curves",
-                                         "as 'floor' and 'rope' do"};
     static float image[NUMBERS];
-    for (int i = 0; i < 2; i++) {
-        Room room = room_open(i ? "boundary_rope.xml" : "mirrored_rope.xml", 1, 0);
-        int param = rey_param_find(room.scene, "camera.to_world"), floor = rey_param_find(room.scene, "floor.to_world");
-        float tangent[MOST] = {0}, pose[16];
-        memcpy(pose, rey_param_values(room.scene, floor), sizeof pose);
-        pose[11] = 0.9f;
-        rey_render_def def = def_make(16, 1, 1);
-        def.terms = 0;
-        tangent[3] = 1;
-        if (i) {
-            ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL));
-            ok(room, rey_param_set(room.scene, floor, pose, 16));
-        }
-        assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_ERROR_INCOMPLETE);
-        assert_non_null(strstr(rey_error(room.ctx), words[i]));
-        room_close(room);
-    }
+    Room room = room_open("mirrored_rope.xml", 1, 0);
+    int param = rey_param_find(room.scene, "camera.to_world");
+    float tangent[MOST] = {0};
+    rey_render_def def = def_make(16, 1, 1);
+    def.terms = 0;
+    tangent[3] = 1;
+    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL), REY_ERROR_INCOMPLETE);
+    assert_non_null(strstr(rey_error(room.ctx), "mirrors, glass and participating media show of the outlines of curves"));
+    room_close(room);
 }
 
 // Lines of textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show.

@@ -76,8 +76,35 @@ KFN Vec3 meeting_end(const BoundaryJob *b, Int i, int end) {
               MEETING_FLOAT(b, i, ends, 3 * end + 2));
 }
 
+// Where the surface is a tube: the distance from it.
+static Float meeting_tube(const SceneView *scene, const BoundaryJob *b, Int i, int which, Vec3 x, Float value, Vec3 *gradient) {
+    Int shape = MEETING_INT(b, i, shape[which]);
+    Mask tube = mi_lt(i_set(-1), shape) & mi_eq(SHAPE_FIELD(scene, i_max(shape, i_set(0)), kind), i_set(SHAPE_BSPLINE));
+    if (!m_any(tube)) {
+        return value;
+    }
+    Hit hit = {i_select(tube, shape, i_set(i_lane(shape, m_first(tube)))), i_select(tube, MEETING_INT(b, i, prim[which]), i_set(0)),
+               f_set(0), f_set(0), x, i_set(0)};
+    Mask inside = tube & mi_lt(i_set(-1), SHAPE_FIELD(scene, hit.shape, collection));
+    Vec3 slope, own = x;
+    Int at = i_set(0);
+    if (m_any(inside)) {
+        hit.instance = i_select(inside, MEETING_INT(b, i, instance[which]), i_set(0));
+        at = instance_table(scene, &hit);
+        own = v3_select(inside, pose_to_local(scene, at, x), x);
+    }
+    Float distance = bspline_distance(scene, &hit, own, &slope);
+    if (m_any(inside)) { // by the transposed inverse
+        Vec3 world = v3_scale(table_v3(scene, at + 12), slope.x);
+        world = v3_madd(v3_madd(world, slope.y, table_v3(scene, at + 16)), slope.z, table_v3(scene, at + 20));
+        slope = v3_select(inside, world, slope);
+    }
+    *gradient = v3_select(tube, slope, *gradient);
+    return f_select(tube, distance, value);
+}
+
 // The value of one of the two surfaces of a meeting at x, and its gradient.
-static Float meeting_surface(const BoundaryJob *b, Int i, int which, Vec3 x, Vec3 *gradient) {
+static Float meeting_surface(const SceneView *scene, const BoundaryJob *b, Int i, int which, Vec3 x, Vec3 *gradient) {
     Float y[3], g[3], value = MEETING_FLOAT(b, i, surface[which].constant, 0);
     y[0] = x.x - MEETING_FLOAT(b, i, surface[which].centre, 0);
     y[1] = x.y - MEETING_FLOAT(b, i, surface[which].centre, 1);
@@ -92,7 +119,7 @@ static Float meeting_surface(const BoundaryJob *b, Int i, int which, Vec3 x, Vec
         value = value + (0.5f * my + linear) * y[k];
     }
     *gradient = v3(g[0], g[1], g[2]);
-    return value;
+    return scene->segments_count ? meeting_tube(scene, b, i, which, x, value, gradient) : value;
 }
 
 // The curve along which two surfaces pass through each other: its point in the plane through p(t), on the straight line between
@@ -100,8 +127,8 @@ static Float meeting_surface(const BoundaryJob *b, Int i, int which, Vec3 x, Vec
 static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
     Int i = i_select(m, EDGE_FIELD(b, e, prim), i_set(0));
     Vec3 from = meeting_end(b, i, 0), along = v3_sub(meeting_end(b, i, 1), from), p = v3_madd(from, t, along), g[2];
-    for (int step = 0; step < 3; step++) {
-        Float f0 = meeting_surface(b, i, 0, p, g), f1 = meeting_surface(b, i, 1, p, g + 1);
+    for (int step = 0; step < 4; step++) {
+        Float f0 = meeting_surface(scene, b, i, 0, p, g), f1 = meeting_surface(scene, b, i, 1, p, g + 1);
         Vec3 back = v3_sub(v3_scale(v3_cross(along, g[0]), f1), v3_scale(v3_cross(along, g[1]), f0));
         Float r = f_safe_rcp(v3_dot(along, v3_cross(g[0], g[1])));
         p = v3_madd(p, -r, back);

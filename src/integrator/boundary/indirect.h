@@ -77,11 +77,13 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * sight.density;
     Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
-    Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
     if (t->scene->has_media) {
+        Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
         m = near_clear(in, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
-    } else {
-        m = m_any(m) ? particle_open(t, &ray, m) : m;
+    } else if (m_any(m)) {
+        // As the sensor's rays find it, which do not start above surfaces: where things touch, there is little between them.
+        Ray ray = {v3_madd(at->si.p, sight.length, d), v3_neg(d), sight.length - 0.25f * interaction_step(at->si.p)};
+        m = rays_open(t, &ray, m);
     }
     near_book(in, &sight, l, at->v.slot, bounce, m);
 }

@@ -9,6 +9,11 @@
 
 #include "integrator/boundary/turning.h"
 
+// Lanes in which rays along d may meet a surface with the normal n: tubes, from outside alone.
+KFN Mask meeting_shows(const SceneView *scene, Int shape, Vec3 n, Vec3 d) {
+    return ~mi_eq(SHAPE_FIELD(scene, i_max(shape, i_set(0)), kind), i_set(SHAPE_BSPLINE)) | m_lt(v3_dot(n, d), f_set(0));
+}
+
 // Samples a batch of segments that end on one of the two surfaces of a curve, and keeps those that begin somewhere.
 static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number, Segments *q) {
     SampleKey key = slot_key(t, number);
@@ -28,6 +33,7 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
     Float step = (1.0f + f_max(f_max(f_abs(e.p.x), f_abs(e.p.y)), f_abs(e.p.z))) * 9e-5f;
     Ray ray = {v3_madd(e.p, -step, d), v3_neg(d), f_set(INFINITY)};
     m = m & m_finite(weight) & m_finite(x + y) & m_gt(weight, f_set(0)) & m_gt(e.probability, f_set(0));
+    m = m & meeting_shows(t->scene, e.hit.shape, e.across[0], d) & meeting_shows(t->scene, e.met.shape, e.across[1], d);
     t->job->rays += m_count(m);
     Hit near = trace_closest(t->scene, &ray, m, false);
     m = m & mi_lt(i_set(-1), near.shape);

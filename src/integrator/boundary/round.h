@@ -73,24 +73,31 @@ static void edge_of_side(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->inner = v3_select(m, pose_to_world(scene, at, v3(nx * unit, ny * unit, t)), out->inner);
 }
 
+// Position t of a tube's segment, of one of them in the lanes that are not in m.
+static Hit tube_hit(const BoundaryJob *b, Int e, Float t, Mask m, const EdgePoint *out) {
+    Int shape = i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m))));
+    return (Hit){shape, i_select(m, EDGE_FIELD(b, e, prim), i_set(0)), t, f_set(0), v3_zero(), i_set(0)};
+}
+
 // A side of a tube, seen from `eye` or along it: at position t of the segment, the point at the angle at which the normal n, along
 // stretch e - r' tangent, is at right angles to the view: stretch (e . a - r) = r' tangent . a, a from the axis to the eye, and
 // without the r where the view is parallel. `stretch` changes little with e: Newton's steps from where it would not.
 static void edge_of_tube(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Vec3 eye, bool parallel, Mask m,
                          EdgePoint *out) {
-    Hit hit = {i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m)))), i_select(m, EDGE_FIELD(b, e, prim), i_set(0)),
-               t, f_set(0), v3_zero(), i_set(0)};
+    Hit hit = tube_hit(b, e, t, m, out);
     CurveWeights w = bspline_weights(t);
     CurvePoint c = curve_sum(scene, &hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
     Float speed = v3_length(c.c1), rcp = f_safe_rcp(speed), round = parallel ? f_set(0) : c.r;
     Frame frame = frame_from_normal(v3_scale(c.c1, rcp));
     Vec3 a = frame_to_local(&frame, parallel ? v3_neg(eye) : v3_sub(eye, c.c)), bend = frame_to_local(&frame, c.c2);
     Float far = f_sqrt(a.x * a.x + a.y * a.y), first = f_atan2(a.y, a.x), sine, cosine;
-    Float near = (round + c.r1 * a.z * rcp) * f_safe_rcp(far), side = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(-1));
+    Float near = (round + c.r1 * a.z * rcp) * f_safe_rcp(far);
+    Float side = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(-1));
     Float angle = first + side * f_acos(f_clamp(near, f_set(-1), f_set(1)));
     for (int i = 0; i < 3; i++) {
         f_sincos(angle, &sine, &cosine);
-        Float stretch = speed - c.r * rcp * (bend.x * cosine + bend.y * sine), dstretch = c.r * rcp * (bend.x * sine - bend.y * cosine);
+        Float stretch = speed - c.r * rcp * (bend.x * cosine + bend.y * sine);
+        Float dstretch = c.r * rcp * (bend.x * sine - bend.y * cosine);
         Float towards = a.x * cosine + a.y * sine - round, turn = a.y * cosine - a.x * sine;
         Float slope = stretch * turn + dstretch * towards;
         angle = angle - f_clamp((stretch * towards - c.r1 * a.z) * f_safe_rcp(slope), f_set((real)-0.1), f_set((real)0.1));
@@ -108,8 +115,8 @@ static void edge_of_tube(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     Vec3 tangent = v3_madd(slide[1].p, -along * f_safe_rcp(around), slide[0].p);
     Float segments = f_from_i(SHAPE_FIELD(scene, hit.shape, segment_count));
     m = m & m_gt(f_abs(around), f_set(0));
-    // Where the surface is hollow along the view, rays touch it from within, on the other side of what they meet: the sensor sees it
-    // through an open end, and other vertices do not.
+    // Where the surface is hollow along the view, rays touch it from within, on the other side of what they meet: the sensor sees
+    // it through an open end, and other vertices do not.
     Float a11 = v3_dot(slide[0].p, slide[0].p), a12 = v3_dot(slide[0].p, slide[1].p), a22 = v3_dot(slide[1].p, slide[1].p);
     Float b1 = v3_dot(slide[0].p, view), b2 = v3_dot(slide[1].p, view), det = f_safe_rcp(a11 * a22 - a12 * a12);
     Vec3 turn = v3_madd(v3_scale(slide[0].ng, (b1 * a22 - b2 * a12) * det), (b2 * a11 - b1 * a12) * det, slide[1].ng);
@@ -127,8 +134,7 @@ static void edge_of_tube(const SceneView *scene, const BoundaryJob *b, Int e, Fl
 // The circle at an end of a tube.
 static void edge_of_tube_end(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
     Float end = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(0)), sine, cosine;
-    Hit hit = {i_select(m, out->hit.shape, i_set(i_lane(out->hit.shape, m_first(m)))), i_select(m, EDGE_FIELD(b, e, prim), i_set(0)),
-               end, f_set(0), v3_zero(), i_set(0)};
+    Hit hit = tube_hit(b, e, end, m, out);
     CurveWeights w = bspline_weights(end);
     CurvePoint c = curve_sum(scene, &hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
     Frame frame = frame_from_normal(v3_normalize(c.c1));
@@ -146,7 +152,8 @@ static void edge_of_tube_end(const SceneView *scene, const BoundaryJob *b, Int e
 static void edge_of_round(const SceneView *scene, const BoundaryJob *b, Int e, Int kind, Float t, Vec3 eye, bool parallel,
                           EdgePoint *out) {
     Mask rim = mi_eq(kind, i_set(EDGE_RIM)), outline = mi_eq(kind, i_set(EDGE_OUTLINE)), side = mi_eq(kind, i_set(EDGE_SIDE));
-    Mask tube = mi_eq(kind, i_set(EDGE_TUBE)), tube_end = mi_eq(kind, i_set(EDGE_TUBE_END)), all = rim | outline | side | tube | tube_end;
+    Mask tube = mi_eq(kind, i_set(EDGE_TUBE)), tube_end = mi_eq(kind, i_set(EDGE_TUBE_END));
+    Mask all = rim | outline | side | tube | tube_end;
     out->round = outline | side | tube;
     if (!m_any(all)) {
         return;

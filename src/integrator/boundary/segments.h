@@ -308,6 +308,15 @@ static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
     return v3_select(m, v3_madd(met.p, -2.0f * step, s->d), o);
 }
 
+// Lanes of m in which what was found against d is seen along d, too: tubes stop rays from outside alone.
+static Mask segment_forwards(Tracer *t, Vec3 o, Vec3 near, Vec3 d, Mask m) {
+    Float step = (1.0f + f_max(f_max(f_abs(near.x), f_abs(near.y)), f_abs(near.z))) * 9e-5f;
+    Ray ray = {v3_madd(near, step, d), d, v3_dot(v3_sub(o, near), d) - 2.0f * step};
+    Mask far = m & m_gt(ray.tmax, f_set(0));
+    t->job->rays += m_count(far);
+    return (m & ~far) | (far & m_gt(spec_max(trace_transmittance(t->scene, &ray, far)), f_set(0)));
+}
+
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
@@ -326,7 +335,11 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     }
     t->job->rays += m_count(m);
     Hit near = trace_closest(t->scene, &back, m, false);
-    segment_keep(s, o, &near, lit, number, q, m & mi_lt(i_set(-1), near.shape));
+    m = m & mi_lt(i_set(-1), near.shape);
+    if (t->scene->segments_count && m_any(m)) {
+        m = segment_forwards(t, o, near.p, s->d, m);
+    }
+    segment_keep(s, o, &near, lit, number, q, m);
 }
 
 // In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through.
