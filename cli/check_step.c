@@ -23,9 +23,10 @@ static double room(const rey_scene *scene, const float *original, const Directio
         if (rey_param_get_info(scene, d->params[k], &info)) {
             continue;
         }
+        bool curve = ends_with(info.name, ".control_points");
         for (int64_t i = d->offsets[k]; i < d->offsets[k + 1]; i++) {
             double t = sign * (double)d->tangent[i], v = (double)original[i];
-            bool radius = ends_with(info.name, ".control_points") && (i - d->offsets[k]) % 4 == 3;
+            bool radius = curve && (i - d->offsets[k]) % 4 == 3;
             if (t > 0) {
                 most = fmin(most, ((double)info.high - v) / t);
             } else if (t < 0) {

@@ -11,8 +11,8 @@
 // One step along rays at x, x and d in the space of the curve. With c(u) the foot of x, (x - c) . c' = 0, the rays meet the tube
 // where f(t) = |x + t d - c|^2 - r^2 is 0, which is a quadratic in t but for how the curve bends: its root at which they enter.
 // Returns t. Rays of *misses do not get there.
-KFN Float tube_step(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d, Mask *misses) {
-    CurvePoint p = bspline_foot(scene, hit, x, 2);
+KFN Float tube_step(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d, CurvePoint *foot, Mask *misses) {
+    const CurvePoint p = *foot = bspline_foot(scene, hit, x, 2);
     Vec3 away = v3_sub(x, p.c);
     Float along = v3_dot(d, p.c1), u1 = along * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
     // halves of f' and f''
@@ -40,10 +40,9 @@ static NOINLINE void tubes_refine(const SceneView *scene, const Ray *ray, Hit *h
         h.p = v3_select(inside, pose_to_local(scene, at, h.p), h.p);
         d = v3_select(inside, pose_direction_to_local(scene, at, d), d);
     }
-    Float moved = tube_step(scene, &h, h.p, d, &misses);
-    moved = moved + tube_step(scene, &h, v3_madd(h.p, moved, d), d, &misses);
-    CurveWeights w = bspline_weights(h.u);
-    CurvePoint p = curve_sum(scene, &h, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    CurvePoint p;
+    Float moved = tube_step(scene, &h, h.p, d, &p, &misses);
+    moved = moved + tube_step(scene, &h, v3_madd(h.p, moved, d), d, &p, &misses);
     m = m & m_lt(moved * moved * v3_dot(d, d), p.r * p.r);
     misses = misses & m;
     hit->u = f_select(m, h.u, hit->u);

@@ -155,9 +155,7 @@ KFN Hit point_hit(const SceneView *scene, Int shape, Int prim, Int instance, Vec
             hit.v = f_select(mine, h.v, hit.v);
         } else if (group->shape_kind == SHAPE_BSPLINE) {
             Vec3 away;
-            Hit own = group->shape_flags & SHAPE_INSTANCED ? instance_hit(scene, &h) : h;
-            bspline_distance(scene, &own, own.p, &away);
-            h.u = own.u;
+            tube_distance(scene, &h, p, &away);
             hit.u = f_select(mine, h.u, hit.u);
         }
         *n = v3_select(mine, shape_interaction(scene, group->shape_kind, group->shape_flags, &h).ng, *n);

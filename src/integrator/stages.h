@@ -186,7 +186,7 @@ KFN Hit trace_past_emitters(Tracer *t, Ray ray, Mask m, Hit hit) {
         if (!m_any(again)) {
             break;
         }
-        Float step = (1.0f + f_max(f_max(f_abs(hit.p.x), f_abs(hit.p.y)), f_abs(hit.p.z))) * 9e-5f;
+        Float step = interaction_step(hit.p);
         Vec3 o = v3_madd(hit.p, step, ray.d);
         Float passed = v3_dot(v3_sub(o, ray.o), ray.d);
         ray.o = v3_select(again, o, ray.o);

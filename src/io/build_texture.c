@@ -300,6 +300,7 @@ rey_result build_texture(Builder *b, rey_xml_node *node, TextureUse use, const c
 
 rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureUse use, const double *value, int count,
                       const char *path, int32_t *out) {
+    double rgb[3] = {value[0], count == 3 ? value[1] : value[0], count == 3 ? value[2] : value[0]};
     rey_xml_child *child = rey_xml_child_named(node, name);
     if (child) {
         if (!(REY_XML_BIT(child->node->tag) & REY_XML_TEXTURES)) {
@@ -313,12 +314,10 @@ rey_result build_slot(Builder *b, rey_xml_node *node, const char *name, TextureU
         if (!left_out) {
             return REY_OK;
         }
-        double rgb[3] = {value[0], count == 3 ? value[1] : value[0], count == 3 ? value[2] : value[0]};
         return build_constant(b, node, name, use, rgb, use.real ? 1 : 3, path, out);
     }
     rey_xml_property *p = rey_xml_find(node, name);
     bool number = p && (p->kind == REY_XML_FLOAT_VALUE || p->kind == REY_XML_INTEGER_VALUE);
-    double rgb[3] = {value[0], count == 3 ? value[1] : value[0], count == 3 ? value[2] : value[0]};
     if (use.real && (!p || number)) {
         TRY(rey_xml_get_float(b->ctx, node, name, value[0], &rgb[0]));
         return build_constant(b, node, name, use, rgb, 1, path, out);

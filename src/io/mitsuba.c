@@ -402,7 +402,7 @@ static void source_free(void *document) {
 rey_result rey_mitsuba_load(rey_context *ctx, const char *path, const rey_define *defines, int define_count, int flags,
                             rey_scene **out) {
     Builder b = {.ctx = ctx, .collection = -1, .lenient = (flags & LOAD_LENIENT) != 0};
-    const int xml_flags = b.lenient ? REY_XML_SPARE | REY_XML_LENIENT : flags & LOAD_SPARE ? REY_XML_SPARE : 0;
+    const int xml_flags = (flags ? REY_XML_SPARE : 0) | (b.lenient ? REY_XML_LENIENT : 0);
     *out = NULL;
     TRY(rey_scene_new(ctx, &b.scene));
     b.source = rey_alloc(ctx, sizeof *b.source);

@@ -183,7 +183,7 @@ static rey_result boundary_check(const Render *r, int term) {
             return refuse(scene, term, tube ? "what mirrors, glass and participating media show of the outlines of curves"
                                             : "the outlines of polylines and grids of distances", name);
         }
-        if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, shape)) {
+        if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, "the outlines of curves that bend more sharply than their radius, and so through themselves",
                           name);

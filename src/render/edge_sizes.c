@@ -1,16 +1,14 @@
 // edge_sizes.c: edges on the film and in the world. Where this is a guess (lenses, round shapes), it decides the noise only.
 #include "render/edge_sizes.h"
 
+#include "shape/affine.h"
+#include "shape/pieces.h"
 #include "shape/shape.h"
 
 #include <math.h>
 
 static void instance_point(const SceneView *view, const EdgeRecord *e, double p[3]) {
-    const float *m = view->theta + view->instances[e->instance].to_world;
-    double q[3] = {p[0], p[1], p[2]};
-    for (int k = 0; k < 3; k++) {
-        p[k] = m[4 * k] * q[0] + m[4 * k + 1] * q[1] + m[4 * k + 2] * q[2] + m[4 * k + 3];
-    }
+    rey_affine_point(view->theta + view->instances[e->instance].to_world, p, p);
 }
 
 static void mesh_point(const SceneView *view, const EdgeRecord *e, int32_t vertex, double p[3]) {
@@ -227,40 +225,32 @@ static double mark_length(const Render *r, const EdgeRecord *e) {
     return sqrt(length2);
 }
 
-// No vector becomes longer than so many times its length.
-static double pose_norm(const float *m) {
-    double sum = 0;
-    for (int k = 0; k < 11; k++) {
-        sum += k % 4 < 3 ? (double)m[k] * (double)m[k] : 0;
-    }
-    return sqrt(sum);
-}
-
-// The middle of a round shape, or of a tube's segment, from which no point of it is further than twice what is returned.
-static double round_ball(const SceneView *view, const EdgeRecord *e, double centre[3]) {
+// The middle of a round shape, or of a tube's segment, and its size. No point of it is further from there than *reach: a pose whose
+// entries are at most `size` makes vectors at most three times that.
+static double round_ball(const SceneView *view, const EdgeRecord *e, double centre[3], double *reach) {
     const ShapeRecord *shape = view->shapes + e->shape;
     double size = 0;
     if (shape->kind == SHAPE_BSPLINE) {
-        const float *p = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + e->prim];
+        double low[3], high[3];
+        rey_tube_box(view, e->shape, e->prim, 1, low, high);
         for (int k = 0; k < 3; k++) {
-            double low = INFINITY, high = -INFINITY;
-            for (int i = 0; i < BSPLINE_POINTS; i++) {
-                low = fmin(low, (double)p[4 * i + k] - (double)p[4 * i + 3]);
-                high = fmax(high, (double)p[4 * i + k] + (double)p[4 * i + 3]);
-            }
-            centre[k] = 0.5 * (low + high);
-            size = fmax(size, 0.5 * (high - low));
+            centre[k] = 0.5 * (low[k] + high[k]);
+            size = fmax(size, 0.5 * (high[k] - low[k]));
         }
+        *reach = 2 * size;
     } else {
         const float *m = view->theta + shape->to_world;
         for (int k = 0; k < 3; k++) {
             centre[k] = (double)m[4 * k + 3];
         }
-        size = pose_norm(m);
+        size = rey_pose_size(m);
+        *reach = 4.5 * size; // of a cylinder's other end
     }
     if (shape->collection >= 0) {
+        double wider = rey_pose_size(view->theta + view->instances[e->instance].to_world);
         instance_point(view, e, centre);
-        size *= pose_norm(view->theta + view->instances[e->instance].to_world);
+        size *= wider;
+        *reach *= 3 * wider;
     }
     return size;
 }
@@ -283,14 +273,14 @@ static bool may_see(const Projection *p, const double local[3], double reach) {
 }
 
 // Of round shapes' edges, how long they are, in units of the shape's size.
-static double round_length(const EdgeRecord *e) { return (e->kind == EDGE_TUBE ? 1.5 : 4) * (double)(e->last - e->first); }
+static double round_length(const EdgeRecord *e) { return (e->kind == EDGE_TUBE ? 1.5 : 6) * (double)(e->last - e->first); }
 
 // As many pixels as the shape's size has.
 static double see_round(const SceneView *view, const Projection *p, const EdgeRecord *e) {
-    double centre[3], local[3], size = round_ball(view, e, centre);
+    double centre[3], local[3], reach, size = round_ball(view, e, centre, &reach);
     rey_to_sensor(p, centre, local);
     double distance = p->parallel ? 1 : fmax(local[2], size);
-    return may_see(p, local, 2 * size) ? fabs(p->scale_x) * size / distance * round_length(e) + 0.01 : 0;
+    return may_see(p, local, reach) ? fabs(p->scale_x) * size / distance * round_length(e) + 0.01 : 0;
 }
 
 // World area of a triangle.
@@ -360,7 +350,7 @@ double rey_edge_on_film(const Render *r, const Projection *p, const double eye[4
 
 double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
-    double length, angle, centre[3];
+    double length, angle, centre[3], reach;
     switch (e->kind) {
     case EDGE_MEETING:
         return meeting_length(r, e);
@@ -374,6 +364,6 @@ double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
         angle = mesh_edge_angle(view, e, &length);
         return length * angle;
     default:
-        return 3.3 * round_ball(view, e, centre) * round_length(e); // a silhouette in an angle of pi
+        return 10 / 3.0 * round_ball(view, e, centre, &reach) * round_length(e); // a silhouette in an angle of about pi
     }
 }

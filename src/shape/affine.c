@@ -38,3 +38,10 @@ double rey_matrix_determinant(const double m[16]) {
     return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
            m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
+
+void rey_affine_point(const float *m, const double p[3], double out[3]) {
+    const double q[3] = {p[0], p[1], p[2]};
+    for (int k = 0; k < 3; k++) {
+        out[k] = (double)m[4 * k] * q[0] + (double)m[4 * k + 1] * q[1] + (double)m[4 * k + 2] * q[2] + (double)m[4 * k + 3];
+    }
+}

@@ -77,21 +77,10 @@ KFN Interaction curve_finish(int32_t flags, Interaction si) {
     return si;
 }
 
-// Swept circle p = c + r e, e perpendicular to T = c' / |c'|: n is parallel to e - T r' / (|c'| - r (c'' . e) / |c'|).
-KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+// Where hit->u is.
+KFN CurvePoint bspline_point(const SceneView *scene, const Hit *hit) {
     CurveWeights w = bspline_weights(hit->u);
-    CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
-    Float speed = v3_length(p.c1);
-    Vec3 tangent = v3_scale(p.c1, f_safe_rcp(speed)), away = v3_sub(hit->p, p.c);
-    Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));
-    Float stretch = speed - p.r * v3_dot(p.c2, e) * f_safe_rcp(speed);
-    Interaction si;
-    si.ng = v3_normalize(v3_madd(e, -p.r1 * f_safe_rcp(stretch), tangent));
-    si.p = v3_madd(p.c, p.r, e);
-    si.uv = curve_uv(scene, hit, tangent, e);
-    si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
-    si.dp_dv = curve_along(scene, hit, v3_madd(v3_scale(tangent, stretch), p.r1, e));
-    return curve_finish(flags, si);
+    return curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
 }
 
 // How far beyond the ends of a segment feet may lie: the next segment goes on likewise.
@@ -100,8 +89,7 @@ KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const
 // The foot of x on a segment, where (x - c) . c' = 0: moves hit->u there by Newton's method.
 KFN CurvePoint bspline_foot(const SceneView *scene, Hit *hit, Vec3 x, int steps) {
     for (int i = 0;; i++) {
-        CurveWeights w = bspline_weights(hit->u);
-        CurvePoint p = curve_sum(scene, hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+        CurvePoint p = bspline_point(scene, hit);
         if (i == steps) {
             return p;
         }
@@ -123,6 +111,22 @@ KFN Float bspline_distance(const SceneView *scene, Hit *hit, Vec3 x, Vec3 *gradi
     Float distance = v3_length(away), slope = f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
     *gradient = v3_madd(v3_scale(away, f_safe_rcp(distance)), -p.r1 * slope, p.c1);
     return distance - p.r;
+}
+
+// Swept circle p = c + r e, e perpendicular to T = c' / |c'|: n is parallel to e - T r' / (|c'| - r (c'' . e) / |c'|).
+KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+    CurvePoint p = bspline_point(scene, hit);
+    Float speed = v3_length(p.c1);
+    Vec3 tangent = v3_scale(p.c1, f_safe_rcp(speed)), away = v3_sub(hit->p, p.c);
+    Vec3 e = v3_normalize(v3_madd(away, -v3_dot(away, tangent), tangent));
+    Float stretch = speed - p.r * v3_dot(p.c2, e) * f_safe_rcp(speed);
+    Interaction si;
+    si.ng = v3_normalize(v3_madd(e, -p.r1 * f_safe_rcp(stretch), tangent));
+    si.p = v3_madd(p.c, p.r, e);
+    si.uv = curve_uv(scene, hit, tangent, e);
+    si.dp_du = v3_scale(v3_cross(tangent, e), TWO_PI * p.r);
+    si.dp_dv = curve_along(scene, hit, v3_madd(v3_scale(tangent, stretch), p.r1, e));
+    return curve_finish(flags, si);
 }
 
 // Cone that touches the spheres at both ends, and those spheres: the normal points away from the sphere of the family

@@ -88,50 +88,18 @@ static double quadric_value(const Quadric *q, const double x[3], double gradient
     return value;
 }
 
-// Distance of x from a tube's segment.
-static double tube_value(const float *points, const double x[3], double gradient[3]) {
-    double u = 0.5, away[3], distance, slope;
-    TubePoint at;
-    for (int i = 0;; i++) {
-        at = rey_tube_at(points, u);
-        for (int k = 0; k < 3; k++) {
-            away[k] = x[k] - at.c[0][k];
-        }
-        slope = dot3(at.c[1], at.c[1]) - dot3(away, at.c[2]);
-        if (i == 6) {
-            break;
-        }
-        double step = fmax(-0.25, fmin(0.25, dot3(away, at.c[1]) / slope));
-        u = fmax(-(double)TUBE_BEYOND, fmin(1 + (double)TUBE_BEYOND, u + (isfinite(step) ? step : 0)));
-    }
-    distance = sqrt(dot3(away, away));
-    for (int k = 0; k < 3; k++) {
-        gradient[k] = away[k] / distance - at.r[1] / slope * at.c[1][k];
-    }
-    return distance - at.r[0];
-}
-
 // The value of a meeting's surface, and its gradient.
 static double surface_value(const SceneView *view, const MeetingRecord *m, int which, const double x[3], double gradient[3]) {
-    const ShapeRecord *shape = m->shape[which] < 0 ? NULL : view->shapes + m->shape[which];
-    if (!shape || shape->kind != SHAPE_BSPLINE) {
+    Hit hit = {.shape = m->shape[which], .prim = m->prim[which], .instance = m->instance[which]};
+    if (hit.shape < 0 || view->shapes[hit.shape].kind != SHAPE_BSPLINE) {
         return quadric_value(m->surface + which, x, gradient);
     }
-    const float *points = rey_tube_points(view, shape, m->prim[which]);
-    if (shape->collection < 0) {
-        return tube_value(points, x, gradient);
-    }
-    const float *inverse = view->tables + view->instances[m->instance[which]].table + 12;
-    double own[3], slope[3];
-    for (int k = 0; k < 3; k++) {
-        const float *row = inverse + 4 * k;
-        own[k] = (double)row[0] * x[0] + (double)row[1] * x[1] + (double)row[2] * x[2] + (double)row[3];
-    }
-    double value = tube_value(points, own, slope);
-    for (int k = 0; k < 3; k++) {
-        gradient[k] = (double)inverse[k] * slope[0] + (double)inverse[4 + k] * slope[1] + (double)inverse[8 + k] * slope[2];
-    }
-    return value;
+    Vec3 slope;
+    float distance = tube_distance(view, &hit, v3((float)x[0], (float)x[1], (float)x[2]), &slope);
+    gradient[0] = (double)slope.x;
+    gradient[1] = (double)slope.y;
+    gradient[2] = (double)slope.z;
+    return (double)distance;
 }
 
 // Brings a point to both surfaces by the shortest steps; false where they do not meet nearby.

@@ -10,12 +10,6 @@
 
 enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 16, TUBE_STACKS = 4 };
 
-static void affine_point(const float *m, const double p[3], double out[3]) {
-    for (int k = 0; k < 3; k++) {
-        out[k] = (double)m[4 * k] * p[0] + (double)m[4 * k + 1] * p[1] + (double)m[4 * k + 2] * p[2] + (double)m[4 * k + 3];
-    }
-}
-
 // ---- surfaces in triangles ---------------------------------------------------------------------------------------
 
 static int32_t triangles_of(const SceneView *view, int32_t id) {
@@ -50,11 +44,13 @@ static void round_node(int32_t kind, int32_t column, int32_t row, double p[3]) {
     p[2] = kind == SHAPE_SPHERE ? cos(theta) : kind == SHAPE_CYLINDER ? row : 0;
 }
 
+// The columns and rows of the corners of both triangles of a cell.
+static const int32_t cell_corners[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
+
 static void round_corner(const SceneView *view, const ShapeRecord *shape, int32_t triangle, int k, double p[3]) {
     int32_t cell = shape->kind == SHAPE_DISK ? triangle : triangle / 2, column = cell % AROUND, row = cell / AROUND;
     bool second = shape->kind != SHAPE_DISK && triangle % 2 == 1;
-    static const int32_t corners[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
-    const int32_t *at = corners[second][k];
+    const int32_t *at = cell_corners[second][k];
     double own[3];
     round_node(shape->kind, column + at[0], row + at[1], own);
     if (shape->kind == SHAPE_SPHERE) {
@@ -63,7 +59,7 @@ static void round_corner(const SceneView *view, const ShapeRecord *shape, int32_
             p[c] = (double)t[c] + (double)t[3] * own[c];
         }
     } else {
-        affine_point(view->theta + shape->to_world, own, p);
+        rey_affine_point(view->theta + shape->to_world, own, p);
     }
 }
 
@@ -79,68 +75,62 @@ static void across_of(const double v[3], const double t[3], double out[3]) {
     }
 }
 
-TubePoint rey_tube_at(const float *p, double u) {
-    double w = 1 - u;
-    const double b[3][4] = {{w * w * w / 6, (3 * u * u * u - 6 * u * u + 4) / 6, (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6,
-                             u * u * u / 6},
-                            {-0.5 * w * w, 0.5 * (3 * u * u - 4 * u), 0.5 * (-3 * u * u + 2 * u + 1), 0.5 * u * u},
-                            {w, 3 * u - 2, 1 - 3 * u, u}};
-    TubePoint t = {.r = {0}};
-    for (int d = 0; d < 3; d++) {
-        for (int i = 0; i < 4; i++) {
-            for (int k = 0; k < 3; k++) {
-                t.c[d][k] += b[d][i] * (double)p[4 * i + k];
-            }
-            t.r[d] += b[d][i] * (double)p[4 * i + 3];
-        }
-    }
-    return t;
+static CurvePoint tube_at(const SceneView *view, int32_t id, int32_t segment, float u) {
+    Hit hit = {.shape = id, .prim = segment, .u = u};
+    return bspline_point(view, &hit);
 }
 
-bool rey_tube_folds(const SceneView *view, const ShapeRecord *shape) {
-    for (int32_t i = 0; i < 8 * shape->segment_count; i++) {
-        TubePoint at = rey_tube_at(rey_tube_points(view, shape, i / 8), 0.125 * (i % 8) + 0.0625);
-        double speed2 = dot3(at.c[1], at.c[1]), along = dot3(at.c[1], at.c[2]), bend2 = dot3(at.c[2], at.c[2]);
-        bend2 -= speed2 > 0 ? along * along / speed2 : 0;
-        if (speed2 * speed2 < at.r[0] * at.r[0] * bend2) {
+bool rey_tube_folds(const SceneView *view, int32_t id) {
+    for (int32_t i = 0; i < 8 * view->shapes[id].segment_count; i++) {
+        CurvePoint at = tube_at(view, id, i / 8, 0.125f * (float)(i % 8) + 0.0625f);
+        float speed = v3_length(at.c1);
+        if (speed * speed * speed < at.r * v3_length(v3_cross(at.c1, at.c2))) {
             return true;
         }
     }
     return false;
 }
 
-const float *rey_tube_points(const SceneView *view, const ShapeRecord *shape, int32_t segment) {
-    return view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
-}
-
-static void tangent_of(const TubePoint *at, double t[3]) {
-    double length = sqrt(dot3(at->c[1], at->c[1]));
+void rey_tube_box(const SceneView *view, int32_t id, int32_t segment, double room, double low[3], double high[3]) {
+    const ShapeRecord *shape = view->shapes + id;
+    const float *p = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
     for (int k = 0; k < 3; k++) {
-        t[k] = length > 0 ? at->c[1][k] / length : 0;
+        low[k] = INFINITY;
+        high[k] = -INFINITY;
+        for (int i = 0; i < BSPLINE_POINTS; i++) {
+            low[k] = fmin(low[k], (double)p[4 * i + k] - room * (double)p[4 * i + 3]);
+            high[k] = fmax(high[k], (double)p[4 * i + k] + room * (double)p[4 * i + 3]);
+        }
     }
 }
 
+static void tangent_of(const CurvePoint *at, double t[3]) {
+    Vec3 tangent = v3_normalize(at->c1);
+    t[0] = (double)tangent.x;
+    t[1] = (double)tangent.y;
+    t[2] = (double)tangent.z;
+}
+
 // Of a tube's triangle: nodes around the axis count from a vector that goes along it without turning about it.
-static void tube_corner(const SceneView *view, const ShapeRecord *shape, int32_t triangle, int corner, double p[3]) {
-    static const int32_t corners[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
+static void tube_corner(const SceneView *view, int32_t id, int32_t triangle, int corner, double p[3]) {
     int32_t cell = triangle % REY_TUBE_PIECES / 2;
-    const int32_t *at = corners[triangle % 2][corner];
+    const int32_t *at = cell_corners[triangle % 2][corner];
     const int32_t column = cell % TUBE_AROUND + at[0], row = cell / TUBE_AROUND + at[1];
-    const float *points = rey_tube_points(view, shape, triangle / REY_TUBE_PIECES);
     const double pi = 3.14159265358979323846, phi = 2 * pi * column / TUBE_AROUND;
-    TubePoint axis = rey_tube_at(points, 0);
+    CurvePoint axis = tube_at(view, id, triangle / REY_TUBE_PIECES, 0);
     double t[3], e[3], f[3];
     tangent_of(&axis, t);
     const double least[3] = {fabs(t[0]) < 0.5, fabs(t[0]) >= 0.5, 0};
     across_of(least, t, e);
     for (int32_t i = 1; i <= row; i++) {
-        axis = rey_tube_at(points, (double)i / TUBE_STACKS);
+        axis = tube_at(view, id, triangle / REY_TUBE_PIECES, (float)i / TUBE_STACKS);
         tangent_of(&axis, t);
         across_of(e, t, e);
     }
     cross3(t, e, f);
+    const double c[3] = {(double)axis.c.x, (double)axis.c.y, (double)axis.c.z}, wide = (double)axis.r / cos(pi / TUBE_AROUND);
     for (int k = 0; k < 3; k++) {
-        p[k] = axis.c[0][k] + axis.r[0] / cos(pi / TUBE_AROUND) * (cos(phi) * e[k] + sin(phi) * f[k]);
+        p[k] = c[k] + wide * (cos(phi) * e[k] + sin(phi) * f[k]);
     }
 }
 
@@ -164,12 +154,12 @@ static void corner_of(const Pieces *s, const Body *body, int32_t triangle, int k
             q[c] = (double)own[c];
         }
     } else if (shape->kind == SHAPE_BSPLINE) {
-        tube_corner(view, shape, triangle, k, q);
+        tube_corner(view, body->shape, triangle, k, q);
     } else {
         round_corner(view, shape, triangle, k, q);
     }
     if (shape->collection >= 0) {
-        affine_point(view->theta + view->instances[body->instance].to_world, q, p);
+        rey_affine_point(view->theta + view->instances[body->instance].to_world, q, p);
     } else {
         memcpy(p, q, sizeof q);
     }
@@ -290,48 +280,28 @@ static Box box_of_triangles(const Pieces *s, const Body *body) {
     return box;
 }
 
-// Corner i of a box through an affine map, null: as it is.
-static void box_corner(const double low[3], const double high[3], int i, const float *m, double p[3]) {
-    const double q[3] = {i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]};
-    if (m) {
-        affine_point(m, q, p);
-    } else {
-        memcpy(p, q, sizeof q);
-    }
-}
-
 static Box box_of_round(const SceneView *view, const Body *body) {
     const ShapeRecord *shape = view->shapes + body->shape;
-    double low[3] = {-1, -1, 0}, high[3] = {1, 1, shape->kind == SHAPE_CYLINDER};
-    const float *m = view->theta + shape->to_world;
+    double low[3] = {-1, -1, 0}, high[3] = {1, 1, shape->kind == SHAPE_CYLINDER}, corners[8][3];
     if (shape->kind == SHAPE_SPHERE) {
         const float *table = view->tables + shape->table;
         for (int k = 0; k < 3; k++) {
             low[k] = (double)table[k] - (double)table[3];
             high[k] = (double)table[k] + (double)table[3];
         }
-        m = NULL;
     } else if (shape->kind == SHAPE_BSPLINE) {
-        const double room = 1 / cos(3.14159265358979323846 / TUBE_AROUND);
-        for (int k = 0; k < 3; k++) {
-            low[k] = INFINITY;
-            high[k] = -INFINITY;
-            for (int32_t i = 0; i < BSPLINE_POINTS; i++) {
-                const float *p = rey_tube_points(view, shape, body->segment) + 4 * i;
-                low[k] = fmin(low[k], (double)p[k] - room * (double)p[3]);
-                high[k] = fmax(high[k], (double)p[k] + room * (double)p[3]);
-            }
-        }
-        m = NULL;
+        rey_tube_box(view, body->shape, body->segment, 1 / cos(3.14159265358979323846 / TUBE_AROUND), low, high);
     }
-    const float *instance = shape->collection >= 0 ? view->theta + view->instances[body->instance].to_world : NULL;
-    double corners[8][3];
     for (int i = 0; i < 8; i++) {
-        box_corner(low, high, i, m, corners[i]);
-        if (instance) {
-            double own[3];
-            memcpy(own, corners[i], sizeof own);
-            affine_point(instance, own, corners[i]);
+        double *p = corners[i];
+        for (int k = 0; k < 3; k++) {
+            p[k] = i >> k & 1 ? high[k] : low[k];
+        }
+        if (shape->kind == SHAPE_DISK || shape->kind == SHAPE_CYLINDER) {
+            rey_affine_point(view->theta + shape->to_world, p, p);
+        }
+        if (shape->collection >= 0) {
+            rey_affine_point(view->theta + view->instances[body->instance].to_world, p, p);
         }
     }
     return box_of_points((const double(*)[3])corners, 8);

@@ -29,15 +29,10 @@ typedef struct Body {
 // So many triangles stand for one segment of a tube.
 enum { REY_TUBE_PIECES = 128 };
 
-// Centre and radius of a tube's segment, and their first and second derivatives.
-typedef struct TubePoint {
-    double c[3][3], r[3];
-} TubePoint;
-// p: the segment's control points.
-TubePoint rey_tube_at(const float *p, double u);
-// Whether it bends somewhere more sharply than its radius, so that it passes through itself there.
-bool rey_tube_folds(const SceneView *view, const ShapeRecord *shape);
-const float *rey_tube_points(const SceneView *view, const ShapeRecord *shape, int32_t segment);
+// Whether a tube bends somewhere more sharply than its radius, so that it passes through itself there.
+bool rey_tube_folds(const SceneView *view, int32_t shape);
+// What a tube's segment lies in, with `room` times its radii about its control points, in its own space.
+void rey_tube_box(const SceneView *view, int32_t shape, int32_t segment, double room, double low[3], double high[3]);
 
 // A triangle of a body's mesh, or of those that stand for a round shape.
 typedef struct Piece {

@@ -88,12 +88,14 @@ KFN Vec3 pose_to_world(const SceneView *scene, Int at, Vec3 p) {
     return v3(r[0], r[1], r[2]);
 }
 
-// Normals follow the inverse transpose.
-KFN Vec3 pose_normal(const SceneView *scene, Int at, Vec3 n) {
+// Gradients and normals follow the inverse transpose.
+KFN Vec3 pose_gradient(const SceneView *scene, Int at, Vec3 n) {
     Vec3 r = v3_scale(table_v3(scene, at + 12), n.x);
     r = v3_madd(r, n.y, table_v3(scene, at + 16));
-    return v3_normalize(v3_madd(r, n.z, table_v3(scene, at + 20)));
+    return v3_madd(r, n.z, table_v3(scene, at + 20));
 }
+
+KFN Vec3 pose_normal(const SceneView *scene, Int at, Vec3 n) { return v3_normalize(pose_gradient(scene, at, n)); }
 
 // A point of a shape without triangles.
 KFN Hit hit_at(int32_t id, Vec3 p) { return (Hit){i_set(id), i_set(0), f_set(0), f_set(0), p, i_set(0)}; }

@@ -73,6 +73,20 @@ KFN Vec3 shape_point(const SceneView *scene, int32_t id, Vec2 uv) {
                                 : cylinder_point(scene, at, uv);
 }
 
+// Distance of x from tubes, which all lanes of *hit lie on, as bspline_distance; of those in shapegroups in units of these, with
+// the gradient in the world.
+KFN Float tube_distance(const SceneView *scene, Hit *hit, Vec3 x, Vec3 *gradient) {
+    Mask inside = mi_lt(i_set(-1), SHAPE_FIELD(scene, hit->shape, collection));
+    if (!m_any(inside)) {
+        return bspline_distance(scene, hit, x, gradient);
+    }
+    hit->instance = i_select(inside, hit->instance, i_set(0));
+    Int at = instance_table(scene, hit);
+    Float distance = bspline_distance(scene, hit, v3_select(inside, pose_to_local(scene, at, x), x), gradient);
+    *gradient = v3_select(inside, pose_gradient(scene, at, *gradient), *gradient);
+    return distance;
+}
+
 // Kinds whose points and numbers move.h knows how to move; all slide.
 KFN bool shape_moves(int32_t kind) {
     return kind == SHAPE_MESH || kind == SHAPE_SPHERE || kind == SHAPE_DISK || kind == SHAPE_CYLINDER ||

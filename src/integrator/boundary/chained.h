@@ -27,7 +27,7 @@ KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, int side) {
 // Where rays from the edge begin, out of the way of its surfaces: beside silhouettes, and towards the viewer where there are two.
 KFN Vec3 chained_offset(const Segment *s) {
     const EdgePoint *e = &s->edge;
-    Float step = (1.0f + f_max(f_max(f_abs(e->p.x), f_abs(e->p.y)), f_abs(e->p.z))) * 9e-5f;
+    Float step = interaction_step(e->p);
     return v3_select(s->silhouette, v3_madd(e->p, step, s->n), v3_madd(e->p, -4.0f * step, s->d));
 }
 

@@ -84,21 +84,9 @@ static Float meeting_tube(const SceneView *scene, const BoundaryJob *b, Int i, i
         return value;
     }
     Hit hit = {i_select(tube, shape, i_set(i_lane(shape, m_first(tube)))), i_select(tube, MEETING_INT(b, i, prim[which]), i_set(0)),
-               f_set(0), f_set(0), x, i_set(0)};
-    Mask inside = tube & mi_lt(i_set(-1), SHAPE_FIELD(scene, hit.shape, collection));
-    Vec3 slope, own = x;
-    Int at = i_set(0);
-    if (m_any(inside)) {
-        hit.instance = i_select(inside, MEETING_INT(b, i, instance[which]), i_set(0));
-        at = instance_table(scene, &hit);
-        own = v3_select(inside, pose_to_local(scene, at, x), x);
-    }
-    Float distance = bspline_distance(scene, &hit, own, &slope);
-    if (m_any(inside)) { // by the transposed inverse
-        Vec3 world = v3_scale(table_v3(scene, at + 12), slope.x);
-        world = v3_madd(v3_madd(world, slope.y, table_v3(scene, at + 16)), slope.z, table_v3(scene, at + 20));
-        slope = v3_select(inside, world, slope);
-    }
+               f_set(0), f_set(0), x, MEETING_INT(b, i, instance[which])};
+    Vec3 slope;
+    Float distance = tube_distance(scene, &hit, x, &slope);
     *gradient = v3_select(tube, slope, *gradient);
     return f_select(tube, distance, value);
 }

@@ -28,8 +28,7 @@ static Facet facet_load(const SceneView *scene, const Hit *hit, Mask m) {
         f.n[k] = v3_select(flip, v3_neg(f.n[k]), f.n[k]);
         if (m_any(inside)) {
             Int at = instance_table(scene, &h);
-            Vec3 n = v3_scale(table_v3(scene, at + 12), f.n[k].x);
-            n = v3_madd(v3_madd(n, f.n[k].y, table_v3(scene, at + 16)), f.n[k].z, table_v3(scene, at + 20));
+            Vec3 n = pose_gradient(scene, at, f.n[k]);
             f.p[k] = v3_select(inside, pose_to_world(scene, at, f.p[k]), f.p[k]);
             f.n[k] = v3_select(inside, n, f.n[k]);
         }

@@ -25,7 +25,7 @@ static void lines_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number, S
     // r is some multiple of side[0], which with the tangent spans `area`.
     Float swept = v3_dot(e.rise, e.side[0]) * f_safe_rcp(v3_dot(e.side[0], e.side[0])) * size;
     Float weight = swept * TWO_PI * f_safe_rcp(e.probability);
-    Float step = (1.0f + f_max(f_max(f_abs(e.p.x), f_abs(e.p.y)), f_abs(e.p.z))) * 9e-5f;
+    Float step = interaction_step(e.p);
     Ray ray = {v3_madd(e.p, step, n), w, f_set(INFINITY)};
     m = m & mi_lt(i_set(-1), e.line) & m_finite(weight) & m_gt(f_abs(weight), f_set(0)) & m_gt(e.probability, f_set(0));
     t->job->rays += m_count(m);

@@ -30,7 +30,7 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
     n = v3_scale(n, f_copysign(f_set(1), v3_dot(n, half)));
     Float weight = length * (8 * PI) * f_safe_rcp(e.probability);
     Float x = (v3_dot(n, own) - c * v3_dot(n, other)) * r, y = (v3_dot(n, other) - c * v3_dot(n, own)) * r;
-    Float step = (1.0f + f_max(f_max(f_abs(e.p.x), f_abs(e.p.y)), f_abs(e.p.z))) * 9e-5f;
+    Float step = interaction_step(e.p);
     Ray ray = {v3_madd(e.p, -step, d), v3_neg(d), f_set(INFINITY)};
     m = m & m_finite(weight) & m_finite(x + y) & m_gt(weight, f_set(0)) & m_gt(e.probability, f_set(0));
     m = m & meeting_shows(t->scene, e.hit.shape, e.across[0], d) & meeting_shows(t->scene, e.met.shape, e.across[1], d);

@@ -85,8 +85,7 @@ static Hit tube_hit(const BoundaryJob *b, Int e, Float t, Mask m, const EdgePoin
 static void edge_of_tube(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Vec3 eye, bool parallel, Mask m,
                          EdgePoint *out) {
     Hit hit = tube_hit(b, e, t, m, out);
-    CurveWeights w = bspline_weights(t);
-    CurvePoint c = curve_sum(scene, &hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    CurvePoint c = bspline_point(scene, &hit);
     Float speed = v3_length(c.c1), rcp = f_safe_rcp(speed), round = parallel ? f_set(0) : c.r;
     Frame frame = frame_from_normal(v3_scale(c.c1, rcp));
     Vec3 a = frame_to_local(&frame, parallel ? v3_neg(eye) : v3_sub(eye, c.c)), bend = frame_to_local(&frame, c.c2);
@@ -135,8 +134,7 @@ static void edge_of_tube(const SceneView *scene, const BoundaryJob *b, Int e, Fl
 static void edge_of_tube_end(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
     Float end = f_select(mi_lt(i_set(0), EDGE_FIELD(b, e, corner)), f_set(1), f_set(0)), sine, cosine;
     Hit hit = tube_hit(b, e, end, m, out);
-    CurveWeights w = bspline_weights(end);
-    CurvePoint c = curve_sum(scene, &hit, BSPLINE_POINTS, w.b, w.b1, w.b2);
+    CurvePoint c = bspline_point(scene, &hit);
     Frame frame = frame_from_normal(v3_normalize(c.c1));
     f_sincos(TWO_PI * t, &sine, &cosine);
     hit.p = v3_madd(c.c, c.r, frame_to_world(&frame, v3(cosine, sine, f_set(0))));

@@ -255,7 +255,7 @@ static void segment_keep(const Segment *s, Vec3 o, const Hit *near, bool lit, In
 // The ray from the edge to the light or far point.
 KFN Vec3 segment_offset(const Segment *s) {
     Vec3 p = s->edge.p;
-    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
+    Float step = interaction_step(p);
     return v3_madd(p, step, s->n);
 }
 
@@ -292,7 +292,7 @@ KFN void nudges_store(const EdgePoint *e, Mask above, Segments *q, int32_t first
 // edge and the viewer. It begins in front of it.
 static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
     Vec3 p = s->edge.p, n;
-    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 9e-5f;
+    Float step = interaction_step(p);
     Ray back = {o, v3_neg(s->d), 32.0f * step};
     Hit met = trace_solid(t->scene, &back, s->m);
     t->job->rays += m_count(s->m);
@@ -310,7 +310,7 @@ static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
 
 // Lanes of m in which what was found against d is seen along d, too: tubes stop rays from outside alone.
 static Mask segment_forwards(Tracer *t, Vec3 o, Vec3 near, Vec3 d, Mask m) {
-    Float step = (1.0f + f_max(f_max(f_abs(near.x), f_abs(near.y)), f_abs(near.z))) * 9e-5f;
+    Float step = interaction_step(near);
     Ray ray = {v3_madd(near, step, d), d, v3_dot(v3_sub(o, near), d) - 2.0f * step};
     Mask far = m & m_gt(ray.tmax, f_set(0));
     t->job->rays += m_count(far);

@@ -130,7 +130,7 @@ static Mask turning_fly(Tracer *t, const Turning *s, const Ray *ray, int32_t kin
 // Finds where the segments end and keeps those that do.
 static void turning_trace(Tracer *t, const Turning *s, int32_t kind, Int number, Segments *q) {
     const bool horizon = !boundary_is_terminator(kind);
-    Float step = (1.0f + f_max(f_max(f_abs(s->p.x), f_abs(s->p.y)), f_abs(s->p.z))) * 9e-5f;
+    Float step = interaction_step(s->p);
     // Where both normals are the same, what comes from above n is above the surface.
     Float up = v3_dot(s->ng, s->d);
     up = f_select(m_gt(f_abs(up), f_set(horizon ? 1e-4f : 0)), up, s->factor);
