@@ -41,7 +41,7 @@ static const Motion motions[] = {
     {"boundary_group.xml", "right.to_world", TURN, {0.2f, 0.3f, 1}, 1, 3},
     {"boundary_group.xml", "group.ball.to_world", SHIFT, {0, 0.3f, 1}, 0.02, 3},
     {"boundary_group.xml", "group.coin.to_world", SHIFT, {1, 0, 0.2f}, 0.02, 2},
-    {"boundary_group.xml", "group.tube.to_world", SHIFT, {0, 1, 0.2f}, 0.02, 10},
+    {"boundary_group.xml", "group.tube.to_world", GROW, {-0.3f, -0.4f, 0.2f}, 0.05, 6},
     {"boundary_group.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 1},
     {"boundary_rope.xml", "rope.control_points", BEND, {0.1f, 0.3f, 1}, 0.02, 5},
     {"boundary_rope.xml", "lamp.to_world", SHIFT, {1, 0.5f, 0}, 0.03, 1},
