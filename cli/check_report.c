@@ -128,6 +128,10 @@ rey_result check_print_table(rey_context *ctx, const Check *checks, int count, d
     if (replayed) {
         snprintf(fresh, sizeof fresh, ", fresh z up to %d", CHECK_FRESH_Z);
     }
+    if (count_verdicts(checks, count, VERDICT_REFUSED) == count) {
+        printf("nothing was checked: all directions are refused\n");
+        return result;
+    }
     printf("%s: |z| of every block and channel up to %.2f, |sum z| below 3%s, reverse = forward to %g\n",
            wrong ? "FAILED" : undecided ? "undecided" : "passed", threshold, fresh, CHECK_REVERSE_TOLERANCE);
     print_left_out(checks, count);
@@ -152,7 +156,7 @@ rey_result check_print_table(rey_context *ctx, const Check *checks, int count, d
 void check_print_json(const Session *session, const rey_stats *stats, const Check *checks, int count, double threshold) {
     Json json = json_begin(stdout);
     json_object(&json, NULL);
-    bool passed = count_verdicts(checks, count, VERDICT_WRONG) == 0;
+    bool passed = count_verdicts(checks, count, VERDICT_WRONG) == 0 && count_verdicts(checks, count, VERDICT_REFUSED) < count;
     for (int i = 0; i < count; i++) {
         passed = passed && !checks[i].undecided;
     }

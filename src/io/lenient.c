@@ -47,6 +47,12 @@ static void take_back(Builder *b, const Snapshot *s) {
 
 rey_result build_remember(Builder *b, const char *text, const char *instead) {
     size_t length = strlen(text) + strlen(instead) + 1;
+    for (size_t i = 0; i < b->source->ignored.count; i++) { // what is read again is listed once
+        const char *known = ARRAY_AT(b->source->ignored, char *, i);
+        if (known && strncmp(known, text, strlen(text)) == 0 && strcmp(known + strlen(text), instead) == 0) {
+            return REY_OK;
+        }
+    }
     char **slot = rey_array_push(b->ctx, &b->source->ignored, sizeof *slot, 1);
     char *copy = slot ? rey_alloc(b->ctx, length) : NULL;
     if (!copy) {

@@ -8,6 +8,7 @@ enum { OBJECT_NAME = 200 };
 // How an object is called in names of parameters: its id, or the path through its owner. Objects without parameters are
 // "number 3".
 void rey_name_shape(const rey_scene *scene, int32_t shape, char name[OBJECT_NAME]);
+void rey_name_instance(const rey_scene *scene, int32_t instance, char name[OBJECT_NAME]);
 void rey_name_bsdf(const rey_scene *scene, int32_t bsdf, char name[OBJECT_NAME]);
 void rey_name_texture(const rey_scene *scene, int32_t texture, char name[OBJECT_NAME]);
 void rey_name_emitter(const rey_scene *scene, int32_t emitter, char name[OBJECT_NAME]);

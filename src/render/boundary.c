@@ -14,6 +14,7 @@
 #include "sensor/kinds.h"
 #include "shape/pieces.h"
 #include "shape/shape.h"
+#include "shape/twins.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -151,6 +152,32 @@ static const char *left_out(const SceneView *view, int term) {
                : NULL;
 }
 
+// Whether a shape hides what is behind it.
+static bool hides(const SceneView *view, const ShapeRecord *shape) {
+    bool passes = view->has_media && rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+    return !passes && !(shape->flags & SHAPE_UNSEEN);
+}
+
+// Of two surfaces in the same place neither is in front: outlines would be counted twice.
+static rey_result check_twins(rey_scene *scene, int term) {
+    Twin twins[2];
+    rey_result result = rey_twins_find(scene, hides, twins);
+    if (result != REY_OK || (twins[0].shape < 0 && twins[0].instance < 0)) {
+        return result;
+    }
+    char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME];
+    for (int k = 0; k < 2; k++) {
+        if (twins[k].shape >= 0) {
+            rey_name_shape(scene, twins[k].shape, names[k]);
+        } else {
+            rey_name_instance(scene, twins[k].instance, names[k]);
+        }
+    }
+    snprintf(text, sizeof text, "surfaces that lie in the same place, as '%s' and '%s' do: one of them would have to go", names[0],
+             names[1]);
+    return refuse(scene, term, text, NULL);
+}
+
 // Whether a term of a selection can be computed; records why not.
 static rey_result boundary_check(const Render *r, int term) {
     rey_scene *scene = r->scene;
@@ -168,6 +195,10 @@ static rey_result boundary_check(const Render *r, int term) {
     if (result != REY_OK || !(r->job.any_motion || r->job.any_places)) {
         return result;
     }
+    result = check_twins(scene, term);
+    if (result != REY_OK) {
+        return result;
+    }
     int32_t jumps;
     const char *unknown = rey_texture_unknown_step(view, term, &jumps);
     if (unknown) {
@@ -176,14 +207,14 @@ static rey_result boundary_check(const Render *r, int term) {
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
-        bool hides = !view->has_media || !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        bool outlines = hides(view, shape);
         bool tube = shape->kind == SHAPE_BSPLINE && (term == REY_TERM_SPECULAR || r->job.rides);
-        if (hides && (tube || shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
+        if (outlines && (tube || shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, tube ? "what mirrors, glass and participating media show of the outlines of curves"
                                             : "the outlines of polylines and grids of distances", name);
         }
-        if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
+        if (outlines && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, "the outlines of curves that bend more sharply than their radius, and so through themselves",
                           name);

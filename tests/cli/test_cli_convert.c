@@ -77,8 +77,8 @@ static const char *const broken_scene =
     "</scene>";
 
 static void lenient_reading_lists_what_it_leaves_out(void **state) {
-    static const char *const words[] = {"stokes",   "zoom", "haze", "sunsky", "hair",
-                                        "212: there is no medium", "none.png", "ellipsoids",  "no.obj",
+    static const char *const words[] = {"stokes",   "zoom", "212: there is no medium 'haze'", "sunsky", "hair", "none.png",
+                                        "ellipsoids",  "no.obj",
                                         "<gizmo>", "text 'words' between", "'abc'", "unknown id 'inner'", "no.spd", "<skew>"};
     static const char *const commands[] = {"params broken.xml --lenient --json", "info broken.xml --lenient --json",
                                            "render broken.xml --spp 2 -o a.npy --lenient --json",

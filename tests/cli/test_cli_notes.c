@@ -47,6 +47,22 @@ static void other_cameras_are_told(void **state) {
                                      "which belong to another sensor: their derivatives are 0"));
 }
 
+// Where all that is asked for is refused, nothing has passed.
+static void refusals_are_no_success(void **state) {
+    Fixture *f = *state;
+    write_words("twins.xml", "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective' id='eye'>\n"
+                             "<film type='hdrfilm'><integer name='width' value='8'/>\n"
+                             "<integer name='height' value='8'/></film></sensor><emitter type='constant'/>\n"
+                             "<shape type='sphere' id='one'/><shape type='sphere' id='two'/></scene>\n");
+    expect(f, 1, "check twins.xml --param eye.x_fov --param one.to_world --spp 1");
+    assert_non_null(strstr(f->out, "surfaces that lie in the same place, as 'one' and 'two' do"));
+    assert_non_null(strstr(f->out, "nothing was checked: all directions are refused"));
+    assert_null(strstr(f->out, "passed"));
+    json_free(run_json(f, 1, "check twins.xml --param eye.x_fov --param one.to_world --spp 1 --json"));
+    assert_non_null(strstr(f->out, "\"passed\": false"));
+    json_free(run_json(f, 0, "check twins.xml --param '*.reflectance.value' --spp 1 --json"));
+}
+
 // So are unknowns of a fit on which no fitted view depends.
 static void unknowns_out_of_sight_are_told(void **state) {
     Fixture *f = *state;
@@ -313,7 +329,7 @@ static void misplaced_words_are_told(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(other_cameras_are_told),
+        cmocka_unit_test(other_cameras_are_told), cmocka_unit_test(refusals_are_no_success),
         cmocka_unit_test(unknowns_out_of_sight_are_told),
         cmocka_unit_test(steps_are_told),
         cmocka_unit_test(shared_noise_is_told),

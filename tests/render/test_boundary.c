@@ -239,7 +239,8 @@ static void test_bits(void **state) {
 }
 
 // Edges behind mirrors and glass are not found beside surfaces that let light pass undeviated, nor those of tubes. Lines of
-// textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show.
+// textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show. Nor what is
+// there twice.
 static void test_refused(void **state) {
     UNUSED(state);
     static const struct {
@@ -250,7 +251,9 @@ static void test_refused(void **state) {
                  {"mirrored_rope.xml", "camera.to_world", 3,
                   "mirrors, glass and participating media show of the outlines of curves"},
                  {"marks_faces.xml", "grid.bsdf.bsdf_0.reflectance.to_uv", 0, "the same line"},
-                 {"seen_tiles.xml", "coin.emitter.radiance.to_uv", 0, "edges of their surfaces"}};
+                 {"seen_tiles.xml", "coin.emitter.radiance.to_uv", 0, "edges of their surfaces"},
+                 {"twins.xml", "camera.to_world", 3, "the same place, as"},
+                 {"twins_group.xml", "camera.to_world", 3, "the same place, as"}};
     static float image[NUMBERS];
     for (int i = 0; i < COUNT_OF(cases); i++) {
         Room room = room_open(cases[i].room, 1, 0);
