@@ -12,7 +12,7 @@
 #include "render/texture_steps.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
-#include "shape/pieces.h"
+#include "shape/cut.h"
 #include "shape/shape.h"
 #include "shape/twins.h"
 

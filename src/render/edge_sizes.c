@@ -2,7 +2,7 @@
 #include "render/edge_sizes.h"
 
 #include "shape/affine.h"
-#include "shape/pieces.h"
+#include "shape/cut.h"
 #include "shape/shape.h"
 
 #include <math.h>

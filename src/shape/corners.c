@@ -78,10 +78,10 @@ static rey_result corners_overlap(void *user, int32_t first, int32_t second) {
     const Piece *piece[2] = {&ARRAY_AT(s->pieces, Piece, first), &ARRAY_AT(s->pieces, Piece, second)};
     const Body *body[2] = {&ARRAY_AT(s->bodies, Body, piece[0]->body), &ARRAY_AT(s->bodies, Body, piece[1]->body)};
     const SceneView *view = &s->scene->view;
-    bool flat = piece[0]->body != piece[1]->body;
+    bool flat = true;
     for (int i = 0; i < 2 && flat; i++) {
         const ShapeRecord *shape = view->shapes + body[i]->shape;
-        flat = shape->kind == SHAPE_MESH && shape->collection < 0 && shape->emitter < 0 && !(shape->flags & SHAPE_HAS_NORMALS);
+        flat = shape->collection < 0 && shape->emitter < 0 && !(shape->flags & SHAPE_HAS_NORMALS);
     }
     Triangle t[2];
     double ends[2][3];
@@ -107,7 +107,7 @@ static int compare_corners(const void *a, const void *b) {
 }
 
 rey_result rey_corners_find(rey_scene *scene, MeetingMoves *moves, const void *user, Array *corners) {
-    Pieces s = {.scene = scene, .moves = moves, .user = user, .margin = 1e-5f, .found = corners};
+    Pieces s = {.scene = scene, .moves = moves, .user = user, .meshes = true, .margin = 1e-5f, .found = corners};
     rey_result result = rey_pieces_overlap(&s, corners_overlap);
     if (result != REY_OK || corners->count == 0) {
         return result;

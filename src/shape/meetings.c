@@ -4,6 +4,9 @@
 #include "shape/shape.h"
 
 #include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
 
 #define TOUCH 1e-4 // of the smaller triangle's size
 
@@ -139,6 +142,120 @@ static bool share_vertex(const SceneView *view, const ShapeRecord *shape, int32_
     return false;
 }
 
+// A side of a triangle that lies in another one's face, or on a side of it. Where the triangle beyond it is on the other side of
+// the face, both together pass through it; on a side of it they do where that holds for all four.
+typedef struct Half {
+    int32_t body, vertices[2], other, face; // vertices: welded; face: -1 = a side of the other body,
+    int32_t across[2];                      // with these vertices
+    int32_t sort;                           // 1: the triangle is above the face, 2: that of the side is above the triangle
+    MeetingRecord meeting;
+} Half;
+
+// Puts the same next to each other.
+static int compare_halves(const void *a, const void *b) { return memcmp(a, b, offsetof(Half, meeting)); }
+
+static bool is_flat(const Pieces *s, const Body *body) {
+    const int32_t kind = body->shape < 0 ? -1 : s->scene->view.shapes[body->shape].kind;
+    return body->shape < 0 ? !s->borders[body->instance].round : kind == SHAPE_MESH || kind == SHAPE_DISK;
+}
+
+// The side of a that lies in the plane of b: its ends, and the number of the corner that is not on it, or -1 where there is no such
+// side. *above: where that corner is.
+static int side_in(const Triangle *a, const Triangle *b, double touch, double on[2][3], bool *above) {
+    int count = 0, off = -1;
+    for (int k = 0; k < 3; k++) {
+        double q[3] = {a->p[k][0] - b->p[0][0], a->p[k][1] - b->p[0][1], a->p[k][2] - b->p[0][2]}, d = dot3(b->n, q);
+        if (fabs(d) >= touch) {
+            off = k;
+            *above = d > 0;
+        } else if (count < 2) {
+            memcpy(on[count++], a->p[k], sizeof on[0]);
+        }
+    }
+    return count == 2 ? off : -1;
+}
+
+static void side_vertices(const Pieces *s, const Piece *piece, int off, int32_t vertices[2]) {
+    const SceneView *view = &s->scene->view;
+    const ShapeRecord *shape = view->shapes + ARRAY_AT(s->bodies, Body, piece->body).shape;
+    const int32_t *corners = rey_mesh_triangle(view, shape, piece->triangle), *welded = view->welded + shape->welded;
+    int32_t x = welded[corners[(off + 1) % 3]], y = welded[corners[(off + 2) % 3]];
+    vertices[0] = x < y ? x : y;
+    vertices[1] = x < y ? y : x;
+}
+
+// The part of the line between two points that others on it span.
+static bool span(double on[2][3], double across[2][3], double least, double ends[2][3]) {
+    double line[3], length2 = 0, at[2];
+    for (int k = 0; k < 3; k++) {
+        line[k] = on[1][k] - on[0][k];
+        length2 += line[k] * line[k];
+    }
+    for (int i = 0; i < 2; i++) {
+        double q[3] = {across[i][0] - on[0][0], across[i][1] - on[0][1], across[i][2] - on[0][2]};
+        at[i] = length2 > 0 ? dot3(q, line) / length2 : 0;
+    }
+    double from = fmax(0, fmin(at[0], at[1])), to = fmin(1, fmax(at[0], at[1]));
+    for (int k = 0; k < 3; k++) {
+        ends[0][k] = on[0][k] + from * line[k];
+        ends[1][k] = on[0][k] + to * line[k];
+    }
+    return (to - from) * sqrt(length2) > least;
+}
+
+static bool is_mesh(const Pieces *s, const Piece *piece) {
+    const int32_t id = ARRAY_AT(s->bodies, Body, piece->body).shape;
+    return id >= 0 && s->scene->view.shapes[id].kind == SHAPE_MESH;
+}
+
+// Of t[own], of a mesh, and a face that it does not pass through.
+static bool half_of(const Pieces *s, const Piece *const *piece, const Triangle *t, int own, Half *half, double ends[2][3]) {
+    const Triangle *a = t + own, *b = t + !own;
+    double touch = TOUCH * fmin(a->size, b->size), on[2][3], across[2][3];
+    bool above = false, beside = false;
+    if (!is_mesh(s, piece[own]) || !is_flat(s, &ARRAY_AT(s->bodies, Body, piece[!own]->body))) {
+        return false;
+    }
+    *half = (Half){.body = piece[own]->body, .other = piece[!own]->body, .face = piece[!own]->triangle, .across = {-1, -1}};
+    int off = side_in(a, b, touch, on, &above);
+    if (off < 0) {
+        return false;
+    }
+    if (!rey_triangle_passes(b, a, touch, across)) {
+        int far = side_in(b, a, touch, across, &beside);
+        if (far < 0 || !is_mesh(s, piece[!own]) || half->body == half->other) {
+            return false;
+        }
+        half->face = -1;
+        side_vertices(s, piece[!own], far, half->across);
+    }
+    side_vertices(s, piece[own], off, half->vertices);
+    half->sort = above + 2 * beside;
+    return span(on, across, touch, ends);
+}
+
+// Of halves that belong together one is kept.
+static rey_result join_halves(const Pieces *s) {
+    Half *halves = s->halves->data;
+    if (s->halves->count > 0) {
+        qsort(halves, s->halves->count, sizeof *halves, compare_halves);
+    }
+    for (size_t i = 0, next; i < s->halves->count; i = next) {
+        unsigned sorts = 0;
+        for (next = i; next < s->halves->count && memcmp(halves + i, halves + next, offsetof(Half, sort)) == 0; next++) {
+            sorts |= 1u << halves[next].sort;
+        }
+        if (sorts == (halves[i].face < 0 ? 15u : 3u)) {
+            MeetingRecord *record = rey_array_push(s->scene->ctx, s->found, sizeof *record, 1);
+            if (!record) {
+                return REY_ERROR_MEMORY;
+            }
+            *record = halves[i].meeting;
+        }
+    }
+    return REY_OK;
+}
+
 static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     const SceneView *view = &s->scene->view;
@@ -150,13 +267,18 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     const ShapeRecord *shape = view->shapes + body[0]->shape;
     bool itself = piece[0]->body == piece[1]->body;
     if (rey_bodies_join(view, body[0], body[1]) ||
-        (itself && (shape->kind != SHAPE_MESH || share_vertex(view, shape, piece[0]->triangle, piece[1]->triangle)))) {
+        (itself && share_vertex(view, shape, piece[0]->triangle, piece[1]->triangle))) {
         return REY_OK;
     }
     Triangle t[2] = {rey_piece_triangle(s, piece[0]), rey_piece_triangle(s, piece[1])};
     double ends[2][3];
     MeetingRecord m;
-    if (!rey_triangles_meet(t, t + 1, rey_triangle_passes, TOUCH, ends)) {
+    Half half;
+    bool meet = rey_triangles_meet(t, t + 1, rey_triangle_passes, TOUCH, ends), halved = false;
+    for (int own = 0; own < 2 && !meet && !halved; own++) {
+        halved = half_of(s, piece, t, own, &half, ends);
+    }
+    if (!meet && !halved) {
         return REY_OK;
     }
     bool round = false, tube = false;
@@ -181,17 +303,24 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     for (int i = 0; i < 6; i++) {
         m.ends[i] = (float)ends[i / 3][i % 3];
     }
-    MeetingRecord *record = rey_array_push(s->scene->ctx, s->found, sizeof *record, 1);
+    if (halved) {
+        half.meeting = m;
+    }
+    void *record = rey_array_push(s->scene->ctx, halved ? s->halves : s->found, halved ? sizeof half : sizeof m, 1);
     if (!record) {
         return REY_ERROR_MEMORY;
     }
-    *record = m;
+    memcpy(record, halved ? (const void *)&half : &m, halved ? sizeof half : sizeof m);
     return REY_OK;
 }
 
 rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
                              const void *user, Array *meetings) {
+    Array halves = {0};
     Pieces s = {.scene = scene, .borders = borders, .border_count = border_count, .moves = moves, .user = user, .itself = true,
-                .found = meetings};
-    return rey_pieces_overlap(&s, pieces_overlap);
+                .found = meetings, .halves = &halves};
+    rey_result result = rey_pieces_overlap(&s, pieces_overlap);
+    result = result == REY_OK ? join_halves(&s) : result;
+    rey_array_free(scene->ctx, &halves);
+    return result;
 }

@@ -46,15 +46,13 @@ static Box box_union(Box a, Box b) {
         a.high[k] = fmaxf(a.high[k], b.high[k]);
     }
     a.moves |= b.moves;
+    a.family = a.family == b.family ? a.family : -1;
     return a;
 }
 
 static bool may_meet(const Box *a, const Box *b) {
-    bool apart = !a->moves && !b->moves;
-    for (int k = 0; k < 3; k++) {
-        apart |= a->low[k] > b->high[k] || b->low[k] > a->high[k];
-    }
-    return !apart;
+    bool left_out = (!a->moves && !b->moves) || (a->family >= 0 && a->family == b->family);
+    return !left_out && !rey_boxes_apart(a, b);
 }
 
 static void sort_boxes(const Box *boxes, int32_t count, Ordered *order) {

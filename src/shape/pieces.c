@@ -1,4 +1,4 @@
-// pieces.c: round surfaces are cut into triangles to find where they may meet. Those of tubes are outside of them.
+// pieces.c: the triangles of all surfaces, and those pairs of them that may meet.
 #include "shape/pieces.h"
 
 #include "shape/affine.h"
@@ -8,135 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 16, TUBE_STACKS = 4 };
-
-// ---- surfaces in triangles ---------------------------------------------------------------------------------------
-
-static int32_t triangles_of(const SceneView *view, int32_t id) {
-    if (id < 0) {
-        return 1;
-    }
-    const ShapeRecord *shape = view->shapes + id;
-    switch (shape->kind) {
-    case SHAPE_MESH:
-        return shape->triangle_count;
-    case SHAPE_SPHERE:
-        return 2 * AROUND * STACKS;
-    case SHAPE_CYLINDER:
-        return 2 * AROUND;
-    case SHAPE_DISK:
-        return AROUND;
-    case SHAPE_BSPLINE:
-        return REY_TUBE_PIECES; // of a segment
-    default:
-        return 0;
-    }
-}
-
-// Node (column, row) of the grid of a round shape, in its own space; the last column is the first again.
-static void round_node(int32_t kind, int32_t column, int32_t row, double p[3]) {
-    const double pi = 3.14159265358979323846;
-    double phi = 2 * pi * (column % AROUND) / AROUND, x = cos(phi), y = sin(phi);
-    double theta = kind == SHAPE_SPHERE ? pi * row / STACKS : 0;
-    double wide = kind == SHAPE_CYLINDER ? 1 : kind == SHAPE_DISK ? row : sin(theta);
-    p[0] = wide * x;
-    p[1] = wide * y;
-    p[2] = kind == SHAPE_SPHERE ? cos(theta) : kind == SHAPE_CYLINDER ? row : 0;
-}
-
-// The columns and rows of the corners of both triangles of a cell.
-static const int32_t cell_corners[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
-
-static void round_corner(const SceneView *view, const ShapeRecord *shape, int32_t triangle, int k, double p[3]) {
-    int32_t cell = shape->kind == SHAPE_DISK ? triangle : triangle / 2, column = cell % AROUND, row = cell / AROUND;
-    bool second = shape->kind != SHAPE_DISK && triangle % 2 == 1;
-    const int32_t *at = cell_corners[second][k];
-    double own[3];
-    round_node(shape->kind, column + at[0], row + at[1], own);
-    if (shape->kind == SHAPE_SPHERE) {
-        const float *t = view->tables + shape->table;
-        for (int c = 0; c < 3; c++) {
-            p[c] = (double)t[c] + (double)t[3] * own[c];
-        }
-    } else {
-        rey_affine_point(view->theta + shape->to_world, own, p);
-    }
-}
-
-// Unit vector along v less its part along the unit vector t.
-static void across_of(const double v[3], const double t[3], double out[3]) {
-    double along = dot3(v, t), length2 = 0;
-    for (int k = 0; k < 3; k++) {
-        out[k] = v[k] - along * t[k];
-        length2 += out[k] * out[k];
-    }
-    for (int k = 0; k < 3; k++) {
-        out[k] = length2 > 0 ? out[k] / sqrt(length2) : 0;
-    }
-}
-
-static CurvePoint tube_at(const SceneView *view, int32_t id, int32_t segment, float u) {
-    Hit hit = {.shape = id, .prim = segment, .u = u};
-    return bspline_point(view, &hit);
-}
-
-bool rey_tube_folds(const SceneView *view, int32_t id) {
-    for (int32_t i = 0; i < 8 * view->shapes[id].segment_count; i++) {
-        CurvePoint at = tube_at(view, id, i / 8, 0.125f * (float)(i % 8) + 0.0625f);
-        float speed = v3_length(at.c1);
-        if (speed * speed * speed < at.r * v3_length(v3_cross(at.c1, at.c2))) {
-            return true;
-        }
-    }
-    return false;
-}
-
-void rey_tube_box(const SceneView *view, int32_t id, int32_t segment, double room, double low[3], double high[3]) {
-    const ShapeRecord *shape = view->shapes + id;
-    const float *p = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
-    for (int k = 0; k < 3; k++) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
-        for (int i = 0; i < BSPLINE_POINTS; i++) {
-            low[k] = fmin(low[k], (double)p[4 * i + k] - room * (double)p[4 * i + 3]);
-            high[k] = fmax(high[k], (double)p[4 * i + k] + room * (double)p[4 * i + 3]);
-        }
-    }
-}
-
-static void tangent_of(const CurvePoint *at, double t[3]) {
-    Vec3 tangent = v3_normalize(at->c1);
-    t[0] = (double)tangent.x;
-    t[1] = (double)tangent.y;
-    t[2] = (double)tangent.z;
-}
-
-// Of a tube's triangle: nodes around the axis count from a vector that goes along it without turning about it.
-static void tube_corner(const SceneView *view, int32_t id, int32_t triangle, int corner, double p[3]) {
-    int32_t cell = triangle % REY_TUBE_PIECES / 2;
-    const int32_t *at = cell_corners[triangle % 2][corner];
-    const int32_t column = cell % TUBE_AROUND + at[0], row = cell / TUBE_AROUND + at[1];
-    const double pi = 3.14159265358979323846, phi = 2 * pi * column / TUBE_AROUND;
-    CurvePoint axis = tube_at(view, id, triangle / REY_TUBE_PIECES, 0);
-    double t[3], e[3], f[3];
-    tangent_of(&axis, t);
-    const double least[3] = {fabs(t[0]) < 0.5, fabs(t[0]) >= 0.5, 0};
-    across_of(least, t, e);
-    for (int32_t i = 1; i <= row; i++) {
-        axis = tube_at(view, id, triangle / REY_TUBE_PIECES, (float)i / TUBE_STACKS);
-        tangent_of(&axis, t);
-        across_of(e, t, e);
-    }
-    cross3(t, e, f);
-    const double c[3] = {(double)axis.c.x, (double)axis.c.y, (double)axis.c.z}, wide = (double)axis.r / cos(pi / TUBE_AROUND);
-    for (int k = 0; k < 3; k++) {
-        p[k] = c[k] + wide * (cos(phi) * e[k] + sin(phi) * f[k]);
-    }
-}
-
-const int32_t *rey_mesh_triangle(const SceneView *view, const ShapeRecord *shape, int32_t triangle) {
-    return view->triangles + 3 * ((int64_t)shape->triangle + triangle);
-}
+static int32_t triangles_of(const SceneView *view, int32_t id) { return id < 0 ? 1 : rey_cut_triangles(view, id); }
 
 static void corner_of(const Pieces *s, const Body *body, int32_t triangle, int k, double p[3]) {
     const SceneView *view = &s->scene->view;
@@ -146,22 +18,9 @@ static void corner_of(const Pieces *s, const Body *body, int32_t triangle, int k
         }
         return;
     }
-    const ShapeRecord *shape = view->shapes + body->shape;
-    double q[3];
-    if (shape->kind == SHAPE_MESH) {
-        const float *own = view->theta + shape->positions + 3 * (int64_t)rey_mesh_triangle(view, shape, triangle)[k];
-        for (int c = 0; c < 3; c++) {
-            q[c] = (double)own[c];
-        }
-    } else if (shape->kind == SHAPE_BSPLINE) {
-        tube_corner(view, body->shape, triangle, k, q);
-    } else {
-        round_corner(view, shape, triangle, k, q);
-    }
-    if (shape->collection >= 0) {
-        rey_affine_point(view->theta + view->instances[body->instance].to_world, q, p);
-    } else {
-        memcpy(p, q, sizeof q);
+    rey_cut_corner(view, body->shape, triangle, k, p);
+    if (view->shapes[body->shape].collection >= 0) {
+        rey_affine_point(view->theta + view->instances[body->instance].to_world, p, p);
     }
 }
 
@@ -191,7 +50,7 @@ Triangle rey_piece_triangle(const Pieces *s, const Piece *piece) {
 }
 
 static Box box_of_points(const double (*p)[3], int count) {
-    Box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0};
+    Box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, -1};
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++) {
             box.low[k] = fminf(box.low[k], (float)p[i][k]);
@@ -264,6 +123,13 @@ static void widen(const Pieces *s, Box *box) {
     }
 }
 
+static void grow(Box *box, const float low[3], const float high[3]) {
+    for (int k = 0; k < 3; k++) {
+        box->low[k] = fminf(box->low[k], low[k]);
+        box->high[k] = fmaxf(box->high[k], high[k]);
+    }
+}
+
 static Box box_of_triangles(const Pieces *s, const Body *body) {
     Box box = box_of_points(NULL, 0);
     for (int32_t i = 0; i < triangles_of(&s->scene->view, body->shape); i++) {
@@ -272,10 +138,7 @@ static Box box_of_triangles(const Pieces *s, const Body *body) {
             corner_of(s, body, i, k, p[k]);
         }
         Box one = box_of_points((const double(*)[3])p, 3);
-        for (int k = 0; k < 3; k++) {
-            box.low[k] = fminf(box.low[k], one.low[k]);
-            box.high[k] = fmaxf(box.high[k], one.high[k]);
-        }
+        grow(&box, one.low, one.high);
     }
     return box;
 }
@@ -290,7 +153,12 @@ static Box box_of_round(const SceneView *view, const Body *body) {
             high[k] = (double)table[k] + (double)table[3];
         }
     } else if (shape->kind == SHAPE_BSPLINE) {
-        rey_tube_box(view, body->shape, body->segment, 1 / cos(3.14159265358979323846 / TUBE_AROUND), low, high);
+        rey_tube_box(view, body->shape, body->segment, REY_TUBE_ROOM, low, high);
+        for (int k = 0; k < 3; k++) { // its rings lean out of it
+            double room = 0.03 * (high[k] - low[k]);
+            low[k] -= room;
+            high[k] += room;
+        }
     }
     for (int i = 0; i < 8; i++) {
         double *p = corners[i];
@@ -307,6 +175,11 @@ static Box box_of_round(const SceneView *view, const Body *body) {
     return box_of_points((const double(*)[3])corners, 8);
 }
 
+// Whether a body's triangles may meet each other.
+static bool meets_itself(const Pieces *s, const Body *body) {
+    return s->itself && body->shape >= 0 && s->scene->view.shapes[body->shape].kind == SHAPE_MESH;
+}
+
 static rey_result add_body(Pieces *s, int32_t shape, int32_t instance, int32_t segment) {
     rey_context *ctx = s->scene->ctx;
     Body *body = rey_array_push(ctx, &s->bodies, sizeof *body, 1);
@@ -314,7 +187,7 @@ static rey_result add_body(Pieces *s, int32_t shape, int32_t instance, int32_t s
     if (!body || !box) {
         return REY_ERROR_MEMORY;
     }
-    *body = (Body){shape, instance, segment, 0};
+    *body = (Body){shape, instance, segment, box_of_points(NULL, 0)};
     if (shape < 0 || s->scene->view.shapes[shape].kind == SHAPE_MESH) {
         *box = box_of_triangles(s, body);
     } else {
@@ -322,7 +195,9 @@ static rey_result add_body(Pieces *s, int32_t shape, int32_t instance, int32_t s
     }
     widen(s, box);
     box->moves = s->moves(s->user, shape, shape < 0 ? s->borders[instance].light : instance);
-    body->meets = s->itself && shape >= 0 && box->moves && s->scene->view.shapes[shape].kind == SHAPE_MESH; // itself
+    if (meets_itself(s, body) && box->moves) {
+        grow(&body->window, box->low, box->high);
+    }
     return REY_OK;
 }
 
@@ -344,7 +219,7 @@ static rey_result add_bodies(Pieces *s) {
     rey_result result = REY_OK;
     for (int32_t id = 0; id < view->shapes_count && result == REY_OK; id++) {
         const ShapeRecord *shape = view->shapes + id;
-        if ((shape->flags & SHAPE_UNSEEN) || triangles_of(view, id) == 0) {
+        if ((shape->flags & SHAPE_UNSEEN) || triangles_of(view, id) == 0 || (s->meshes && shape->kind != SHAPE_MESH)) {
             continue;
         }
         if (shape->collection < 0) {
@@ -368,12 +243,39 @@ bool rey_bodies_join(const SceneView *view, const Body *a, const Body *b) {
     return abs(first[a->segment] - first[b->segment]) <= 1;
 }
 
+// Whether of two spheres in the world one lies outside or inside of the other.
+static bool spheres_apart(const Pieces *s, const Body *a, const Body *b) {
+    const SceneView *view = &s->scene->view;
+    const Body *both[2] = {a, b};
+    const float *table[2];
+    for (int i = 0; i < 2; i++) {
+        const ShapeRecord *shape = both[i]->shape < 0 ? NULL : view->shapes + both[i]->shape;
+        if (!shape || shape->kind != SHAPE_SPHERE || shape->collection >= 0) {
+            return false;
+        }
+        table[i] = view->tables + shape->table;
+    }
+    float d2 = 0, far = table[0][3] + table[1][3], near = table[0][3] - table[1][3], room = 1 + 4 * s->margin;
+    for (int k = 0; k < 3; k++) {
+        d2 += (table[0][k] - table[1][k]) * (table[0][k] - table[1][k]);
+    }
+    return d2 > far * far * room || d2 * room < near * near;
+}
+
 static rey_result bodies_overlap(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     Body *a = &ARRAY_AT(s->bodies, Body, first), *b = &ARRAY_AT(s->bodies, Body, second);
-    bool meet = !rey_bodies_join(&s->scene->view, a, b);
-    a->meets |= meet;
-    b->meets |= meet;
+    const Box *x = &ARRAY_AT(s->body_boxes, Box, first), *y = &ARRAY_AT(s->body_boxes, Box, second);
+    float low[3], high[3];
+    if (rey_bodies_join(&s->scene->view, a, b) || spheres_apart(s, a, b)) {
+        return REY_OK;
+    }
+    for (int k = 0; k < 3; k++) {
+        low[k] = fmaxf(x->low[k], y->low[k]);
+        high[k] = fminf(x->high[k], y->high[k]);
+    }
+    grow(&a->window, low, high);
+    grow(&b->window, low, high);
     return REY_OK;
 }
 
@@ -381,7 +283,7 @@ static rey_result add_pieces(Pieces *s) {
     rey_context *ctx = s->scene->ctx;
     for (int32_t b = 0; b < (int32_t)s->bodies.count; b++) {
         const Body *body = &ARRAY_AT(s->bodies, Body, b);
-        int32_t n = body->meets ? triangles_of(&s->scene->view, body->shape) : 0;
+        int32_t n = body->window.low[0] <= body->window.high[0] ? triangles_of(&s->scene->view, body->shape) : 0, kept = 0;
         if (n == 0) {
             continue;
         }
@@ -396,11 +298,17 @@ static rey_result add_pieces(Pieces *s) {
             for (int k = 0; k < 3; k++) {
                 corner_of(s, body, triangle, k, p[k]);
             }
-            pieces[i] = (Piece){b, triangle};
-            boxes[i] = box_of_points(p, 3);
-            widen(s, boxes + i);
-            boxes[i].moves = ARRAY_AT(s->body_boxes, Box, b).moves;
+            Box box = box_of_points(p, 3);
+            widen(s, &box);
+            box.moves = ARRAY_AT(s->body_boxes, Box, b).moves;
+            box.family = meets_itself(s, body) ? -1 : b;
+            if (!rey_boxes_apart(&box, &body->window)) {
+                pieces[kept] = (Piece){b, triangle};
+                boxes[kept++] = box;
+            }
         }
+        s->pieces.count -= (size_t)(n - kept);
+        s->boxes.count -= (size_t)(n - kept);
     }
     return s->pieces.count < INT32_MAX ? REY_OK : rey_fail(ctx, REY_ERROR_UNSUPPORTED, "more than 2^31 triangles may meet");
 }

@@ -2,6 +2,7 @@
 // src/shape.
 #pragma once
 
+#include "shape/cut.h"
 #include "shape/meetings.h"
 #include "shape/overlaps.h"
 
@@ -13,26 +14,20 @@ typedef struct Pieces {
     MeetingMoves *moves;
     const void *user;
     bool itself;              // bodies overlap themselves, too
+    bool meshes;              // they are the only bodies
     float margin;             // by which boxes are larger than what they hold, over its size
     Array bodies, body_boxes; // of Body, of Box
     Array pieces, boxes;      // of Piece, of Box
     Array *found;             // what the caller makes of it
+    Array *halves;            // of Half (meetings.c)
 } Pieces;
 
 // A shape, or an instance of one, of tubes a segment; shape -1: the border of a light with the number `instance`.
 typedef struct Body {
     int32_t shape, instance;
     int32_t segment; // of a tube, else -1
-    int32_t meets;   // may meet another
+    Box window;      // where it may meet another, or itself; empty where it cannot
 } Body;
-
-// So many triangles stand for one segment of a tube.
-enum { REY_TUBE_PIECES = 128 };
-
-// Whether a tube bends somewhere more sharply than its radius, so that it passes through itself there.
-bool rey_tube_folds(const SceneView *view, int32_t shape);
-// What a tube's segment lies in, with `room` times its radii about its control points, in its own space.
-void rey_tube_box(const SceneView *view, int32_t shape, int32_t segment, double room, double low[3], double high[3]);
 
 // A triangle of a body's mesh, or of those that stand for a round shape.
 typedef struct Piece {
@@ -44,15 +39,6 @@ typedef struct Triangle {
     double size;          // of its longest side
 } Triangle;
 
-static inline double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static inline void cross3(const double a[3], const double b[3], double out[3]) {
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        out[k] = a[i] * b[j] - a[j] * b[i];
-    }
-}
-
 // Whether two bodies are segments of one strand that follow each other, or the same one.
 bool rey_bodies_join(const SceneView *view, const Body *a, const Body *b);
 
@@ -60,7 +46,6 @@ bool rey_bodies_join(const SceneView *view, const Body *a, const Body *b);
 rey_result rey_pieces_overlap(Pieces *s, OverlapFn *overlap);
 
 Triangle rey_piece_triangle(const Pieces *s, const Piece *piece);
-const int32_t *rey_mesh_triangle(const SceneView *view, const ShapeRecord *shape, int32_t triangle);
 
 // Where the sides of a get to the plane of b, if they do: two points. Distances below `touch` count as 0.
 typedef bool TriangleReach(const Triangle *a, const Triangle *b, double touch, double points[2][3]);

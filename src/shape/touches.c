@@ -51,7 +51,7 @@ static rey_result pieces_touch(void *user, int32_t first, int32_t second) {
     Pieces *s = user;
     Touches *touches = (Touches *)(uintptr_t)s->user;
     const Piece *piece[2] = {&ARRAY_AT(s->pieces, Piece, first), &ARRAY_AT(s->pieces, Piece, second)};
-    if (touches->found || piece[0]->body == piece[1]->body || is_tube(s, piece[0]) || is_tube(s, piece[1])) {
+    if (touches->found || is_tube(s, piece[0]) || is_tube(s, piece[1])) {
         return REY_OK;
     }
     Triangle a = rey_piece_triangle(s, piece[0]), b = rey_piece_triangle(s, piece[1]);

@@ -1,7 +1,7 @@
 // twins.c: sorts what stands in a scene by all the numbers that say where it is, so that twins follow each other.
 #include "shape/twins.h"
 
-#include "shape/pieces.h"
+#include "shape/cut.h"
 #include "shape/shape.h"
 
 #include <stdlib.h>
@@ -26,11 +26,10 @@ static Place place_of(const SceneView *view, int32_t i) {
         p.triangles = 3 * shape->triangle_count;
         p.corners = rey_mesh_triangle(view, shape, 0);
     } else if (shape->segment_count > 0) {
-        const int32_t *segments = view->segments + shape->segment;
-        p.count = 4 * (segments[shape->segment_count - 1] + (shape->kind == SHAPE_BSPLINE ? BSPLINE_POINTS : LINEAR_POINTS));
+        p.count = 4 * shape->vertex_count;
         p.numbers = view->theta + shape->positions;
         p.triangles = shape->segment_count;
-        p.corners = segments;
+        p.corners = view->segments + shape->segment;
     } else {
         p.count = POSE_NUMBERS;
         p.numbers = view->theta + shape->to_world;
