@@ -143,16 +143,29 @@ static bool share_vertex(const SceneView *view, const ShapeRecord *shape, int32_
 }
 
 // A side of a triangle that lies in another one's face, or on a side of it. Where the triangle beyond it is on the other side of
-// the face, both together pass through it; on a side of it they do where that holds for all four.
+// the face, both together pass through it; on a side of it they do where that holds for all four. That is, of triangles in one
+// plane: sides between others are edges, which are known by themselves where they are outlines.
 typedef struct Half {
     int32_t body, vertices[2], other, face; // vertices: welded; face: -1 = a side of the other body,
     int32_t across[2];                      // with these vertices
     int32_t sort;                           // 1: the triangle is above the face, 2: that of the side is above the triangle
+    float normals[2][3];                    // of the triangle and of the face
     MeetingRecord meeting;
 } Half;
 
 // Puts the same next to each other.
-static int compare_halves(const void *a, const void *b) { return memcmp(a, b, offsetof(Half, meeting)); }
+static int compare_halves(const void *a, const void *b) { return memcmp(a, b, offsetof(Half, normals)); }
+
+// Whether triangles of one body lie in one plane, and those of the other one.
+static bool are_even(const Half *a, const Half *b) {
+    bool even = true;
+    for (int i = 0; i < 2; i++) {
+        const float *n = a->normals[i], *m = b->normals[i];
+        float x = n[1] * m[2] - n[2] * m[1], y = n[2] * m[0] - n[0] * m[2], z = n[0] * m[1] - n[1] * m[0];
+        even &= x * x + y * y + z * z < (float)(TOUCH * TOUCH);
+    }
+    return even;
+}
 
 static bool is_flat(const Pieces *s, const Body *body) {
     const int32_t kind = body->shape < 0 ? -1 : s->scene->view.shapes[body->shape].kind;
@@ -231,6 +244,10 @@ static bool half_of(const Pieces *s, const Piece *const *piece, const Triangle *
     }
     side_vertices(s, piece[own], off, half->vertices);
     half->sort = above + 2 * beside;
+    for (int k = 0; k < 3; k++) {
+        half->normals[0][k] = (float)a->n[k];
+        half->normals[1][k] = (float)b->n[k];
+    }
     return span(on, across, touch, ends);
 }
 
@@ -242,10 +259,12 @@ static rey_result join_halves(const Pieces *s) {
     }
     for (size_t i = 0, next; i < s->halves->count; i = next) {
         unsigned sorts = 0;
+        bool even = true;
         for (next = i; next < s->halves->count && memcmp(halves + i, halves + next, offsetof(Half, sort)) == 0; next++) {
             sorts |= 1u << halves[next].sort;
+            even &= are_even(halves + i, halves + next);
         }
-        if (sorts == (halves[i].face < 0 ? 15u : 3u)) {
+        if (even && sorts == (halves[i].face < 0 ? 15u : 3u)) {
             MeetingRecord *record = rey_array_push(s->scene->ctx, s->found, sizeof *record, 1);
             if (!record) {
                 return REY_ERROR_MEMORY;

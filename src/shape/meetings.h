@@ -29,7 +29,7 @@ typedef struct MeetingRecord {
 typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
 
 // Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without
-// passing through, to 1e-4 of its size, does not meet, nor do the segments of a strand. Grids of distances and polylines have none
-// yet.
+// passing through, to 1e-4 of its size, does not meet, nor do the segments of a strand. Of two triangles in one plane that have a
+// side on a curve, its record is of one. Grids of distances and polylines have none yet.
 rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
                              const void *user, Array *meetings);

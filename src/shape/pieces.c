@@ -255,11 +255,11 @@ static bool spheres_apart(const Pieces *s, const Body *a, const Body *b) {
         }
         table[i] = view->tables + shape->table;
     }
-    float d2 = 0, far = table[0][3] + table[1][3], near = table[0][3] - table[1][3], room = 1 + 4 * s->margin;
+    float d2 = 0, far = table[0][3] + table[1][3], near = fabsf(table[0][3] - table[1][3]), room = 2 * s->margin * far;
     for (int k = 0; k < 3; k++) {
         d2 += (table[0][k] - table[1][k]) * (table[0][k] - table[1][k]);
     }
-    return d2 > far * far * room || d2 * room < near * near;
+    return sqrtf(d2) > far + room || sqrtf(d2) + room < near;
 }
 
 static rey_result bodies_overlap(void *user, int32_t first, int32_t second) {

@@ -49,6 +49,8 @@ static const struct {
      PIPE, RINGS LOWER UPPER, 8 / PI},
     {"two walls, both cut where they cross", PIPE TURNED("0"), STRIP, 2 / PI},
     {"two walls, one of which ends at where the other is cut", PIPE TURNED("1"), STRIP, 0},
+    {"a fold through a floor, whose spine is an edge by itself", FLOOR PIPE,
+     "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 1 -1\nf 1 2 3\nf 2 1 4\n", 0},
     {"a roof through a floor, cut there", FLOOR PIPE, "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 -1\nf 1 2 3\nf 1 4 2\n", 2 / PI},
     {"a log half in a floor",
      FLOOR "<shape type='cylinder'><point name='p0' x='-1' y='0' z='0'/><point name='p1' x='1.5' y='0' z='0'/>"
