@@ -5,7 +5,6 @@
 #include "emitter/table.h"
 #include "render/boundary.h"
 
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -17,25 +16,21 @@ static void owner_of(const char *param, int parts, char name[OBJECT_NAME]) {
     }
 }
 
-// By the parameter that places it: one whose number `at` bytes into it is `id`.
-static void name_placed(const rey_scene *scene, size_t at, int32_t id, char name[OBJECT_NAME]) {
-    snprintf(name, OBJECT_NAME, "number %d", (int)id);
+// By the parameter that places it. One of both is -1.
+static void name_placed(const rey_scene *scene, int32_t shape, int32_t instance, char name[OBJECT_NAME]) {
+    snprintf(name, OBJECT_NAME, "number %d", (int)(shape < 0 ? instance : shape));
     for (size_t i = 0; i < scene->params.count; i++) {
         const Param *p = &ARRAY_AT(scene->params, Param, i);
-        if (*(const int32_t *)(const void *)((const char *)p + at) == id) {
+        if (shape < 0 ? p->instance == instance : p->geometry == shape) {
             owner_of(p->name, 1, name);
             return;
         }
     }
 }
 
-void rey_name_shape(const rey_scene *scene, int32_t shape, char name[OBJECT_NAME]) {
-    name_placed(scene, offsetof(Param, geometry), shape, name);
-}
+void rey_name_shape(const rey_scene *scene, int32_t shape, char name[OBJECT_NAME]) { name_placed(scene, shape, -1, name); }
 
-void rey_name_instance(const rey_scene *scene, int32_t instance, char name[OBJECT_NAME]) {
-    name_placed(scene, offsetof(Param, instance), instance, name);
-}
+void rey_name_instance(const rey_scene *scene, int32_t instance, char name[OBJECT_NAME]) { name_placed(scene, -1, instance, name); }
 
 // The parameter that holds a texture's values; null for textures that have none.
 static const Param *param_of(const rey_scene *scene, int32_t texture) {

@@ -152,8 +152,7 @@ static const char *left_out(const SceneView *view, int term) {
                : NULL;
 }
 
-// Whether a shape hides what is behind it.
-static bool hides(const SceneView *view, const ShapeRecord *shape) {
+bool rey_boundary_hides(const SceneView *view, const ShapeRecord *shape) {
     bool passes = view->has_media && rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
     return !passes && !(shape->flags & SHAPE_UNSEEN);
 }
@@ -161,7 +160,7 @@ static bool hides(const SceneView *view, const ShapeRecord *shape) {
 // Of two surfaces in the same place neither is in front: outlines would be counted twice.
 static rey_result check_twins(rey_scene *scene, int term) {
     Twin twins[2];
-    rey_result result = rey_twins_find(scene, hides, twins);
+    rey_result result = rey_twins_find(scene, rey_boundary_hides, twins);
     if (result != REY_OK || (twins[0].shape < 0 && twins[0].instance < 0)) {
         return result;
     }
@@ -195,10 +194,6 @@ static rey_result boundary_check(const Render *r, int term) {
     if (result != REY_OK || !(r->job.any_motion || r->job.any_places)) {
         return result;
     }
-    result = check_twins(scene, term);
-    if (result != REY_OK) {
-        return result;
-    }
     int32_t jumps;
     const char *unknown = rey_texture_unknown_step(view, term, &jumps);
     if (unknown) {
@@ -207,14 +202,14 @@ static rey_result boundary_check(const Render *r, int term) {
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
-        bool outlines = hides(view, shape);
+        bool hides = rey_boundary_hides(view, shape);
         bool tube = shape->kind == SHAPE_BSPLINE && (term == REY_TERM_SPECULAR || r->job.rides);
-        if (outlines && (tube || shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
+        if (hides && (tube || shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, tube ? "what mirrors, glass and participating media show of the outlines of curves"
                                             : "the outlines of polylines and grids of distances", name);
         }
-        if (outlines && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
+        if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
             rey_name_shape(scene, (int32_t)i, name);
             return refuse(scene, term, "the outlines of curves that bend more sharply than their radius, and so through themselves",
                           name);
@@ -371,11 +366,16 @@ rey_result rey_boundaries_begin(Render *r) {
     if (look_out && !r->rims) {
         r->terms &= REY_TERM_INTERIOR;
     }
+    bool twins_sought = !(r->job.any_motion || r->job.any_places);
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
         bool selected = boundary_is_rim(i) ? r->rims : moves || (r->job.any_normals && !look_out);
         if ((r->terms & rey_boundary_term(i)) && selected) {
             bool check = moves || !rey_boundary_sees(r->plan.sensor);
             result = check ? boundary_check(r, rey_boundary_term(i)) : REY_OK;
+            if (result == REY_OK && !twins_sought) {
+                result = check_twins(r->scene, rey_boundary_term(i));
+                twins_sought = true;
+            }
             result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }

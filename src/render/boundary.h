@@ -9,6 +9,8 @@ rey_result rey_boundaries_begin(Render *r);
 void rey_boundaries_free(Render *r);
 // Whether a sensor is one that boundary terms know.
 bool rey_boundary_sees(const SensorRecord *sensor);
+// Whether a shape hides what is behind it, so that its outlines matter.
+bool rey_boundary_hides(const SceneView *view, const ShapeRecord *shape);
 // Whether what only vertex normals move is known for a sensor: silhouettes have no part in it.
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.

@@ -123,7 +123,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     double factor = edge_moves(r, e) || (w->kind == BOUNDARY_PRIMARY && line_moves(r, e)) ? 1 : w->still;
-    bool hides = !view->has_media || !rey_bsdf_passes(view->bsdfs[view->shapes[e->shape].bsdf].kind);
+    bool hides = rey_boundary_hides(view, view->shapes + e->shape);
     if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
     }

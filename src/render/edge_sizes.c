@@ -232,7 +232,7 @@ static double round_ball(const SceneView *view, const EdgeRecord *e, double cent
     double size = 0;
     if (shape->kind == SHAPE_BSPLINE) {
         double low[3], high[3];
-        rey_tube_box(view, e->shape, e->prim, 1, low, high);
+        rey_tube_box(view, e->shape, e->prim, low, high);
         for (int k = 0; k < 3; k++) {
             centre[k] = 0.5 * (low[k] + high[k]);
             size = fmax(size, 0.5 * (high[k] - low[k]));

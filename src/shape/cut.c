@@ -8,6 +8,7 @@
 
 enum { AROUND = 64, STACKS = 32, TUBE_AROUND = 16, TUBE_STACKS = 4 };
 #define PHASE 0.2931 // of the angle between nodes around an axis, by which they are turned
+#define TUBE_ROOM 1.0195911582083184 // over the radius: 1 / cos(pi / TUBE_AROUND), so that triangles enclose the tube
 
 int32_t rey_cut_triangles(const SceneView *view, int32_t id) {
     const ShapeRecord *shape = view->shapes + id;
@@ -95,7 +96,7 @@ bool rey_tube_folds(const SceneView *view, int32_t id) {
     return false;
 }
 
-void rey_tube_box(const SceneView *view, int32_t id, int32_t segment, double room, double low[3], double high[3]) {
+static void tube_box(const SceneView *view, int32_t id, int32_t segment, double room, double low[3], double high[3]) {
     const ShapeRecord *shape = view->shapes + id;
     const float *p = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
     for (int k = 0; k < 3; k++) {
@@ -105,6 +106,19 @@ void rey_tube_box(const SceneView *view, int32_t id, int32_t segment, double roo
             low[k] = fmin(low[k], (double)p[4 * i + k] - room * (double)p[4 * i + 3]);
             high[k] = fmax(high[k], (double)p[4 * i + k] + room * (double)p[4 * i + 3]);
         }
+    }
+}
+
+void rey_tube_box(const SceneView *view, int32_t id, int32_t segment, double low[3], double high[3]) {
+    tube_box(view, id, segment, 1, low, high);
+}
+
+void rey_cut_box(const SceneView *view, int32_t id, int32_t segment, double low[3], double high[3]) {
+    tube_box(view, id, segment, TUBE_ROOM, low, high);
+    for (int k = 0; k < 3; k++) { // rings lean out of it
+        double room = 0.03 * (high[k] - low[k]);
+        low[k] -= room;
+        high[k] += room;
     }
 }
 
@@ -149,7 +163,7 @@ static void tube_corner(const SceneView *view, int32_t id, int32_t triangle, int
     if (next >= 0) {
         axis = tube_at(view, id, beyond ? next : segment, (float)(u - beyond));
     }
-    const double c[3] = {(double)axis.c.x, (double)axis.c.y, (double)axis.c.z}, wide = (double)axis.r / cos(pi / TUBE_AROUND);
+    const double c[3] = {(double)axis.c.x, (double)axis.c.y, (double)axis.c.z}, wide = TUBE_ROOM * (double)axis.r;
     for (int k = 0; k < 3; k++) {
         p[k] = c[k] + wide * way[k];
     }

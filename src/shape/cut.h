@@ -3,9 +3,8 @@
 
 #include "scene/scene.h"
 
-// So many triangles stand for one segment of a tube, which they enclose: they lie within so many radii of its axis.
+// So many triangles stand for one segment of a tube.
 enum { REY_TUBE_PIECES = 128 };
-#define REY_TUBE_ROOM 1.0196
 
 // How many triangles a shape has; of tubes, a segment. 0: it is never cut.
 int32_t rey_cut_triangles(const SceneView *view, int32_t shape);
@@ -15,8 +14,10 @@ const int32_t *rey_mesh_triangle(const SceneView *view, const ShapeRecord *shape
 
 // Whether a tube bends somewhere more sharply than its radius, so that it passes through itself there.
 bool rey_tube_folds(const SceneView *view, int32_t shape);
-// What a tube's segment lies in, with `room` times its radii about its control points, in its own space.
-void rey_tube_box(const SceneView *view, int32_t shape, int32_t segment, double room, double low[3], double high[3]);
+// What a tube's segment lies in, in its own space.
+void rey_tube_box(const SceneView *view, int32_t shape, int32_t segment, double low[3], double high[3]);
+// What its triangles lie in.
+void rey_cut_box(const SceneView *view, int32_t shape, int32_t segment, double low[3], double high[3]);
 
 static inline double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 

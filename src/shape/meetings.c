@@ -251,13 +251,33 @@ static bool half_of(const Pieces *s, const Piece *const *piece, const Triangle *
     return span(on, across, touch, ends);
 }
 
+static rey_result keep(const Pieces *s, const MeetingRecord *m) {
+    MeetingRecord *record = rey_array_push(s->scene->ctx, s->found, sizeof *record, 1);
+    if (!record) {
+        return REY_ERROR_MEMORY;
+    }
+    *record = *m;
+    return REY_OK;
+}
+
+static rey_result keep_half(const Pieces *s, const Half *half, const MeetingRecord *m) {
+    Half *kept = rey_array_push(s->scene->ctx, s->halves, sizeof *kept, 1);
+    if (!kept) {
+        return REY_ERROR_MEMORY;
+    }
+    *kept = *half;
+    kept->meeting = *m;
+    return REY_OK;
+}
+
 // Of halves that belong together one is kept.
 static rey_result join_halves(const Pieces *s) {
     Half *halves = s->halves->data;
     if (s->halves->count > 0) {
         qsort(halves, s->halves->count, sizeof *halves, compare_halves);
     }
-    for (size_t i = 0, next; i < s->halves->count; i = next) {
+    rey_result result = REY_OK;
+    for (size_t i = 0, next; i < s->halves->count && result == REY_OK; i = next) {
         unsigned sorts = 0;
         bool even = true;
         for (next = i; next < s->halves->count && memcmp(halves + i, halves + next, offsetof(Half, sort)) == 0; next++) {
@@ -265,14 +285,10 @@ static rey_result join_halves(const Pieces *s) {
             even &= are_even(halves + i, halves + next);
         }
         if (even && sorts == (halves[i].face < 0 ? 15u : 3u)) {
-            MeetingRecord *record = rey_array_push(s->scene->ctx, s->found, sizeof *record, 1);
-            if (!record) {
-                return REY_ERROR_MEMORY;
-            }
-            *record = halves[i].meeting;
+            result = keep(s, &halves[i].meeting);
         }
     }
-    return REY_OK;
+    return result;
 }
 
 static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
@@ -322,15 +338,7 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
     for (int i = 0; i < 6; i++) {
         m.ends[i] = (float)ends[i / 3][i % 3];
     }
-    if (halved) {
-        half.meeting = m;
-    }
-    void *record = rey_array_push(s->scene->ctx, halved ? s->halves : s->found, halved ? sizeof half : sizeof m, 1);
-    if (!record) {
-        return REY_ERROR_MEMORY;
-    }
-    memcpy(record, halved ? (const void *)&half : &m, halved ? sizeof half : sizeof m);
-    return REY_OK;
+    return halved ? keep_half(s, &half, &m) : keep(s, &m);
 }
 
 rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,

@@ -153,12 +153,7 @@ static Box box_of_round(const SceneView *view, const Body *body) {
             high[k] = (double)table[k] + (double)table[3];
         }
     } else if (shape->kind == SHAPE_BSPLINE) {
-        rey_tube_box(view, body->shape, body->segment, REY_TUBE_ROOM, low, high);
-        for (int k = 0; k < 3; k++) { // its rings lean out of it
-            double room = 0.03 * (high[k] - low[k]);
-            low[k] -= room;
-            high[k] += room;
-        }
+        rey_cut_box(view, body->shape, body->segment, low, high);
     }
     for (int i = 0; i < 8; i++) {
         double *p = corners[i];
@@ -283,7 +278,9 @@ static rey_result add_pieces(Pieces *s) {
     rey_context *ctx = s->scene->ctx;
     for (int32_t b = 0; b < (int32_t)s->bodies.count; b++) {
         const Body *body = &ARRAY_AT(s->bodies, Body, b);
-        int32_t n = body->window.low[0] <= body->window.high[0] ? triangles_of(&s->scene->view, body->shape) : 0, kept = 0;
+        const int32_t n = body->window.low[0] <= body->window.high[0] ? triangles_of(&s->scene->view, body->shape) : 0;
+        const int32_t family = meets_itself(s, body) ? -1 : b;
+        int32_t kept = 0;
         if (n == 0) {
             continue;
         }
@@ -301,7 +298,7 @@ static rey_result add_pieces(Pieces *s) {
             Box box = box_of_points(p, 3);
             widen(s, &box);
             box.moves = ARRAY_AT(s->body_boxes, Box, b).moves;
-            box.family = meets_itself(s, body) ? -1 : b;
+            box.family = family;
             if (!rey_boxes_apart(&box, &body->window)) {
                 pieces[kept] = (Piece){b, triangle};
                 boxes[kept++] = box;

@@ -1,5 +1,6 @@
 // Points of the curves along which shading normals turn away, and along which surfaces pass through each other: each lies on its
 // curve, its tangent is the rate of the point, and its density adds up to the curve's length.
+#include "../quadric.h"
 #include "edge_world.h"
 
 
@@ -114,21 +115,6 @@ static void test_terminators(void **state) {
 
 // ---- meetings ----------------------------------------------------------------------------------------------------
 
-static double quadric_at(const Quadric *q, Vec3 p, double gradient[3]) {
-    const double y[3] = {(double)p.x - q->centre[0], (double)p.y - q->centre[1], (double)p.z - q->centre[2]};
-    static const int entry[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
-    double value = q->constant;
-    for (int i = 0; i < 3; i++) {
-        double row = 0;
-        for (int k = 0; k < 3; k++) {
-            row += q->matrix[entry[i][k]] * y[k];
-        }
-        gradient[i] = row + q->linear[i];
-        value += y[i] * (0.5 * row + q->linear[i]);
-    }
-    return value;
-}
-
 // A triangle of a mesh and a closed quadric around its corner; two points of their curve.
 static void meeting_make(World *w, uint64_t *random) {
     Vec3 a = vertex(w, 0), e1 = v3_sub(vertex(w, 1), a), e2 = v3_sub(vertex(w, 2), a), n = v3_normalize(v3_cross(e1, e2));
@@ -146,7 +132,7 @@ static void meeting_make(World *w, uint64_t *random) {
         double unused[3];
         for (int i = 0; i < 40; i++) {
             float at = 0.5f * (low + high);
-            bool outside = quadric_at(q, v3_madd(a, at, way), unused) > 0;
+            bool outside = quadric_at(q, (const float[]){a.x + at * way.x, a.y + at * way.y, a.z + at * way.z}, unused) > 0;
             *(outside ? &high : &low) = at;
         }
         Vec3 p = v3_madd(a, low, way);
@@ -165,7 +151,7 @@ static void meeting_bend(World *w, uint64_t *random) {
         for (int step = 0; step < 8; step++) {
             double g[2][3], f[2], a[3] = {0};
             for (int k = 0; k < 2; k++) {
-                f[k] = quadric_at(m->surface + k, v3(p[0], p[1], p[2]), g[k]);
+                f[k] = quadric_at(m->surface + k, p, g[k]);
             }
             for (int i = 0; i < 3; i++) {
                 a[0] += g[0][i] * g[0][i];
@@ -196,7 +182,7 @@ static void test_meetings(void **state) {
         w.edges[1].shape = MESH;
         EdgePoint e = point_of(&w, u, v3_zero(), false);
         for (int k = 0; k < 2; k++) {
-            double g[3], value = quadric_at(w.meeting.surface + k, e.p, g);
+            double g[3], value = quadric_at(w.meeting.surface + k, (const float[]){e.p.x, e.p.y, e.p.z}, g);
             Vec3 n = v3_normalize(v3((float)g[0], (float)g[1], (float)g[2]));
             assert_near("surface", value, 0, 1e-5);
             assert_near_v3("normal", e.across[k], n, 2e-3);

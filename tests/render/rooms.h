@@ -126,6 +126,34 @@ static inline Room room_open(const char *file, int threads, int lanes) {
     return room;
 }
 
+// Texts one after another, up to a null.
+static inline void write_texts(const char *path, const char *const *texts) {
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    for (; *texts; texts++) {
+        fputs(*texts, f);
+    }
+    assert_int_equal(fclose(f), 0);
+}
+
+// A scene from such texts.
+static inline Room room_of(const char *const *texts, int threads, int lanes, const rey_define *defines, int count) {
+    rey_context_def def = rey_default_context_def();
+    char path[64];
+    Room room;
+    def.threads = threads;
+    def.lanes = lanes;
+    snprintf(path, sizeof path, "/tmp/reynolds_room_%ld.xml", (long)getpid());
+    write_texts(path, texts);
+    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
+    rey_result result = rey_scene_load(room.ctx, path, defines, count, &room.scene);
+    unlink(path);
+    if (result != REY_OK) {
+        fail_msg("%s", rey_error(room.ctx));
+    }
+    return room;
+}
+
 static inline void room_close(Room room) {
     rey_scene_destroy(room.scene);
     rey_context_destroy(room.ctx);

@@ -1,6 +1,6 @@
 // The curves along which surfaces pass through each other: that what is found is as long as they are, and lies on them.
+#include "../quadric.h"
 #include "rooms.h"
-#include "shape/meetings.h"
 
 #define PI 3.14159265358979323846
 
@@ -66,62 +66,38 @@ static const struct {
 };
 
 static bool moves_any(const void *user, int32_t shape, int32_t instance) {
-    (void)user;
-    (void)shape;
-    (void)instance;
+    UNUSED(user);
+    UNUSED(shape);
+    UNUSED(instance);
     return true;
 }
 
 static bool moves_none(const void *user, int32_t shape, int32_t instance) {
-    (void)user;
-    (void)shape;
-    (void)instance;
+    UNUSED(user);
+    UNUSED(shape);
+    UNUSED(instance);
     return false;
 }
 
-// Of a quadric, over the length of its gradient.
+// Of a point from a surface, to first order.
 static double distance_to(const Quadric *q, const float *x) {
-    double y[3], gradient2 = 0, value = (double)q->constant;
-    for (int k = 0; k < 3; k++) {
-        y[k] = (double)x[k] - (double)q->centre[k];
-    }
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        double my = (double)q->matrix[k] * y[k] + (double)q->matrix[3 + j] * y[i] + (double)q->matrix[3 + i] * y[j];
-        double slope = my + (double)q->linear[k];
-        value += (0.5 * my + (double)q->linear[k]) * y[k];
-        gradient2 += slope * slope;
-    }
-    return fabs(value) / sqrt(gradient2);
-}
-
-static void write_file(const char *path, const char *start, const char *text, const char *end) {
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fprintf(f, "%s%s%s", start, text, end);
-    assert_int_equal(fclose(f), 0);
+    double g[3], value = quadric_at(q, x, g);
+    return fabs(value) / sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
 static Room scene_open(const char *shapes, const char *file) {
-    rey_context_def def = rey_default_context_def();
-    char path[64], other[64];
-    Room room;
-    def.threads = 1;
-    snprintf(path, sizeof path, "/tmp/reynolds_meetings_%ld.xml", (long)getpid());
-    snprintf(other, sizeof other, "/tmp/reynolds_meetings_%ld.obj", (long)getpid());
-    write_file(path, "<scene version='3.0.0'>", shapes, "</scene>");
-    write_file(other, "", file ? file : "", "");
-    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    rey_result result = rey_scene_load(room.ctx, path, (const rey_define[]){{"file", other}}, file != NULL, &room.scene);
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/reynolds_meetings_%ld.obj", (long)getpid());
+    write_texts(path, (const char *const[]){file, NULL});
+    const char *const texts[] = {"<scene version='3.0.0'>", shapes, "</scene>", NULL};
+    Room room = room_of(texts, 1, 0, (const rey_define[]){{"file", path}}, file != NULL);
     unlink(path);
-    unlink(other);
-    ok(room, result);
     return room;
 }
 
 static void test_lengths(void **state) {
-    (void)state;
-    for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); i++) {
+    UNUSED(state);
+    for (int i = 0; i < COUNT_OF(cases); i++) {
         Room room = scene_open(cases[i].scene, cases[i].file);
         Array found = {0};
         double length = 0;

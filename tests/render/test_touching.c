@@ -39,21 +39,7 @@ static const Pile piles[] = {
 };
 
 static Room pile_open(const char *text, int lanes) {
-    rey_context_def def = rey_default_context_def();
-    char path[64];
-    Room room;
-    def.threads = 2;
-    def.lanes = lanes;
-    snprintf(path, sizeof path, "/tmp/reynolds_touching_%ld.xml", (long)getpid());
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fprintf(f, "<scene version='3.0.0'>%s%s%s</scene>", sensor, media, text);
-    assert_int_equal(fclose(f), 0);
-    assert_int_equal(rey_context_create(&def, &room.ctx), REY_OK);
-    rey_result result = rey_scene_load(room.ctx, path, NULL, 0, &room.scene);
-    unlink(path);
-    ok(room, result);
-    return room;
+    return room_of((const char *const[]){"<scene version='3.0.0'>", sensor, media, text, "</scene>", NULL}, 2, lanes, NULL, 0);
 }
 
 // Mean over pixels and seeds of the picture (param -1) or its derivative, against what it should be.
