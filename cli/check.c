@@ -10,6 +10,7 @@
 #include "check.h"
 
 #include "base/context.h"
+#include "render/facing.h"
 #include "render/replay.h"
 
 #include <math.h>
@@ -361,7 +362,9 @@ static int build_directions(Work *w, const Specs *specs, Check *checks) {
             return status;
         }
         checks[i].replays = can_replay(w, &checks[i].direction);
-        int needed = cli_direction_terms(w->session.scene, &checks[i].direction), asked = w->session.options->terms;
+        int asked = w->session.options->terms;
+        int needed = rey_terms_stated(w->session.scene, w->session.sensor,
+                                      cli_direction_terms(w->session.scene, &checks[i].direction));
         checks[i].left_out = asked ? needed & ~asked : 0;
     }
     return note_unreached(w, checks, specs->count);

@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 enum { MOST_SPP = 1 << 24 };        // the library's limit
-enum { TERMS_ESTIMATED = 15 };      // REY_TERM_ bits that --terms may ask for
+enum { TERMS_ESTIMATED = 15 | REY_TERM_TERMINATOR }; // REY_TERM_ bits that --terms may ask for
 enum { EXIT_OK = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_INTERRUPTED = 130 };
 
 // Subcommands: main.c holds one row for each. A command gets its own name as argv[0] and returns the exit status.

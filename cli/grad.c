@@ -9,6 +9,7 @@
 #include "base/context.h"
 #include "io/file.h"
 #include "io/image.h"
+#include "render/facing.h"
 #include "render/term_request.h"
 
 #include <math.h>
@@ -51,16 +52,21 @@ static void summarize(const double *values, int stride, double *mean, double *st
     *standard_error = sqrt(squares / (SETS - 1) / SETS);
 }
 
-// Terms that are missing. A jump that no path met is not needed; of mirrors that the camera sees the term does not know.
+// Terms that are needed. A jump that is only looked out for, and that no path met, is not.
+static int terms_needed(const Grad *g) {
+    return rey_terms_stated(g->session.scene, g->session.sensor, g->needed) | (g->needed & g->stats.missing_terms);
+}
+
+// Terms that are missing; of mirrors that the camera sees the term does not know.
 static int terms_left_out(const Grad *g) {
-    int met = g->stats.missing_terms;
-    return (g->needed & ~g->used & (~REY_TERM_TERMINATOR | met)) | (g->needed & met & REY_TERM_SPECULAR);
+    return terms_needed(g) & (~g->used | (g->stats.missing_terms & REY_TERM_SPECULAR));
 }
 
 // The terms' shares of the value, and their standard errors.
 static void write_terms(Json *json, const Grad *g) {
     static const char *const keys[] = {"terms", "terms_standard_error"};
     int computed = g->used | (g->session.options->terms ? 0 : REY_TERM_INTERIOR);
+    computed = rey_terms_stated(g->session.scene, g->session.sensor, computed);
     for (int k = 0; k < 2; k++) {
         json_object(json, keys[k]);
         for (int i = 0; i < TERM_COUNT; i++) {
@@ -112,7 +118,7 @@ static void write_json(FILE *file, const Grad *g, const char *gradient_folder) {
     json_number(&json, "standard_error", g->standard_error);
     write_terms(&json, g);
     json_bool(&json, "complete", terms_left_out(g) == 0);
-    cli_json_terms(&json, "needed_terms", g->needed & (~REY_TERM_TERMINATOR | g->stats.missing_terms));
+    cli_json_terms(&json, "needed_terms", terms_needed(g));
     cli_json_terms(&json, "left_out", terms_left_out(g));
     json_array(&json, "parameters");
     for (int i = 0; i < g->direction.count; i++) {

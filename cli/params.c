@@ -3,6 +3,7 @@
 #include "npy.h"
 #include "reasons.h"
 
+#include "render/facing.h"
 #include "render/term_request.h"
 #include "render/update.h"
 #include "render/used.h"
@@ -33,6 +34,10 @@ typedef struct Listing {
     bool *complete;     // has a gradient, per parameter that is shown
     Reasons reasons;    // of what is refused
 } Listing;
+
+static int terms_stated(const Listing *l, const rey_param_info *info) {
+    return rey_terms_stated(l->session->scene, l->session->sensor, info->terms);
+}
 
 // Why `grad` refuses a parameter, by the words that it uses; null where it does not.
 static const char *refusal(const Listing *l, int param) {
@@ -103,8 +108,9 @@ static void json_param(Json *json, const Listing *l, int param) {
     json_number(json, "mean", range.mean);
     json_number(json, "min", range.low);
     json_number(json, "max", range.high);
-    cli_json_terms(json, "terms", info->terms & ~REY_TERM_TERMINATOR);
-    cli_json_terms(json, "terms_if_met", info->terms & REY_TERM_TERMINATOR);
+    int stated = terms_stated(l, info);
+    cli_json_terms(json, "terms", stated);
+    cli_json_terms(json, "terms_if_met", info->terms & ~stated);
     json_string(json, "why", info->why);
     json_bool(json, "used", l->used[param]);
     json_string(json, "refused", refusal(l, param));
@@ -138,7 +144,7 @@ static void gradient_text(Listing *l, int param, char text[CELL_BYTES]) {
         snprintf(text, CELL_BYTES, "unused: nothing in the scene refers to it, and its derivative is 0");
     } else {
         snprintf(text, CELL_BYTES, "complete%s",
-                 info.terms & REY_TERM_TERMINATOR ? ", unless paths meet the jump of 'terminator'" : "");
+                 info.terms & ~terms_stated(l, &info) ? ", unless paths meet the jump of 'terminator'" : "");
     }
 }
 
@@ -158,7 +164,7 @@ static void param_cells(Listing *l, int param, char cells[PARAM_CELLS][CELL_BYTE
     snprintf(cells[2], CELL_BYTES, "%s", info.unit[0] ? info.unit : "-");
     snprintf(cells[3], CELL_BYTES, "[%g, %g]", (double)info.low, (double)info.high);
     value_text(&info, rey_param_values(s->scene, param), cells[4], CELL_BYTES);
-    cli_terms_text(info.terms & ~REY_TERM_TERMINATOR, cells[5], CELL_BYTES);
+    cli_terms_text(terms_stated(l, &info), cells[5], CELL_BYTES);
     gradient_text(l, param, cells[6]);
 }
 

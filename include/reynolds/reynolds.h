@@ -152,8 +152,9 @@ typedef struct rey_param_info {
     int dims;                /* number of entries of shape, 0 to 3 */
     int64_t shape[3];        /* for example height, width, 3 */
     float low, high;         /* allowed range, -INFINITY and INFINITY where open */
-    int terms;               /* bits of the terms that its derivative may need; 0 = not differentiable. TERMINATOR is
-                                needed only if paths meet the jump, which the derivative then reports */
+    int terms;               /* bits of the terms that its derivative may need; 0 = not differentiable. Where TERMINATOR
+                                is not known (docs/cli.md) it is needed only if paths meet the jump, which the
+                                derivative then reports */
     const char *why;         /* why the terms beyond interior are needed, or why it is not differentiable; "" else */
 } rey_param_info;
 

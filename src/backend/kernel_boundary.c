@@ -3,6 +3,7 @@
 #include "integrator/boundary/mirrored.h"
 #include "integrator/boundary/primary.h"
 #include "integrator/boundary/rim_view.h"
+#include "integrator/boundary/facing_view.h"
 
 // Behind the workspace proper: the groups' offsets, and which samples of a chunk are kept.
 size_t KNAME(rey_kernel_boundary_bytes)(void) {
@@ -42,14 +43,22 @@ static void pairs_splat(Tracer *t, const BoundaryJob *b, int32_t count) {
     }
 }
 
+// Curves of the film that are looked for, and seen by pairs of paths.
 static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *filter, Sink *sink, Segments *q, int32_t *kept,
                          int32_t *begin) {
     const int32_t most = t->ws.chunk / 2;
+    const bool turned = b->kind == BOUNDARY_FACING_VIEW;
     const Strips strips = strips_of(t);
     for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
         int64_t left = b->count - at;
-        int32_t count = strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept), half;
-        curves_find(t, b, &strips, b->first + at, kept, count, q);
+        int32_t count = left < most ? (int32_t)left : most, half;
+        if (turned) {
+            count = level_strips_find(t, b, &strips, b->first + at, count, kept);
+            facing_views_find(t, b, &strips, b->first + at, kept, count, q);
+        } else {
+            count = strips_find(t, b, &strips, b->first + at, count, kept);
+            curves_find(t, b, &strips, b->first + at, kept, count, q);
+        }
         if (q->count == 0) {
             continue;
         }
@@ -57,7 +66,7 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
         curves_start(t, &strips, q, b->first + at, half);
         path_forward(t, begin);
         pairs_adjoint(t, b, filter, q->count);
-        curves_finish(t, b, q, sink, half);
+        (turned ? facing_views_finish : curves_finish)(t, b, q, sink, half);
         pairs_splat(t, b, q->count);
     }
 }
@@ -67,7 +76,7 @@ static void run_rim_view(Tracer *t, const BoundaryJob *b, const FilterTable *fil
     const Strips strips = strips_of(t);
     for (int64_t at = 0; at < b->count && (!t->job->go_on || t->job->go_on(t->job->user)); at += most) {
         int64_t left = b->count - at;
-        int32_t count = rim_strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept);
+        int32_t count = level_strips_find(t, b, &strips, b->first + at, left < most ? (int32_t)left : most, kept);
         rim_views_find(t, b, &strips, b->first + at, kept, count, q);
         pairs_adjoint(t, b, filter, q->count);
         rim_views_finish(t, b, b->first + at, q, sink);
@@ -123,7 +132,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     still.gradient = &unused;
     still.tangent = NULL;
     b->still = &still;
-    if (b->kind == BOUNDARY_MIRRORED) {
+    if (b->kind == BOUNDARY_MIRRORED || b->kind == BOUNDARY_FACING_VIEW) {
         run_mirrored(&t, b, &filter, &sink, &in.q, kept, begin);
     } else if (b->kind == BOUNDARY_RIM_VIEW) {
         run_rim_view(&t, b, &filter, &sink, &in.q, kept);

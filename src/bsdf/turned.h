@@ -2,7 +2,7 @@
 // maps have in common. The nested function sees both directions in a frame about n, with its tangent along the
 // surface's; light that is above one of the two surfaces and below the other one is dropped. Optionally the rest is
 // shadowed as by a microsurface whose roughness follows from the angle between the normals [estevez2019 eq. 3 and 4].
-// NOT differentiated: the jump where n turns away from the viewer; it is reported (turned_watch).
+// The jump where n turns away from the viewer is a boundary term (facing.h); where that is not known it is reported (turned_watch).
 #pragma once
 
 #include "bsdf/call.h"

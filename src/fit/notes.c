@@ -1,6 +1,7 @@
 // notes.c: what is not wrong with a job and may be a mistake, told before the first iteration.
 #include "fit/fit.h"
 
+#include "render/facing.h"
 #include "render/used.h"
 #include "scene/names.h"
 
@@ -113,7 +114,7 @@ static void note_terms(const Fit *fit) {
     for (size_t k = 0; k < fit->unknowns.items.count && fit->job.terms; k++) {
         const Unknown *p = &ARRAY_AT(fit->unknowns.items, Unknown, k);
         int needed = p->param < 0 ? 0 : ARRAY_AT(fit->scene->params, Param, p->param).terms;
-        int left = needed & ~fit->job.terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR);
+        int left = rey_terms_stated(fit->scene, fit->views[0].sensor, needed) & ~fit->job.terms & ~REY_TERM_MEDIUM;
         first = left && !first ? p->name : first;
         missing |= left;
         count += left != 0;

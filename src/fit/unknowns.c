@@ -80,7 +80,7 @@ static rey_result check_terms(Job *job, const JobParameter *p, const rey_param_i
     }
     char asked[128], expected[128];
     rey_job_terms_text(job->terms, asked, sizeof asked);
-    rey_job_terms_text(info->terms & ~(REY_TERM_MEDIUM | REY_TERM_TERMINATOR), expected, sizeof expected);
+    rey_job_terms_text(info->terms & ~REY_TERM_MEDIUM, expected, sizeof expected);
     JobPlace at = rey_job_blame(job->terms_at, rey_job_place_of(p->node, "name", NULL));
     return rey_job_fail_at(job, at, REY_ERROR_PARAM,
                            "terms %s: the gradient of %s has no such term, expected some of %s", asked, info->name, expected);

@@ -43,6 +43,10 @@ int rey_boundary_term(int32_t kind) {
     case BOUNDARY_CHAINED_HORIZON:
     case BOUNDARY_CHAINED_RIM:
         return REY_TERM_SPECULAR;
+    case BOUNDARY_FACING:
+    case BOUNDARY_FACING_VIEW:
+    case BOUNDARY_CHAINED_FACING:
+        return REY_TERM_TERMINATOR;
     default:
         return REY_TERM_INDIRECT;
     }
@@ -71,9 +75,11 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
         return (ChainObstacle){what, -1, -1, what == step ? texture : -1};
     }
     for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
-        int kind = view->bsdfs[i].kind;
-        if (view->bsdfs[i].used && (rey_bsdf_opens(kind) || rey_bsdf_turns(kind))) {
-            return (ChainObstacle){rey_bsdf_opens(kind) ? "light that passes undeviated through" : "the normals of", -1, i, -1};
+        const BsdfNode *node = view->bsdfs + i;
+        bool opens = rey_bsdf_opens(node->kind), turns = rey_bsdf_turns(node->kind);
+        bool mirror = turns && (rey_bsdf_holds(view, i, rey_bsdf_bends) || rey_bsdf_cuts(node));
+        if (node->used && (opens || mirror)) {
+            return (ChainObstacle){opens ? "light that passes undeviated through" : "the normals of", -1, i, -1};
         }
     }
     return (ChainObstacle){NULL, -1, -1, -1};
@@ -270,7 +276,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_LINES] = 1, [BOUNDARY_RIDING] = 1, [BOUNDARY_CHAINED_TERMINATOR] = 4,
                                                   [BOUNDARY_CHAINED_HORIZON] = 4, [BOUNDARY_RIDING_TERMINATOR] = 4,
                                                   [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1,
-                                                  [BOUNDARY_CHAINED_RIM] = 1};
+                                                  [BOUNDARY_CHAINED_RIM] = 1, [BOUNDARY_FACING] = 4,
+                                                  [BOUNDARY_FACING_VIEW] = 1, [BOUNDARY_CHAINED_FACING] = 4};
     int32_t asked = rey_boundary_term(kind) == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -299,7 +306,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     if (result == REY_OK && kind == BOUNDARY_MIRRORED) { // it looks for edges where they are seen
         result = rey_texture_step_records(r->scene, r->job.to_uv_at, &plan->steps, &plan->step_at);
         result = result == REY_OK ? check_halves(r) : result;
-    } else if (result == REY_OK && !boundary_is_rim(kind)) {
+    } else if (result == REY_OK && !boundary_is_rim(kind) && kind != BOUNDARY_FACING_VIEW) {
         result = rey_boundary_edges(r, kind, plan);
     }
     if (result == REY_OK && r->job.mode == MODE_FORWARD) {
@@ -313,6 +320,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
     }
+    edge_count = kind == BOUNDARY_FACING_VIEW ? 1 : edge_count;
+    edge_count = kind == BOUNDARY_CHAINED_FACING && !has_chains(&r->scene->view) ? 0 : edge_count;
     const int32_t depth = r->scene->view.max_depth;
     if (boundary_is_rim(kind)) { // `direct` without emitter_samples meets no such lights
         bool lit = !r->scene->view.split || r->scene->view.light_samples > 0, deep = depth < 0 || depth > 2;
@@ -364,11 +373,12 @@ rey_result rey_boundaries_begin(Render *r) {
     rey_result result = REY_OK;
     bool look_out = !moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor); // paths do, instead
     if (look_out && !r->rims) {
-        r->terms &= REY_TERM_INTERIOR;
+        r->terms &= REY_TERM_INTERIOR | REY_TERM_TERMINATOR;
     }
     bool twins_sought = !(r->job.any_motion || r->job.any_places);
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
-        bool selected = boundary_is_rim(i) ? r->rims : moves || (r->job.any_normals && !look_out);
+        bool facing = boundary_is_facing(i) || i == BOUNDARY_FACING_VIEW;
+        bool selected = facing ? r->facing : boundary_is_rim(i) ? r->rims : moves || (r->job.any_normals && !look_out);
         if ((r->terms & rey_boundary_term(i)) && selected) {
             bool check = moves || !rey_boundary_sees(r->plan.sensor);
             result = check ? boundary_check(r, rey_boundary_term(i)) : REY_OK;
@@ -379,6 +389,7 @@ rey_result rey_boundaries_begin(Render *r) {
             result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }
+    r->job.watch_turned &= !(r->facing && (r->terms & REY_TERM_TERMINATOR));
     watch_smooth_normals(r, look_out);
     return result == REY_OK ? rey_corners_begin(r) : result;
 }
@@ -410,7 +421,7 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
 
 void rey_boundary_run(Render *r, BoundaryPlan *plan, uint32_t scramble, double *picture) {
     // The interior's paths have found out whether the sensor sees mirrors and glass.
-    bool may = !(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED) || r->lines || r->rims;
+    bool may = !(r->terms & REY_TERM_INTERIOR) || (r->faces & CAMERA_MIRRORED) || r->lines || r->rims || r->facing;
     plan->job.mirrored = plan->job.chains && !r->particles && may;
     if (plan->job.edge_count == 0 || (plan->job.kind == BOUNDARY_MIRRORED && !plan->job.mirrored)) {
         return;

@@ -4,6 +4,7 @@
 #include "bsdf/table.h"
 #include "render/cuts.h"
 #include "render/edge_sizes.h"
+#include "render/facing.h"
 #include "render/light_borders.h"
 #include "render/texture_steps.h"
 #include "shape/shape.h"
@@ -37,7 +38,7 @@ static bool line_moves(const Render *r, const EdgeRecord *e) {
 // Whether it moves what an edge looks like. Meetings were looked for where something moves.
 static bool edge_moves(const Render *r, const EdgeRecord *e) {
     return e->kind == EDGE_MEETING || moves_on_film(r, e->shape, e->instance) ||
-           ((e->kind == EDGE_TERMINATOR || e->kind == EDGE_CUT) && r->job.normals_at[e->shape] >= 0);
+           ((e->kind == EDGE_TERMINATOR || e->kind == EDGE_CUT || e->kind == EDGE_FACING) && r->job.normals_at[e->shape] >= 0);
 }
 
 // Whether it moves what meets along a curve.
@@ -122,6 +123,11 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if (w->kind != BOUNDARY_PRIMARY && e->kind == EDGE_MARK && ARRAY_AT(r->marks, MarkRecord, e->corner).half) {
         return 0;
     }
+    if (boundary_is_facing(w->kind) || e->kind == EDGE_FACING) {
+        bool reads = r->job.live[view->shapes[e->shape].group] & LIVE_SCATTERING; // which may be a map's texture
+        double area = boundary_is_facing(w->kind) && e->kind == EDGE_FACING ? rey_edge_in_world(r, e) : 0;
+        return edge_moves(r, e) || reads ? area : w->still * area;
+    }
     double factor = edge_moves(r, e) || (w->kind == BOUNDARY_PRIMARY && line_moves(r, e)) ? 1 : w->still;
     bool hides = rey_boundary_hides(view, view->shapes + e->shape);
     if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
@@ -181,6 +187,7 @@ static rey_result find_edges(Render *r) {
         result = rey_marks_find(r->scene, &steps, seen_moving, r, &r->edges, &r->marks);
     }
     result = result == REY_OK ? rey_cuts_find(r->scene, &r->edges) : result;
+    result = result == REY_OK && r->facing ? rey_facing_find(r->scene, &r->edges) : result;
     rey_array_free(r->scene->ctx, &steps);
     return result;
 }

@@ -37,8 +37,7 @@ static bool has_sharp_light(const SceneView *view) {
     return false;
 }
 
-// The triangles of one shape, in every instance.
-static rey_result find_in_shape(rey_scene *scene, int32_t id, Array *edges) {
+rey_result rey_faces_find(rey_scene *scene, int32_t id, int32_t kind, Array *edges) {
     const SceneView *view = &scene->view;
     const ShapeRecord *shape = view->shapes + id;
     const int64_t instances = shape->collection >= 0 ? view->instances_count : 1;
@@ -46,12 +45,13 @@ static rey_result find_in_shape(rey_scene *scene, int32_t id, Array *edges) {
         if (shape->collection >= 0 && view->instances[i].group != shape->collection) {
             continue;
         }
-        for (int32_t k = 0; k < shape->triangle_count; k++) {
+        const int32_t count = shape->kind == SHAPE_MESH ? shape->triangle_count : 1;
+        for (int32_t k = 0; k < count; k++) {
             EdgeRecord *e = rey_array_push(scene->ctx, edges, sizeof *e, 1);
             if (!e) {
                 return REY_ERROR_MEMORY;
             }
-            *e = (EdgeRecord){.kind = EDGE_CUT, .shape = id, .instance = (int32_t)i, .prim = k, .opposite = EDGE_OPEN,
+            *e = (EdgeRecord){.kind = kind, .shape = id, .instance = (int32_t)i, .prim = k, .opposite = EDGE_OPEN,
                               .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};
         }
     }
@@ -63,7 +63,7 @@ rey_result rey_cuts_find(rey_scene *scene, Array *edges) {
     for (int32_t i = 0; i < scene->view.shapes_count && result == REY_OK; i++) {
         const ShapeRecord *shape = scene->view.shapes + i;
         if (shape->kind == SHAPE_MESH && !(shape->flags & SHAPE_UNSEEN) && rey_cuts_within(&scene->view, shape->bsdf)) {
-            result = find_in_shape(scene, i, edges);
+            result = rey_faces_find(scene, i, EDGE_CUT, edges);
         }
     }
     return result;

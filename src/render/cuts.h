@@ -8,6 +8,9 @@
 // Whether a scattering function does, itself or inside.
 bool rey_cuts_within(const SceneView *view, int32_t bsdf);
 
+// Appends records of a kind (EDGE_) of the triangles of one shape, or of all of it where it is no mesh, in every instance.
+rey_result rey_faces_find(rey_scene *scene, int32_t shape, int32_t kind, Array *edges);
+
 // Appends the triangles of meshes with such functions to `edges`, an Array of EdgeRecord.
 rey_result rey_cuts_find(rey_scene *scene, Array *edges);
 

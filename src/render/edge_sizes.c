@@ -358,6 +358,9 @@ double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
         return mark_length(r, e);
     case EDGE_CUT:
         return triangle_area(view, e);
+    case EDGE_FACING:
+        return view->shapes[e->shape].kind == SHAPE_MESH ? triangle_area(view, e)
+                                                         : 12 * pow(round_ball(view, e, centre, &reach), 2);
     case EDGE_TERMINATOR:
         return turning_weight(view, e);
     case EDGE_MESH:

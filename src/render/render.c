@@ -4,6 +4,7 @@
 #include "math/rng.h"
 #include "render/boundary.h"
 #include "render/dropped.h"
+#include "render/facing.h"
 #include "render/live.h"
 #include "render/motion.h"
 #include "render/particles.h"
@@ -339,6 +340,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     }
     r->job.spp = set_spp(r);
     r->rims = rey_rims_move(scene, selection);
+    r->facing = r->job.watch_turned && !rey_facing_gap(&scene->view, r->plan.sensor);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
     return rey_boundaries_begin(r);
 }

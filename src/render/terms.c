@@ -7,6 +7,7 @@
 #include "render/cuts.h"
 #include "render/dropped.h"
 #include "render/edge_on.h"
+#include "render/facing.h"
 #include "render/motion.h"
 #include "render/particles.h"
 #include "render/rims.h"
@@ -268,7 +269,8 @@ static rey_result check_rims(rey_scene *scene, const SensorRecord *sensor, const
 
 // Terms that are asked for by name must exist.
 static rey_result check_asked(rey_scene *scene, const rey_render_def *def, int chains, rey_selection selection) {
-    int wrong = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains), bit = wrong & -wrong;
+    const int turned = rey_terms_stated(scene, def->sensor, REY_TERM_TERMINATOR);
+    int wrong = def->terms & ~(REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains | turned), bit = wrong & -wrong;
     if (bit == REY_TERM_SPECULAR && selection.count > 0) {
         char reason[REASON];
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[0]);
@@ -383,11 +385,11 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
         const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
         p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
     }
-    static const char *const turned = "does not exist yet: paths met shading normals that face the viewer as the surface "
-                                      "does and others that do not, and the picture jumps between them";
+    const char *gap = rey_facing_gap(&r->scene->view, r->plan.sensor);
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                    "the gradient of %s needs the term '%s', which %s. --terms interior gives the part that does exist",
-                    p ? p->name : "", rey_term_name(bit), turned);
+                    "the gradient of %s needs the term '%s', which is not known %s: paths met shading normals that face the viewer "
+                    "as the surface does and others that do not, and the picture jumps between them. --terms interior gives the "
+                    "part that does exist", p ? p->name : "", rey_term_name(bit), gap ? gap : "here");
 }
 
 void rey_terms_book(Render *r, int set, int term, const double *picture) {

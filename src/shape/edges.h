@@ -8,8 +8,21 @@
 // of a B-spline curve; EDGE_TUBE_END: the circle at which such a curve ends; EDGE_TERMINATOR: the curve in
 // a triangle along which its shading normal is at right angles to the viewer; EDGE_MEETING: a MeetingRecord (meetings.h);
 // EDGE_MARK: a MarkRecord (marks.h); EDGE_CUT: a triangle whose scattering function
-// cuts light off at the plane of its shading normal.
-enum { EDGE_MESH, EDGE_RIM, EDGE_OUTLINE, EDGE_SIDE, EDGE_TUBE, EDGE_TUBE_END, EDGE_TERMINATOR, EDGE_MEETING, EDGE_MARK, EDGE_CUT };
+// cuts light off at the plane of its shading normal; EDGE_FACING: a triangle, or all of another surface, on which normals of maps
+// turn away from viewers.
+enum {
+    EDGE_MESH,
+    EDGE_RIM,
+    EDGE_OUTLINE,
+    EDGE_SIDE,
+    EDGE_TUBE,
+    EDGE_TUBE_END,
+    EDGE_TERMINATOR,
+    EDGE_MEETING,
+    EDGE_MARK,
+    EDGE_CUT,
+    EDGE_FACING
+};
 enum { EDGE_OPEN = -1 };
 enum { EDGE_NONE = -1, EDGE_ANY = -2 };
 // EDGE_SOFT: only the plane does behind which rays start

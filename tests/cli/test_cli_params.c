@@ -208,7 +208,7 @@ static void terms_that_do_not_exist_are_errors(void **state) {
     expect_said(f, 2, "grad %s --param red.reflectance.value --terms primary",
                  "--terms primary: the gradient of red.reflectance.value has no such term, expected some of interior");
     expect_said(f, 2, "check %s --param red.reflectance.value --terms indirect", "expected some of interior");
-    expect_said(f, 2, "grad %s --param red.reflectance.value --terms terminator", "expected some of interior,primary,");
+    expect_said(f, 2, "grad %s --param red.reflectance.value --terms terminator", "expected some of interior");
     expect(f, 0, "grad %s --param red.reflectance.value --terms interior,primary --spp 1");
     expect(f, 0, "grad %s --param ball.to_world:translate=1,0,0 --param red.reflectance.value --terms primary --spp 4");
     JsonNode *node = run_json(f, 0, "check %s --all --terms primary --spp 16 --json");

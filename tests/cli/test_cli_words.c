@@ -51,8 +51,15 @@ static void what_may_be_needed_is_told(void **state) {
                 "<texture type='bitmap'><string name='filename' value='height.npy'/></texture><bsdf type='diffuse'/></bsdf>"
                 "<shape type='rectangle'><ref id='b'/></shape><emitter type='constant'/></scene>");
     expect(f, 0, "render %s -o height.npy --spp 1");
-    expect_said(f, 0, "params bump.xml", "interior,primary,indirect  complete, unless paths meet the jump of 'terminator'");
-    JsonNode *node = run_json(f, 0, "params bump.xml --json");
+    expect_said(f, 0, "params bump.xml", "interior,primary,indirect,terminator  complete");
+    write_words("bumps.xml",
+                "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><film type='hdrfilm'><integer "
+                "name='width' value='4'/><integer name='height' value='4'/></film></sensor><bsdf type='normalmap' id='b'><rgb "
+                "name='normalmap' value='0.6,0.5,1'/><bsdf type='bumpmap'><texture type='bitmap'><string name='filename' "
+                "value='height.npy'/></texture><bsdf type='diffuse'/></bsdf></bsdf>"
+                "<shape type='rectangle'><ref id='b'/></shape><emitter type='constant'/></scene>");
+    expect_said(f, 0, "params bumps.xml", "interior,primary,indirect  complete, unless paths meet the jump of 'terminator'");
+    JsonNode *node = run_json(f, 0, "params bumps.xml --json");
     bool found = false;
     for (const JsonNode *p = json_get(node, "parameters")->first; p; p = p->next) {
         if (json_get(p, "terms_if_met")->first) {

@@ -1,5 +1,5 @@
-// Normals of maps that turn away from the viewer are refused where a path meets them and nowhere else, and those of vertices
-// where the terms that know them are left out; pictures along recorded paths.
+// Normals that turn away from the viewer are told where a path meets them and the terms that know them are left out, and nowhere
+// else; those of maps within maps are refused there; pictures along recorded paths.
 #include "render/replay.h"
 #include "reynolds/reynolds.h"
 #include "../folder.h"
@@ -147,6 +147,9 @@ static void test_turned_normals(void **state) {
     static const char unflipped_map[] =
         "<bsdf type='normalmap' id='map'><boolean name='flip_invalid_normals' value='false'/>"
         "<rgb name='normalmap' value='0.95,0.5,0.6'/><bsdf type='diffuse'/></bsdf>";
+    static const char map_in_map[] = "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='0.95,0.5,0.6'/>"
+                                     "<bsdf type='normalmap'><rgb name='normalmap' value='0.6,0.5,1'/><bsdf type='diffuse'/>"
+                                     "</bsdf></bsdf>";
     static const struct {
         const char *origin, *normal, *bsdf, *param;
         bool turned, reversed;
@@ -161,11 +164,12 @@ static void test_turned_normals(void **state) {
                  {"0,0,5", "0 0 1", flat_map, "map.normalmap.value", false, false},
                  {"-1.08,0,4.9", "0 0 1", steep_map, "map.normalmap.value", true, false},
                  {"-1.08,0,4.9", "0 0 1", unflipped_map, "map.normalmap.value", true, false},
+                 {"-1.08,0,4.9", "0 0 1", map_in_map, "map.normalmap.value", true, false},
                  {"5,0,1", "0 0 1", steep_map, "map.normalmap.value", false, false}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         rey_scene *scene;
         int missing, expected = cases[i].turned ? REY_TERM_TERMINATOR : 0;
-        bool refused = cases[i].turned && strcmp(cases[i].param, "plane.normals");
+        bool refused = cases[i].bsdf == map_in_map;
         stage_load(s, cases[i].origin, cases[i].normal, cases[i].bsdf, cases[i].reversed, &scene);
         rey_result result = derive(s, scene, cases[i].param, 0, &missing);
         if (result != (refused ? REY_ERROR_INCOMPLETE : REY_OK) || missing != (refused ? expected : 0)) {

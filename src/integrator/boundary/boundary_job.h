@@ -12,7 +12,8 @@
 // them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains, RIDING_TERMINATOR and
 // RIDING_HORIZON those that collisions see or light. RIM and RIM_VIEW are the ends of rough refraction in the light of a point or
 // of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h); CHAINED_RIM, those of segments that
-// keep their directions.
+// keep their directions. FACING and FACING_VIEW are where normals of maps turn away, as other vertices and as the sensor see that
+// (facing.h, facing_view.h), and CHAINED_FACING as vertices see it along chains.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -31,6 +32,9 @@ enum {
     BOUNDARY_RIM,
     BOUNDARY_RIM_VIEW,
     BOUNDARY_CHAINED_RIM,
+    BOUNDARY_FACING,
+    BOUNDARY_FACING_VIEW,
+    BOUNDARY_CHAINED_FACING,
     BOUNDARY_KINDS
 };
 
@@ -56,11 +60,13 @@ typedef struct BoundaryJob {
     const PathJob *still;     // the job with that selection
 } BoundaryJob;
 
-// Kinds of turning.h: curves on which n . w = 0, n the shading normal of what is seen along w, or the geometric normal of what
-// looks along it; those whose segments keep their directions, as pieces of chains or because they begin one; and those of them
-// that compare what is seen on both sides of edges.
+// Kinds of turning.h: curves on which n . w = 0, n the shading normal, or that of a map, of what is seen along w, or the geometric
+// normal of what looks along it; those whose segments keep their directions, as pieces of chains or because they begin one; and
+// those of them that compare what is seen on both sides of edges.
+static inline bool boundary_is_facing(int32_t kind) { return kind == BOUNDARY_FACING || kind == BOUNDARY_CHAINED_FACING; }
 static inline bool boundary_is_terminator(int32_t kind) {
-    return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_RIDING_TERMINATOR;
+    return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_RIDING_TERMINATOR ||
+           boundary_is_facing(kind);
 }
 static inline bool boundary_is_horizon(int32_t kind) {
     return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON || kind == BOUNDARY_RIDING_HORIZON;
@@ -70,7 +76,7 @@ static inline bool boundary_is_riding(int32_t kind) {
 }
 static inline bool boundary_is_chained(int32_t kind) {
     return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON ||
-           kind == BOUNDARY_CHAINED_RIM || boundary_is_riding(kind);
+           kind == BOUNDARY_CHAINED_RIM || kind == BOUNDARY_CHAINED_FACING || boundary_is_riding(kind);
 }
 static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
 

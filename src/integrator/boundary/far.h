@@ -156,6 +156,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
     }
     switch (in->b->kind) {
     case BOUNDARY_TERMINATOR:
+    case BOUNDARY_FACING:
         reflected = in->upstream ? spec_add(reflected, far_chain(in, other, bounce)) : reflected;
         return spec_sub(reflected, far_reflected(in, other, bounce));
     case BOUNDARY_LINES:

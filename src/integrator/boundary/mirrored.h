@@ -109,6 +109,12 @@ static Mask lines_share(const SceneView *scene, const Hit *a, const Hit *b, Mask
     Int shape = i_select(apart, a->shape, i_set(0)), flags = SHAPE_FIELD(scene, shape, flags);
     apart = apart & mi_eq(SHAPE_FIELD(scene, shape, kind), i_set(SHAPE_MESH));
     apart = apart & mi_lt(i_set(0), flags & SHAPE_HAS_UVS); // else each has its own
+    for (Mask left = apart; m_any(left);) { // the tangents that maps go by may turn
+        int32_t id;
+        Hit h;
+        Mask mine = take_group(scene, a, &left, &id, &h);
+        apart = scene->bsdfs[scene->groups[id].bsdf].turns ? apart & ~mine : apart;
+    }
     return m & (one | (m_any(apart) ? triangles_join(scene, a, b, apart) : apart));
 }
 

@@ -48,7 +48,7 @@ static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, co
     SurfaceSweep s;
     RimVertex x = in->x;
     x.hit = *hit;
-    rim_surface(t, group, hit, m, &s);
+    looked_surface(t, group, hit, m, &s);
     Vec3 wl = frame_to_local(&s.si.sh, x.light_d);
     BsdfSample b = bsdf_sample(&s.call, wl, rng_1d(key, DIMENSION_TURNING_SIDE), rng_2d(key, DIMENSION_RIM));
     m = m & lobe_is(b.lobe, LOBE_RIM);

@@ -6,8 +6,8 @@
 // attached points, or, along chains and from a film position, of where the ray meets the surface (turning.h).
 #pragma once
 
+#include "integrator/boundary/looked.h"
 #include "integrator/boundary/segments.h"
-#include "integrator/path_move.h"
 
 // A vertex that a ray meets, the light that shines on it, and the lobe.
 typedef struct RimVertex {
@@ -21,17 +21,6 @@ typedef struct RimVertex {
 KFN Mask rim_light(const SceneView *scene, const SampleKey *key, Int *light, Float *probability) {
     *light = emitter_choose(scene, rng_1d(key, DIMENSION_SEGMENT_LIGHT), probability);
     return light_is_delta(scene, *light);
-}
-
-// The surfaces of a group. s must stay where it is.
-static void rim_surface(const Tracer *t, int32_t group, const Hit *hit, Mask m, SurfaceSweep *s) {
-    s->group = t->scene->groups + group;
-    s->hit = *hit;
-    s->m = m;
-    s->si = shape_interaction(t->scene, s->group->shape_kind, s->group->shape_flags, hit);
-    s->call = bsdf_call(t->scene, s->group->bsdf, texcoord(s->si.uv, NULL), t->floor);
-    s->call.rim = RIM_ALWAYS;
-    surface_parameterise(t, s);
 }
 
 typedef struct Rim {
@@ -76,34 +65,17 @@ static NOINLINE Carried rim_vertex_adj(const Tracer *t, const RimVertex *x, Floa
                                        Mask m) {
     Carried all = {v3_zero(), v3_zero()};
     for (Mask left = m; m_any(left);) {
-        int32_t id;
-        Hit h;
-        SurfaceSweep s;
-        VertexAdj d;
-        Mask mine = take_group(t->scene, &x->hit, &left, &id, &h);
-        rim_surface(t, id, &h, mine, &s);
-        s.d = x->d;
-        s.slides = s.chained = slides ? mine : m_set(false);
-        s.wi = frame_to_local(&s.si.sh, v3_neg(x->d));
-        vertex_adj_clear(&d, true);
-        s.call.dsurface = s.call.surface ? &d.surface : NULL;
-        Vec3 light = frame_to_local(&s.si.sh, x->light_d), dlight = v3_zero();
-        sink->at = slides ? &d.at : NULL;
-        sink->point = &d.point;
-        bsdf_adj(&s.call, s.wi, light, x->lobe, spec_zero_unless(mine, spec_set(worth)), sink, mine, &d.wi, &dlight,
-                 vertex_uv_adj(&s, &d, sink));
-        sink->at = NULL;
-        sink->point = NULL;
+        Looked at;
+        looked_take(t, &x->hit, x->d, slides, &left, &at, sink);
+        const SurfaceSweep *s = &at.s;
+        Vec3 light = frame_to_local(&s->si.sh, x->light_d), dlight = v3_zero();
+        bsdf_adj(&s->call, s->wi, light, x->lobe, spec_zero_unless(s->m, spec_set(worth)), sink, s->m, &at.d.wi, &dlight,
+                 vertex_uv_adj(s, &at.d, sink));
+        looked_over(sink);
         LightMove move = light_move_zero();
-        frame_to_local_adj(&s.si.sh, x->light_d, dlight, &d.frame, &move.d);
-        lights_move_adj(t->scene, x->light, mine, h.p, x->light_d, x->light_distance, &move, sink);
-        Vec3 dp = v3_select(mine, move.ref, v3_zero()), turn = frame_to_world(&s.si.sh, d.wi);
-        Vec3 apart = v3_select(mine, v3_scale(v3_madd(turn, -v3_dot(turn, x->d), x->d), behind), v3_zero());
-        Carried own = {slides ? v3_zero() : apart, v3_zero()};
-        dp = slides ? dp : v3_sub(dp, apart);
-        vertex_place_adj(t, &s, &d, dp, s.slides, t->job->live[id], &own, sink);
-        all.drag = v3_select(mine, own.drag, all.drag);
-        all.turn = v3_select(mine, own.turn, all.turn);
+        frame_to_local_adj(&s->si.sh, x->light_d, dlight, &at.d.frame, &move.d);
+        lights_move_adj(t->scene, x->light, s->m, s->hit.p, x->light_d, x->light_distance, &move, sink);
+        looked_finish(t, &at, v3_select(s->m, move.ref, v3_zero()), behind, sink, &all);
     }
     return all;
 }

@@ -30,7 +30,7 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 // near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
 // what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
 // (leg.h), and the edge, what the flight to it weighs, and whether it was looked for along a ray of the sensor's. Of
-// rims: the lobe.
+// rims: the lobe, or the map's number.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
         F(nudge_u) F(nudge_v)                                                                                                  \

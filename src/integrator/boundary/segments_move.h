@@ -97,6 +97,9 @@ static Carried turnings_ahead_adj(const Indirect *in, int32_t k, Float worth, Si
 // only that.
 static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool still, Sink *sink, Mask m) {
     const Segments *q = &in->q;
+    if (boundary_is_facing(in->b->kind)) {
+        return facing_ahead_adj(in->t, q, k, boundary_is_chained(in->b->kind), worth, sink, m);
+    }
     if (boundary_is_terminator(in->b->kind) || boundary_is_horizon(in->b->kind)) {
         return turnings_ahead_adj(in, k, worth, sink, m);
     }
@@ -269,15 +272,16 @@ static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     }
 }
 
-// The same of rims.
-static void rims_move_adj(Indirect *in, int32_t k, Sink *sink) {
+// The same of rims, and of normals of maps.
+static void looked_move_adj(Indirect *in, int32_t k, Sink *sink) {
     const Segments *q = &in->q;
     bool forward = in->b->job.mode == MODE_FORWARD;
     Float seen = forward ? f_set(1) : f_load(q->seen + k), unseen = forward ? f_set(0) : f_load(q->unseen + k);
     Float worth = seen + unseen;
     Mask m = m_first_n(q->count - k) & m_finite(worth) & m_ne(worth, f_set(0));
     Hit near = LOAD_HIT(q, k, near);
-    Carried c = rims_ahead_adj(in->t, q, k, false, worth, sink, m);
+    Carried c = in->b->kind == BOUNDARY_FACING ? facing_ahead_adj(in->t, q, k, false, worth, sink, m)
+                                               : rims_ahead_adj(in->t, q, k, false, worth, sink, m);
     Float some = f_select(m, worth, f_set(1));
     segments_near_adj(in, k, &near, c.drag, seen / some, unseen / some, sink, m);
 }
@@ -293,8 +297,8 @@ static void moves_adj(Indirect *in, int32_t k, Sink *sink) {
         lines_move_adj(&in->q, in->b->job.mode == MODE_FORWARD, k, sink);
     } else if (in->b->kind == BOUNDARY_CUT) {
         cuts_move_adj(in, k, sink);
-    } else if (in->b->kind == BOUNDARY_RIM) {
-        rims_move_adj(in, k, sink);
+    } else if (in->b->kind == BOUNDARY_RIM || in->b->kind == BOUNDARY_FACING) {
+        looked_move_adj(in, k, sink);
     } else {
         turnings_move_adj(in, k, sink);
     }

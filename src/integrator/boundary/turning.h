@@ -17,20 +17,18 @@
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
 #pragma once
 
-#include "integrator/boundary/segments.h"
+#include "integrator/boundary/facing.h"
 
 // What a segment says of its light in `lit`, beside "no" and "from a light": all that comes along it, or the difference
 // between two directions beside it (NORMAL_TURN), the other one in a second slot.
 enum { SEGMENT_ALL = 2, SEGMENT_JUMP = 3 };
-
-// How often directions leave on the side of the surface that its geometric normal is on.
-#define TURNING_OUTSIDE 0.75f
 
 // A batch of segments that leave x, in the edge record's place, along d.
 typedef struct Turning {
     Hit hit;
     Vec3 p, n, ng, d;
     Float weight, factor; // factor: of the light that comes, 1 or -1
+    Int map;              // its number, where the normal is one's (facing.h)
     Mask m;
 } Turning;
 
@@ -91,6 +89,14 @@ static Float turning_directions(Vec2 way, Vec3 other, bool horizon, Turning *out
 
 static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Turning *out) {
     SampleKey key = slot_key(t, slot);
+    out->map = i_set(-1);
+    if (boundary_is_facing(b->kind)) {
+        FacingPoint at;
+        facing_sample(t, b, &key, &at);
+        m = m & at.m & m_finite(at.weight) & m_gt(at.weight, f_set(0));
+        *out = (Turning){at.hit, at.hit.p, at.n, at.ng, at.d, at.weight, f_set(1), at.number, m};
+        return;
+    }
     Vec2 way = rng_2d(&key, DIMENSION_SEGMENT_END);
     Float probability;
     Vec3 cross, shading = turning_point(t->scene, b, &key, out, &cross, &probability);
@@ -163,6 +169,7 @@ static void turning_trace(Tracer *t, const Turning *s, int32_t kind, Int number,
     spec_compress(q->light, at, spec_set(f_set(1)), m);
     i_compress(q->lit + at, i_set(horizon ? SEGMENT_ALL : SEGMENT_JUMP), m);
     i_compress(q->source + at, i_set(-1), m);
+    i_compress(q->rim + at, s->map, m);
     i_compress(q->number + at, number, m);
     end.shape = i_select(met, end.shape, i_set(-1));
     KEEP_HIT(q, at, edge, &s->hit, s->p, m);
