@@ -2,8 +2,8 @@
 // them jumps (bsdf/turned.h). F' is that of n, with its texture and the surface's frame, and of the direction w (looked.h). Other
 // vertices see that as they see shading normals turn away (turning.h):
 //   dI += integral dA_x dphi |n_g . w| (n' . w + n . (a' - x') / r) (L+ - L-) W
-// over the points x of surfaces that have maps and the directions w at right angles to n, and along chains of smooth mirrors and glass
-// as those do; the sensor: facing_view.h.
+// over the points x of surfaces that have maps and the directions w at right angles to n, and along chains of smooth mirrors and
+// glass as those do; the sensor: facing_view.h.
 // NOT differentiated: maps within other maps, where those mirror normals.
 #pragma once
 
