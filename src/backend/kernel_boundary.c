@@ -112,7 +112,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     Tracer t = {.job = &job, .scene = job.scene, .deciding = job.scene, .sensor = job.scene->sensors + job.sensor};
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
     bool turns = boundary_is_terminator(b->kind) || boundary_is_horizon(b->kind);
-    bool segments = turns || b->kind == BOUNDARY_INDIRECT || boundary_is_paired(b->kind);
+    bool segments = turns || b->kind == BOUNDARY_INDIRECT || b->kind == BOUNDARY_MEETING || boundary_is_paired(b->kind);
     segments |= boundary_is_rim(b->kind) && (b->job.any_motion || b->job.any_places);
     Indirect in = {.t = &t, .b = b, .upstream = (b->chains || b->job.rides) && segments};
     bytes += segments_layout(&in.q, (char *)job.workspace + bytes);

@@ -96,20 +96,18 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
     return true;
 }
 
-// Chains, and collisions that ride along with surfaces, may see all curves along which surfaces, and borders of light, pass
-// through each other, also those that stand still.
-static rey_result check_meetings(rey_scene *scene, int term) {
+// Chains, and collisions that ride along with surfaces, may see all curves along which borders of light pass through surfaces, also
+// those that stand still.
+static rey_result check_borders(rey_scene *scene, int term) {
     Array meetings = {0};
     rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
-    if (result == REY_OK && meetings.count > 0) {
-        const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, 0);
-        char text[2 * OBJECT_NAME + 128], names[2][OBJECT_NAME] = {"", "the border of a light"};
-        for (int k = 0; k < 2 && m->shape[k] >= 0; k++) {
-            rey_name_shape(scene, m->shape[k], names[k]);
+    for (size_t i = 0; i < meetings.count && result == REY_OK; i++) {
+        const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, i);
+        if (m->shape[1] < 0) {
+            char name[OBJECT_NAME];
+            rey_name_shape(scene, m->shape[0], name);
+            result = refuse(scene, term, "the curves along which the border of a light passes over surfaces", name);
         }
-        snprintf(text, sizeof text, "the curves along which surfaces pass through each other, as '%s' and '%s' do", names[0],
-                 names[1]);
-        result = refuse(scene, term, text, NULL);
     }
     rey_array_free(scene->ctx, &meetings);
     return result;
@@ -125,7 +123,7 @@ static rey_result check_rides(rey_scene *scene, int term) {
             return refuse(scene, term, "where, in participating media, normals of maps turn away from what sees them", name);
         }
     }
-    return check_meetings(scene, term);
+    return check_borders(scene, term);
 }
 
 // Whether lines of textures that a selection moves over their surfaces are known.
@@ -236,7 +234,7 @@ static rey_result boundary_check(const Render *r, int term) {
                           name);
         }
     }
-    return r->job.rides ? check_rides(scene, term) : term == REY_TERM_SPECULAR ? check_meetings(scene, term) : REY_OK;
+    return r->job.rides ? check_rides(scene, term) : term == REY_TERM_SPECULAR ? check_borders(scene, term) : REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {
@@ -316,6 +314,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     // In media only edges are known; what else there is does not depend on lights, and is refused where surfaces move.
     bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || !r->scene->view.has_media;
     known |= rides && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_HORIZON);
+    known |= rides && kind == BOUNDARY_MEETING;
     int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);

@@ -145,18 +145,26 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     if (e->kind == EDGE_TERMINATOR && !boundary_is_horizon(w->kind) && !ends_at_normals(view, view->shapes + e->shape)) {
         return 0;
     }
+    bool crosses = e->kind == EDGE_MEETING, still = crosses && !meeting_moves(r, e);
     if (w->kind == BOUNDARY_PRIMARY) {
-        return rey_edge_on_film(r, &w->projection, w->eye, e);
+        return still && !r->job.any_camera ? 0 : rey_edge_on_film(r, &w->projection, w->eye, e);
     }
-    if (e->kind == EDGE_MEETING) {
-        return meeting_moves(r, e) ? rey_edge_in_world(r, e) : 0;
+    if (still && !boundary_is_paired(w->kind)) {
+        return 0;
     }
+    factor = still ? w->still : factor;
     return factor * rey_edge_in_world(r, e);
+}
+
+// Whether what lies on a shape matters: along chains and from collisions, what moves shows it also where it stands still.
+static bool seen_moving(const void *render, int32_t id, int32_t instance) {
+    const Render *r = render;
+    return (r->terms & REY_TERM_SPECULAR) || r->job.rides || moves_on_film(r, id, instance);
 }
 
 static rey_result find_meetings(Render *r) {
     r->meetings_found = true;
-    return rey_meetings_with_borders(r->scene, moves_on_film, r, &r->meetings);
+    return rey_meetings_with_borders(r->scene, seen_moving, r, &r->meetings);
 }
 
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
@@ -169,12 +177,6 @@ static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan,
         result = keep_edge(r, &e, weight, &plan->job.round, kept, weights);
     }
     return result;
-}
-
-// Whether lines of textures on a shape matter: along chains and from collisions, what moves shows them also where they stand still.
-static bool seen_moving(const void *render, int32_t id, int32_t instance) {
-    const Render *r = render;
-    return (r->terms & REY_TERM_SPECULAR) || r->job.rides || moves_on_film(r, id, instance);
 }
 
 static rey_result find_edges(Render *r) {
@@ -201,7 +203,7 @@ rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
         double weight = edge_weight(r, &w, &e);
         result = keep_edge(r, &e, weight, &plan->job.round, &kept, &weights);
     }
-    if (result == REY_OK && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_MEETING)) {
+    if (result == REY_OK && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_MEETING || boundary_is_paired(kind))) {
         result = keep_meetings(r, &w, plan, &kept, &weights);
     }
     if (result == REY_OK) {

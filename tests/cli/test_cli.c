@@ -225,7 +225,7 @@ static void terms_have_budgets(void **state) {
 
 static void incomplete_gradients_are_refused(void **state) {
     Fixture *f = *state;
-    expect(f, 1, "grad %s -D ball=glass --param camera.to_world:translate=1,0,0 --spp 16");
+    expect(f, 1, "grad %s -D ball=veil --param camera.to_world:translate=1,0,0 --spp 16");
     assert_non_null(strstr(f->words, "specular"));
     JsonNode *node = run_json(f, 0, "grad %s --param camera.to_world:translate=1,0,0 --spp 16 --terms interior --json");
     assert_true(json_value(node, "complete", 1) == 0);

@@ -122,17 +122,17 @@ static void mistakes_are_told_at_the_start(void **state) {
 static void refusals_are_those_of_grad(void **state) {
     Fixture *f = *state;
     static char words[OUTPUT_BYTES];
-    expect(f, 0, "render %s -D ball=glass -o target.exr --spp 4");
-    expect(f, 1, "grad %s -D ball=glass --param floor.to_world:translate=1,0,0");
+    expect(f, 0, "render %s -D ball=veil -o target.exr --spp 4");
+    expect(f, 1, "grad %s -D ball=veil --param floor.to_world:translate=1,0,0");
     snprintf(words, sizeof words, "%s", f->words + strlen("reynolds: "));
     words[strcspn(words, "\n")] = 0;
-    assert_non_null(strstr(words, "the term 'specular' does not know"));
-    write_words("glass.yaml", "scene: " TEST_SCENE "\ndefines: {ball: glass}\nviews: [{target: target.exr}]\niterations: 1\n"
+    assert_non_null(strstr(words, "needs the term 'specular', which does not cover this yet"));
+    write_words("veil.yaml", "scene: " TEST_SCENE "\ndefines: {ball: veil}\nviews: [{target: target.exr}]\niterations: 1\n"
                               "spp: 2\nreport_spp: 0\nparameters:\n  - red.reflectance.value\n  - floor.to_world\n");
-    expect_words(f, 1, "fit glass.yaml -o glass", words);
-    assert_non_null(strstr(f->words, "glass.yaml:9: parameter 'floor.to_world': "));
+    expect_words(f, 1, "fit veil.yaml -o veil", words);
+    assert_non_null(strstr(f->words, "veil.yaml:9: parameter 'floor.to_world': "));
     assert_non_null(strstr(f->words, "(in a job, 'terms: interior')"));
-    expect_words(f, 0, "fit glass.yaml -o glass --set terms=interior",
+    expect_words(f, 0, "fit veil.yaml -o veil --set terms=interior",
                  "incomplete on request: 'terms: interior' leaves out primary,indirect,specular, which the gradient of "
                  "floor.to_world needs\n");
 }
@@ -143,8 +143,8 @@ static void restricted_gradients_say_what_they_lack(void **state) {
     expect_words(f, 0, "grad %s --param floor.to_world:translate=1,0,0 --spp 16 --terms interior,primary",
                  "incomplete on request: --terms interior,primary leaves out indirect\n");
     assert_null(strstr(f->words, "without --terms"));
-    expect_words(f, 0, "grad %s -D ball=glass --param floor.to_world:translate=1,0,0 --spp 16 --terms interior",
-                 "without --terms it is refused: the term 'specular' does not know the curves");
+    expect_words(f, 0, "grad %s -D ball=veil --param floor.to_world:translate=1,0,0 --spp 16 --terms interior",
+                 "without --terms it is refused: the gradient of floor.to_world needs the term 'specular'");
     JsonNode *node = run_json(f, 0, "grad %s --param floor.to_world:translate=1,0,0 --spp 16 --terms interior,indirect --json");
     assert_string_equal(json_get(node, "left_out")->first->text, "primary");
     assert_null(json_get(node, "left_out")->first->next);

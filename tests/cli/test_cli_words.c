@@ -23,7 +23,7 @@ static JsonNode *fit_json(Fixture *f, int status, const char *sets) {
 // `params` and `grad` agree about what is refused, in the same words.
 static void refusals_are_the_same(void **state) {
     Fixture *f = *state;
-    static const char *const scenes[] = {TEST_SCENE, TEST_SCENE " -D ball=glass"};
+    static const char *const scenes[] = {TEST_SCENE, TEST_SCENE " -D ball=veil"};
     int refused = 0;
     for (int s = 0; s < 2; s++) {
         char arguments[1024], text[512];
@@ -39,7 +39,7 @@ static void refusals_are_the_same(void **state) {
         json_free(node);
     }
     assert_true(refused > 0);
-    expect_said(f, 0, "params %s -D ball=glass", "  refused [1]\n");
+    expect_said(f, 0, "params %s -D ball=veil", "  refused [1]\n");
 }
 
 // A jump that paths may not meet is told apart from the terms that are needed, in words and in JSON.

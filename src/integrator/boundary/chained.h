@@ -14,12 +14,15 @@
 // no segments to lights pass there.
 enum { SEGMENT_CREASE = 4 };
 
-// Distance of the two rays from the edge.
-KFN Float chained_step(Vec3 p) { return (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 1e-5f; }
+// Distance of the two rays from the edge. Where surfaces pass through each other the rays to lights start a step above them, and
+// must start on their own side of the other one.
+KFN Float chained_step(Vec3 p, Mask meeting) {
+    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 1e-5f;
+    return f_select(meeting, 4.0f * interaction_step(p), step);
+}
 
 // The rays past both sides of an edge, from half-way to the near point on: n points to the second one.
-KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, int side) {
-    Float step = chained_step(p);
+KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, Float step, int side) {
     Vec3 o = v3_madd(v3_madd(p, behind * -0.5f, d), side ? step : -step, n);
     return (Ray){o, d, f_set(INFINITY)};
 }
@@ -35,17 +38,23 @@ KFN Vec3 chained_offset(const Segment *s) {
 static Mask chained_between(Tracer *t, const Segment *s, Vec3 near, Mask m, Float *behind) {
     const EdgePoint *e = &s->edge;
     *behind = f_select(m, v3_length(v3_sub(near, e->p)), f_set(1));
-    Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, 0), chained_ray(e->p, s->d, s->n, *behind, 1)};
+    Float step = chained_step(e->p, e->meeting);
+    Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, step, 0), chained_ray(e->p, s->d, s->n, *behind, step, 1)};
     return edge_between(t, e, s->silhouette, s->n, rays, m);
 }
 
-// Stores the segments of m, in any direction.
+// Stores the segments of m, in any direction. Where surfaces pass through each other, the edge moves with both (meeting.h): `far`
+// is on the other one, and beside n = x a + y b there is y b.
 static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind, Int number, Segments *q, Mask m) {
     const EdgePoint *e = &s->edge;
     int32_t at = q->count;
+    Float c = v3_dot(e->across[0], e->across[1]), rcp = f_safe_rcp(1.0f - c * c);
+    Float y = (v3_dot(s->n, e->across[1]) - c * v3_dot(s->n, e->across[0])) * rcp;
+    Vec3 other = v3_select(e->meeting, v3_scale(e->across[1], -s->weight * y), v3_zero());
     v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
     v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
     v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
+    v3_compress(q->mx + at, q->my + at, q->mz + at, other, m);
     f_compress(q->behind + at, behind, m);
     spec_compress(q->light, at, s->light, m);
     i_compress(q->lit + at, i_select(s->silhouette, i_set(0), i_set(SEGMENT_CREASE)), m);
@@ -54,9 +63,10 @@ static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind
     f_compress(q->along + at, f_set(0), m);
     Hit none = *near;
     none.shape = i_set(-1);
+    Hit far = hit_select(e->meeting, &e->met, &none);
     KEEP_HIT(q, at, near, near, near->p, m);
     KEEP_HIT(q, at, edge, &e->hit, e->p, m);
-    KEEP_HIT(q, at, far, &none, e->p, m);
+    KEEP_HIT(q, at, far, &far, e->p, m);
     q->count += m_count(m);
 }
 
@@ -104,8 +114,10 @@ static void chained_start(Tracer *t, const Segments *q, int32_t half) {
         Vec3 p = LOAD_V3(*q, edge_x, edge_y, edge_z, at), d = LOAD_V3(*q, dx, dy, dz, at);
         Vec3 n = v3_normalize(v3_neg(LOAD_V3(*q, nx, ny, nz, at)));
         Mask m = m_first_n(q->count - k) & ~mi_eq(i_gather(q->lit, at), i_set(1));
+        Vec3 met = LOAD_V3(*q, mx, my, mz, at);
+        Float step = chained_step(p, m_gt(v3_dot(met, met), f_set(0)));
         for (int side = 0; side < 2; side++) { // first the side that n points to
-            Ray ray = chained_ray(p, d, n, real_gather(q->behind, at), 1 - side);
+            Ray ray = chained_ray(p, d, n, real_gather(q->behind, at), step, 1 - side);
             ray.tmax = f_zero_unless(m, ray.tmax);
             path_begin(t, side * half + k, i_iota() + (side * half + k), &ray, f_set(1));
             if (t->scene->has_media) { // what lies before the edge is on both sides the same

@@ -14,6 +14,22 @@ KFN Mask meeting_shows(const SceneView *scene, Int shape, Vec3 n, Vec3 d) {
     return ~mi_eq(SHAPE_FIELD(scene, i_max(shape, i_set(0)), kind), i_set(SHAPE_BSPLINE)) | m_lt(v3_dot(n, d), f_set(0));
 }
 
+// What looks along the rays. In media, where their flights end; what collisions see is for riding.h.
+static Hit meeting_near(Tracer *t, const Ray *ray, Int number, Segments *q, Mask *m) {
+    if (!t->scene->has_media) {
+        t->job->rays += m_count(*m);
+        Hit near = trace_closest(t->scene, ray, *m, false);
+        *m = *m & mi_lt(i_set(-1), near.shape);
+        return near;
+    }
+    Int around = medium_around(t, ray->o, ray->d, *m);
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, *ray, ray->o, around, spec_set(f_set(1)), &key, *m);
+    *m = leg.m & mi_lt(leg.air, i_set(0));
+    segment_keep_leg(around, &leg, q, *m);
+    return leg.near;
+}
+
 // Samples a batch of segments that end on one of the two surfaces of a curve, and keeps those that begin somewhere.
 static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number, Segments *q) {
     SampleKey key = slot_key(t, number);
@@ -34,9 +50,7 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
     Ray ray = {v3_madd(e.p, -step, d), v3_neg(d), f_set(INFINITY)};
     m = m & m_finite(weight) & m_finite(x + y) & m_gt(weight, f_set(0)) & m_gt(e.probability, f_set(0));
     m = m & meeting_shows(t->scene, e.hit.shape, e.across[0], d) & meeting_shows(t->scene, e.met.shape, e.across[1], d);
-    t->job->rays += m_count(m);
-    Hit near = trace_closest(t->scene, &ray, m, false);
-    m = m & mi_lt(i_set(-1), near.shape);
+    Hit near = meeting_near(t, &ray, number, q, &m);
     int32_t at = q->count;
     v3_compress(q->ox + at, q->oy + at, q->oz + at, ray.o, m);
     v3_compress(q->dx + at, q->dy + at, q->dz + at, d, m);
@@ -86,6 +100,9 @@ static void meetings_start(Tracer *t, const Segments *q) {
         Ray ray = {v3_sub(hit.p, d), d, f_zero_unless(m_first_n(q->count - k), f_set(INFINITY))};
         path_begin(t, k, i_iota() + k, &ray, f_set(1));
         hit_store(t, k, &hit);
+        if (t->scene->has_media) {
+            i_store(t->ws.paths[0].medium + k, i_gather(q->medium, at));
+        }
     }
     t->active = q->count;
 }

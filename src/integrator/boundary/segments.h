@@ -238,6 +238,7 @@ static void segment_keep(const Segment *s, Vec3 o, const Hit *near, bool lit, In
     v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);
     // What the edge gains on the side of n, the light loses.
     v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
+    v3_compress(q->mx + at, q->my + at, q->mz + at, v3_zero(), m);
     f_compress(q->behind + at, behind, m);
     f_compress(q->along + at, along, m);
     f_compress(q->seen + at, f_set(0), m);

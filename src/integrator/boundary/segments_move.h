@@ -29,10 +29,11 @@ static void segments_ahead_adj(const Indirect *in, int32_t k, Vec3 n, Float both
     Hit near = LOAD_HIT(q, k, near), edge = LOAD_HIT(q, k, edge), far = LOAD_HIT(q, k, far);
     Float along = f_load(q->along + k);
     Mask attached = m & mi_lt(i_set(-1), far.shape);
+    Vec3 met = v3_select(m, v3_scale(record_v3(q->mx, q->my, q->mz, k), both), v3_zero()); // of curves of two surfaces
     // n . (edge - lerp(near, far, along))
-    points_move_adj(in->t, &edge, v3_scale(n, both), v3_zero(), sink, m);
+    points_move_adj(in->t, &edge, v3_sub(v3_scale(n, both), met), v3_zero(), sink, m);
     if (m_any(attached)) {
-        points_move_adj(in->t, &far, v3_scale(n, -both * along), v3_zero(), sink, attached);
+        points_move_adj(in->t, &far, v3_madd(met, -both * along, n), v3_zero(), sink, attached);
     }
     Int light = i_load(q->source + k);
     Mask delta = m & mi_lt(i_set(-1), light);
@@ -93,6 +94,19 @@ static Carried turnings_ahead_adj(const Indirect *in, int32_t k, Float worth, Si
     return (Carried){apart, v3_zero()};
 }
 
+// The motion of the curves along which surfaces meet, of the segments k..., by the two surfaces, worth `worth`.
+static void meetings_ahead_adj(const Indirect *in, int32_t k, Float worth, Sink *sink, Mask m) {
+    const Segments *q = &in->q;
+    Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
+    Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
+    points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
+    Mask attached = m & mi_lt(i_set(-1), other.shape);
+    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, attached);
+    if (sink->any_places) {
+        borders_move_adj(in->t->scene, other.prim, other.p, w, sink, m & ~attached);
+    }
+}
+
 // The motion of the segments k... but for their near points, worth `worth`: returns what it asks of the rays from there. still:
 // only that.
 static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool still, Sink *sink, Mask m) {
@@ -105,6 +119,12 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
     }
     if (boundary_is_rim(in->b->kind)) {
         return rims_ahead_adj(in->t, q, k, boundary_is_chained(in->b->kind), worth, sink, m);
+    }
+    if (in->b->kind == BOUNDARY_MEETING) { // where near points are has no part in it
+        if (!still) {
+            meetings_ahead_adj(in, k, worth, sink, m);
+        }
+        return (Carried){v3_zero(), v3_zero()};
     }
     Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
     if (!still) {
@@ -250,21 +270,13 @@ static void cuts_move_adj(Indirect *in, int32_t k, Sink *sink) {
     }
 }
 
-// The same of the two surfaces of meetings. Where near points are has no part in it.
+// The same of the two surfaces of meetings.
 static void meetings_move_adj(Indirect *in, int32_t k, Sink *sink) {
     const Segments *q = &in->q;
     bool forward = in->b->job.mode == MODE_FORWARD;
     Mask m = m_first_n(q->count - k);
     Float worth = forward ? f_set(1) : f_load(q->seen + k) + f_load(q->unseen + k);
-    m = m & m_finite(worth);
-    Hit own = LOAD_HIT(q, k, edge), other = LOAD_HIT(q, k, far);
-    Vec3 v = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth), w = v3_scale(record_v3(q->mx, q->my, q->mz, k), worth);
-    points_move_adj(in->t, &own, v3_select(m, v, v3_zero()), v3_zero(), sink, m);
-    Mask attached = m & mi_lt(i_set(-1), other.shape);
-    points_move_adj(in->t, &other, v3_select(m, w, v3_zero()), v3_zero(), sink, attached);
-    if (sink->any_places) {
-        borders_move_adj(in->t->scene, other.prim, other.p, w, sink, m & ~attached);
-    }
+    meetings_ahead_adj(in, k, worth, sink, m & m_finite(worth));
     if (forward) {
         Float all = sink_taken(sink);
         f_store(q->seen + k, all);
