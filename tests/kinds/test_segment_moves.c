@@ -135,8 +135,9 @@ static double worth_of(const Sample *s) {
     case BOUNDARY_CUT:
         return cuts_of(s);
     case BOUNDARY_CHAINED:
-    case BOUNDARY_INDIRECT: // n . (edge - lerp(near, far, along))
-        return both * (v3_dot(s->n, edge.p) - s->along * v3_dot(s->n, far.p)) - (1 - s->along) * v3_dot(s->n, near);
+    case BOUNDARY_INDIRECT: // n . (edge - lerp(near, far, along)), and a part of the edge's n that counts for the far surface
+        return both * (v3_dot(s->n, edge.p) - s->along * v3_dot(s->n, far.p)) - (1 - s->along) * v3_dot(s->n, near) +
+               both * v3_dot(s->other, v3_sub(far.p, edge.p));
     case BOUNDARY_MEETING:
         return both * (v3_dot(s->n, edge.p) + v3_dot(s->other, far.p));
     case BOUNDARY_TERMINATOR: // n . (near - x) / r, and the shading normal
