@@ -238,7 +238,7 @@ static const Motion motions[] = {
     {"ride_fog.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.3f}, 0.05, 1},
     {"ride_fog.xml", "ball.to_world", GROW, {-0.7f, 0.3f, 0.4f}, 0.03, 1},
     {"ride_meeting.xml", "card.to_world", SHIFT, {0, 0, 1}, 0.05, 2},
-    {"ride_meeting.xml", "card.to_world", TURN, {1, 0.3f, 0.2f}, 3, 10},
+    {"ride_meeting.xml", "card.to_world", TURN, {1, 0.3f, 0.2f}, 3, 2},
     {"ride_meeting.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.06, 2},
     {"ride_hull.xml", "ball.to_world", SHIFT, {1, 0.3f, -0.4f}, 0.03, 2},
     {"ride_hull.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.05, 1},
