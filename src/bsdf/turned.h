@@ -28,6 +28,13 @@ KFN void turned_watch(Vec3 n, Vec3 wi, Sink *sink, Mask m) {
     }
 }
 
+// Notes normals that point into the surface, where they are mirrored or turned round: those jump once more.
+KFN void turned_watch_inward(Vec3 n, Sink *sink, Mask m) {
+    if (sink->watch_inward) {
+        sink->faces |= m_any(m & m_lt(n.z, f_set(0))) ? FACES_INWARD : 0;
+    }
+}
+
 KFN Vec3 turned_valid_adj(Vec3 n, Vec3 wi, int32_t flip_invalid, Vec3 dvalid) {
     Mask flip = m_set(flip_invalid) & m_le(wi.z * v3_dot(wi, n), f_set(0));
     return v3(f_select(flip, -dvalid.x, dvalid.x), f_select(flip, -dvalid.y, dvalid.y), dvalid.z);

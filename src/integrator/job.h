@@ -59,6 +59,7 @@ typedef struct PathJob {
     bool live_borders;            // so does where some medium begins and ends
     bool live_lights;             // some emitter depends on the selection
     bool watch_turned;            // the selection turns shading normals: note which way they face
+    bool watch_inward;            // note normals of maps that point into their surfaces
     bool watch_smooth;            // also those of smooth meshes, whose jumps no boundary term takes into account
     // Asked before each chunk of paths: false ends the job early. May be null.
     bool (*go_on)(void *user);

@@ -145,5 +145,6 @@ static Sink sink_of(const PathJob *job) {
                   .any_motion = job->any_motion,
                   .any_camera = job->any_camera,
                   .watch_turned = job->watch_turned,
+                  .watch_inward = job->watch_inward,
                   .derivative = f_set(0)};
 }

@@ -140,11 +140,14 @@ rey_result rey_particles_run(Render *r, double *picture) {
 }
 
 // A parameter of a selection that moves the places that particles are connected through, or what jumps there; null: none does.
-static const Param *moving(const rey_scene *scene, rey_selection selection) {
+// jumps: where shading normals turn away counts, too.
+static const Param *moving(const rey_scene *scene, rey_selection selection, bool jumps) {
     for (int i = 0; i < selection.count; i++) {
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
         const bool stays = p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0 || p->normals >= 0;
-        if (!stays || (p->to_uv >= 0 && (p->terms & REY_TERM_PRIMARY)) || rey_rims_moved_by(scene, p)) {
+        const bool turns = jumps && (p->normals >= 0 || (p->terms & REY_TERM_TERMINATOR));
+        const bool crosses = p->to_uv >= 0 && (p->terms & REY_TERM_PRIMARY);
+        if (!stays || turns || crosses || rey_rims_moved_by(scene, p)) {
             return p;
         }
     }
@@ -155,12 +158,12 @@ rey_result rey_particles_begin(Render *r, rey_selection selection) {
     rey_scene *scene = r->scene;
     int32_t depth = scene->view.max_depth;
     rey_result result = check_sensor(scene, &r->def);
-    const Param *p = moving(scene, selection);
+    const Param *p = moving(scene, selection, r->def.terms != REY_TERM_INTERIOR);
     if (result == REY_OK && p && rey_particles_alone(scene)) {
         result = rey_fail(scene->ctx, REY_ERROR_INCOMPLETE,
-                          "the gradient of %s needs how places move that light tracing reaches, which is known where paths from "
-                          "the sensor find the same light: not beside smooth mirrors and glass, masks and 'directionalarea'. "
-                          "'path' has it", p->name);
+                          "the gradient of %s needs how places move that light tracing reaches, or how normals turn away there, "
+                          "which is known where paths from the sensor find the same light: not beside smooth mirrors and glass, "
+                          "masks and 'directionalarea'. 'path' has it", p->name);
     }
     if (!p && (depth < 0 || depth > 1)) {
         r->particles = true;

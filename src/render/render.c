@@ -174,7 +174,8 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
     r->faces |= job->faces;
-    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH, mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
+    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH || (r->faces & FACES_INWARD);
+    bool mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
     r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
     r->stats.trace_seconds += passed > 0 ? job->trace_seconds * seconds / passed : 0; // what the thread worked of it
     r->stats.thread_seconds += seconds;

@@ -385,6 +385,12 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
         const Param *one = &ARRAY_AT(r->scene->params, Param, selection.params[i]);
         p = !p || (one->terms & ~REY_TERM_INTERIOR) ? one : p;
     }
+    if (r->faces & FACES_INWARD) {
+        return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                        "the gradient of %s needs a part of the term '%s' that does not exist yet: normals of maps point into "
+                        "their surfaces (z below 0, or bumps too steep for the surface's own normals), are turned round there, "
+                        "and jump once more. --terms interior gives the part that does", p ? p->name : "", rey_term_name(bit));
+    }
     const char *gap = rey_facing_gap(&r->scene->view, r->plan.sensor);
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                     "the gradient of %s needs the term '%s', which is not known %s: paths met shading normals that face the viewer "

@@ -9,8 +9,8 @@
 // Which way shading normals that depend on the selection were met: as the surface faces, or the other way round.
 enum { FACES_ALIKE = 1, FACES_AWAY = 2, FACES_BOTH = 3 };
 // Beside these: a light at a point that moves was met within a medium.
-// And the camera saw something smooth mirror or refract while something moves.
-enum { LIGHT_WITHIN = 4, CAMERA_MIRRORED = 8 };
+// The camera saw something smooth mirror or refract while something moves. And a map's normal pointed into its surface.
+enum { LIGHT_WITHIN = 4, CAMERA_MIRRORED = 8, FACES_INWARD = 16 };
 
 typedef struct Sink {
     double *gradient;          // reverse, else null
@@ -32,7 +32,7 @@ typedef struct Sink {
     int32_t sky_at;    // the logarithm of the sum of its table: kept here (emitter/envmap.h)
     Vec2 *at;          // gathers the adjoint of the barycentrics at which attributes are read; null = not asked for
     Vec3 *point;       // the same of the points of the world at which textures read volumes
-    bool watch_turned; // see PathJob
+    bool watch_turned, watch_inward; // see PathJob
     int32_t faces;     // FACES_ bits
     Float derivative;          // forward: accumulates
 } Sink;

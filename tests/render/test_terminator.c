@@ -297,6 +297,58 @@ static void test_particles_turn(void **state) {
     assert_true(size > 0 && worst < 2e-3 * size && fabs(along - difference) < 2e-3 * size);
 }
 
+// Where normals turn away particles have the whole derivative, too: that of paths, which is more than its interior.
+static void test_particles_see_turns(void **state) {
+    Stage s = *(const Stage *)*state;
+    static const char map[] = "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='0.94,0.5,0.6'/>"
+                              "<bsdf type='diffuse'/></bsdf>";
+    static const char *const integrators[] = {"path", "ptracer", "path"};
+    static float adjoint[NUMBERS];
+    for (int i = 0; i < NUMBERS; i++) {
+        adjoint[i] = 1;
+    }
+    for (int m = 0; m < 2; m++) {
+        double gradient[3][12] = {{0}};
+        for (int k = 0; k < 3; k++) {
+            rey_scene *scene;
+            s.integrator = integrators[k];
+            s.light = torch;
+            stage_load(&s, m ? "-1.1,0,4.85" : "5,0,1.6", m ? "0 0 1" : "-0.3 0 1", m ? map : "<bsdf type='diffuse'/>", false,
+                       &scene);
+            rey_render_def def = def_make(k < 2 ? 0 : REY_TERM_INTERIOR);
+            def.spp = 256;
+            int param = rey_param_find(scene, m ? "map.normalmap.value" : "plane.normals");
+            if (rey_vjp(scene, &def, (rey_selection){&param, 1}, adjoint, gradient[k], NULL, NULL) != REY_OK) {
+                fail_msg("%s", rey_error(s.ctx));
+            }
+            rey_scene_destroy(scene);
+        }
+        print_message("whole %.4g, interior %.4g\n", gradient[0][0], gradient[2][0]);
+        assert_memory_equal(gradient[0], gradient[1], sizeof gradient[0]);
+        assert_true(fabs(gradient[0][0] - gradient[2][0]) > 0.01 * fabs(gradient[0][0]));
+    }
+}
+
+// Normals of maps that point into their surface are mirrored, and jump once more where they face away again.
+static void test_inward_maps(void **state) {
+    const Stage *s = *state;
+    static const char *const maps[] = {"0.9,0.5,0.6", "0.9,0.5,0.4"};
+    for (int i = 0; i < 4; i++) {
+        char bsdf[256];
+        rey_scene *scene;
+        int missing;
+        snprintf(bsdf, sizeof bsdf, "<bsdf type='normalmap' id='map'><rgb name='normalmap' value='%s'/>"
+                 "<boolean name='flip_invalid_normals' value='%s'/><bsdf type='diffuse'/></bsdf>", maps[i % 2],
+                 i < 2 ? "true" : "false");
+        stage_load(s, "1,0,5", "0 0 1", bsdf, false, &scene);
+        assert_int_equal(derive(s, scene, "map.normalmap.value", REY_TERM_INTERIOR, &missing), REY_OK);
+        rey_result whole = derive(s, scene, "map.normalmap.value", 0, &missing);
+        assert_int_equal(whole, i == 1 ? REY_ERROR_INCOMPLETE : REY_OK);
+        assert_true(whole == REY_OK || strstr(rey_error(s->ctx), "point into their surfaces"));
+        rey_scene_destroy(scene);
+    }
+}
+
 // Maps without shadowing cut light off at the plane of the surface: what is not known of that is refused by name.
 static void test_cut_off(void **state) {
     const Stage *s = *state;
@@ -373,6 +425,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned_normals), cmocka_unit_test(test_normals_of_lights),
                                        cmocka_unit_test(test_other_parameters), cmocka_unit_test(test_cut_off),
                                        cmocka_unit_test(test_particles_look), cmocka_unit_test(test_particles_turn),
+                                       cmocka_unit_test(test_particles_see_turns), cmocka_unit_test(test_inward_maps),
                                        cmocka_unit_test(test_replay)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
