@@ -63,7 +63,7 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
             continue;
         }
         half = (q->count + LANES - 1) / LANES * LANES;
-        curves_start(t, &strips, q, b->first + at, half);
+        curves_start(t, q, b->first + at, half);
         path_forward(t, begin);
         pairs_adjoint(t, b, filter, q->count);
         (turned ? facing_views_finish : curves_finish)(t, b, q, sink, half);

@@ -14,6 +14,8 @@ KFN Int lobe_from_child(Int lobe, int child) {
 KFN Int lobe_to_child(Int lobe) { return (lobe & 7) | (lobe >> 4) * 8; }
 // Reflections and refractions: their directions follow from wi.
 KFN Mask lobe_turns(Int lobe) { return lobe_is(lobe, LOBE_REFLECT) | lobe_is(lobe, LOBE_TRANSMIT); }
+// The same, and what passes undeviated.
+KFN Mask lobe_follows(Int lobe) { return lobe_turns(lobe) | lobe_is(lobe, LOBE_NULL); }
 KFN Mask lobe_in_child(Int lobe, int child) { return lobe_is_shared(lobe) | mi_eq(lobe >> 3 & 1, i_set(child)); }
 // Directions out of many, so that the next vertex may lie wherever they lead.
 KFN Mask lobe_spreads(Int lobe) { return lobe_is(lobe, LOBE_SMOOTH) | lobe_is(lobe, LOBE_RIM); }

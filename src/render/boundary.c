@@ -52,22 +52,25 @@ int rey_boundary_term(int32_t kind) {
     }
 }
 
-// Whether paths turn at surfaces in directions that follow from how they came.
-static bool has_chains(const SceneView *view) {
+static bool has_bsdfs(const SceneView *view, bool (*are)(int kind)) {
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (view->bsdfs[i].used && rey_bsdf_bends(view->bsdfs[i].kind)) {
+        if (view->bsdfs[i].used && are(view->bsdfs[i].kind)) {
             return true;
         }
     }
     return false;
 }
 
+// Whether paths go on from surfaces in directions that follow from how they came.
+static bool has_chains(const SceneView *view) { return has_bsdfs(view, rey_bsdf_bends); }
+
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
+    const bool passed = view->through && has_bsdfs(view, rey_bsdf_opens);
     const char *what = !rey_boundary_sees(sensor) ? "this sensor"
-                       : view->through        ? "the integrator 'volpath'"
                        : view->has_media      ? "participating media"
+                       : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass,"
                        : step                 ? step
                        : !has_chains(view)    ? "functions that let light pass"
                                               : NULL;
@@ -76,10 +79,9 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
     }
     for (int32_t i = 0; i < (int32_t)view->bsdfs_count; i++) {
         const BsdfNode *node = view->bsdfs + i;
-        bool opens = rey_bsdf_opens(node->kind), turns = rey_bsdf_turns(node->kind);
-        bool mirror = turns && (rey_bsdf_holds(view, i, rey_bsdf_bends) || rey_bsdf_cuts(node));
-        if (node->used && (opens || mirror)) {
-            return (ChainObstacle){opens ? "light that passes undeviated through" : "the normals of", -1, i, -1};
+        bool mirror = rey_bsdf_turns(node->kind) && (rey_bsdf_holds(view, i, rey_bsdf_bends) || rey_bsdf_cuts(node));
+        if (node->used && mirror) {
+            return (ChainObstacle){"the normals of", -1, i, -1};
         }
     }
     return (ChainObstacle){NULL, -1, -1, -1};
@@ -388,6 +390,7 @@ rey_result rey_boundaries_begin(Render *r) {
             result = result == REY_OK && !r->request.asked ? boundary_begin(r, i, r->boundary + i) : result;
         }
     }
+    r->job.watch_inward = r->job.watch_turned;
     r->job.watch_turned &= !(r->facing && (r->terms & REY_TERM_TERMINATOR));
     watch_smooth_normals(r, look_out);
     return result == REY_OK ? rey_corners_begin(r) : result;

@@ -1,6 +1,9 @@
 // corners.c: which inner corners the interior term has to look out for.
 #include "render/corners.h"
 
+#include "bsdf/table.h"
+#include "render/blame.h"
+
 // What the sensor sees of surfaces slides over them where it moves itself.
 static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
@@ -13,6 +16,12 @@ static bool ends_with_cosine(const SceneView *view, const CornerRecord *c) {
     return !view->bsdfs[view->shapes[c->viewer].bsdf].turns;
 }
 
+// Whether the wall's light is attached to it; mirrors show, and masks let pass, what is not.
+static bool wall_scatters(const SceneView *view, const CornerRecord *c) {
+    int32_t bsdf = view->shapes[c->wall].bsdf;
+    return rey_bsdf_holds(view, bsdf, rey_bsdf_spreads) && !rey_bsdf_holds(view, bsdf, rey_bsdf_opens);
+}
+
 rey_result rey_corners_begin(Render *r) {
     const SceneView *view = &r->scene->view;
     bool plain = !view->has_media && !view->through && !view->drops && !view->split;
@@ -23,7 +32,7 @@ rey_result rey_corners_begin(Render *r) {
     CornerRecord *all = r->corners.data;
     size_t kept = 0;
     for (size_t i = 0; i < r->corners.count && result == REY_OK; i++) {
-        if (ends_with_cosine(view, all + i)) {
+        if (ends_with_cosine(view, all + i) && wall_scatters(view, all + i)) {
             all[kept++] = all[i];
         }
     }

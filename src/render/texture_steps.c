@@ -28,10 +28,10 @@ const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *t
         }
     }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        for (int k = 0; k < MAX_SLOTS && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
+        for (int k = 0; k < MAX_SLOTS && view->through && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
             *texture = view->bsdfs[i].slot[k];
             if (texture_jumps(view, *texture)) {
-                return "the jumps of opacities";
+                return "the jumps of opacities that shadow rays pass";
             }
         }
     }

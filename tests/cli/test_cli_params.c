@@ -98,9 +98,9 @@ static void refusals_name_objects(void **state) {
          "</emitter>",
          "does not know the border of the light of spots whose beam_width is all but their cutoff_angle ('torch')"},
         {"<shape type='rectangle' id='pane'><bsdf type='dielectric'/></shape><shape type='rectangle' id='leaf'>"
-         "<bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='diffuse'/></bsdf></shape>",
+         "<bsdf type='normalmap'><rgb name='normalmap' value='0.6, 0.5, 0.9'/><bsdf type='conductor'/></bsdf></shape>",
          "'pane' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and the edges that are seen in "
-         "or through it are not found because of light that passes undeviated through 'leaf.bsdf'"},
+         "or through it are not found because of the normals of 'leaf.bsdf'"},
     };
     for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; i++) {
         FILE *file = fopen("objects.xml", "w");

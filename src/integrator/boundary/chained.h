@@ -18,7 +18,7 @@ enum { SEGMENT_CREASE = 4 };
 // must start on their own side of the other one.
 KFN Float chained_step(Vec3 p, Mask meeting) {
     Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 1e-5f;
-    return f_select(meeting, 4.0f * interaction_step(p), step);
+    return f_select(meeting, MEETING_STEPS * interaction_step(p), step);
 }
 
 // The rays past both sides of an edge, from half-way to the near point on: n points to the second one.

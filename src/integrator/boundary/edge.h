@@ -5,6 +5,10 @@
 #include "integrator/boundary/mark.h"
 #include "integrator/boundary/round.h"
 
+// How many steps of rays that start above a surface (interaction_step) paths keep off the curves along which surfaces meet, so that
+// those that one surface lets pass meet the other one behind it.
+#define MEETING_STEPS 8.0f
+
 #define MEETING_INT(job, i, field)                                                                                     \
     i_gather((const int32_t *)(job)->meetings,                                                                         \
              (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4))

@@ -22,13 +22,7 @@ static void facing_views_find(Tracer *t, const BoundaryJob *b, const Strips *all
         }
         Float weight = level_again(t, b, all, slot, &at, m) * f_set(1 / all->density) * f_safe_rcp(at.view.probability);
         m = m & m_gt(weight, f_set(0)) & m_finite(weight);
-        f_compress(q->ox + q->count, s.x[0], m);
-        f_compress(q->oy + q->count, s.y[0], m);
-        f_compress(q->dx + q->count, s.x[1], m);
-        f_compress(q->dy + q->count, s.y[1], m);
-        f_compress(q->behind + q->count, weight, m);
-        i_compress(q->number + q->count, i_load(kept + i), m);
-        q->count += m_count(m);
+        strip_keep(&s, weight, strip_apart(all), i_load(kept + i), q, m);
     }
 }
 

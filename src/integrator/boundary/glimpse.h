@@ -215,7 +215,7 @@ static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens,
     Tracer *t = in->t;
     const PathJob *job = t->job;
     int kind = t->scene->bsdfs[at->call.node].kind;
-    if (kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC) {
+    if (kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_THINDIELECTRIC || kind == BSDF_NULL) {
         return; // they send nothing into other directions
     }
     SampleKey key = slot_key(t, at->v.slot);

@@ -148,7 +148,7 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     }
     next_count = particle_scatter(in->t, &at, bounce, -1, next_count);
     if (in->upstream) {
-        upstream_leave(in->t, &in->q, at.v.slot, bounce, boundary_is_chained(in->b->kind), at.v.m);
+        upstream_leave(in->t, &in->q, at.v.slot, bounce, in->b->kind, at.v.m);
     }
     return next_count;
 }

@@ -15,6 +15,9 @@
 #define DIMENSION_STRIP_TURN 0x80000011u
 #define DIMENSION_STRIP_AGAIN 0x80001000u
 
+// Of two paths beside a curve along which surfaces meet, the largest distance [pixels].
+#define WIDEST_MEETING ((real)0.05)
+
 // Lengths of strips: LONGEST_STRIP pixels, and halves of that.
 enum { STRIP_LENGTHS = 7, LONGEST_STRIP = 8, MOST_AGAIN = 512 };
 
@@ -132,7 +135,7 @@ static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *
         level = i_select(m & ~same, i_set(i), level);
         Mask alike = mi_eq(a->lobe[i], b->lobe[i]);
         level = i_select(m & same & ~alike, i_set(0), level);
-        m = m & same & alike & lobe_turns(a->lobe[i]);
+        m = m & same & alike & lobe_follows(a->lobe[i]);
     }
     return level;
 }
@@ -216,6 +219,29 @@ typedef struct Curve {
     Mask m;
 } Curve;
 
+// Lanes of m in which rays begin next to a surface that lies before or behind their start: where another surface touches the one
+// that they leave, they start beyond it in a band as narrow as the step that they start above theirs. The band's border is none of
+// the scene's curves: what it hides, it takes from the curve along which the surfaces meet. Bands within smooth meshes count: those
+// end at edges, beside which primary.h sees them.
+static Mask curve_in_band(Tracer *t, const Sightline *line, Int level, Mask m) {
+    Vec3 o = v3_zero(), p = v3_zero();
+    Int shape = i_set(0);
+    for (int32_t i = 1; i < line->last; i++) {
+        Mask here = mi_eq(level, i_set(i));
+        o = v3_select(here, line->o[i], o);
+        p = v3_select(here, line->hit[i - 1].p, p);
+        shape = i_select(here, line->hit[i - 1].shape, shape);
+    }
+    Vec3 step = v3_sub(o, p);
+    Float length = v3_length(step);
+    Vec3 back = v3_select(m, v3_scale(step, -f_safe_rcp(length)), v3(f_set(0), f_set(0), f_set(1)));
+    Ray ray = {v3_madd(o, -0.5f * length, back), back, 1.45f * length};
+    Hit hit = trace_closest(t->scene, &ray, m, false);
+    t->job->rays += m_count(m);
+    Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_select(m, shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
+    return m & mi_lt(i_set(-1), hit.shape) & ~(smooth & mi_eq(hit.shape, shape));
+}
+
 static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const Strip *s, Mask m, Curve *c) {
     SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
     Sink still = sink_of(b->still);
@@ -224,6 +250,7 @@ static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const
     strip_look(t, &key, c->lens, s, 1, m, c->line + 1);
     c->level = lines_part(t, b, c->line, c->line + 1, m);
     m = m & mi_lt(i_set(0), c->level);
+    m = m & ~curve_in_band(t, c->line, c->level, m) & ~curve_in_band(t, c->line + 1, c->level, m);
     c->crossing = crossing_find(t, b, c->line, c->level, m);
     Carried carried = crossing_move_adj(t, &c->crossing, c->line, c->level, f_set(1), &still);
     c->x = 0.5f * (s->x[0] + s->x[1]);
@@ -287,7 +314,29 @@ KFN Mask strips_inside(const Strips *all, Float x, Float y) {
            m_lt(y, f_set(all->y + all->height));
 }
 
-// Finds the curves of those strips: leaves in q their ends (o, d) and what they are worth (behind).
+// How far apart paths pass a curve [pixels], so that those whose directions are rounded in another order pass it there, too.
+KFN Float strip_apart(const Strips *all) { return f_set(4 * all->end); }
+
+// The same so far apart that rays that go on from a surface meet another one that it meets there.
+KFN Float curve_apart(const Strips *all, const Curve *c) {
+    Float gap = 2.0f * MEETING_STEPS * interaction_step(c->crossing.p) * f_safe_rcp(c->slope), least = strip_apart(all);
+    return f_select(c->crossing.meeting, f_clamp(gap, least, f_set(WIDEST_MEETING)), least);
+}
+
+// Keeps a strip's ends (o, d), what it is worth (behind), how far apart the two paths are that look at its curve (along), and its
+// number.
+static void strip_keep(const Strip *s, Float worth, Float apart, Int number, Segments *q, Mask m) {
+    f_compress(q->ox + q->count, s->x[0], m);
+    f_compress(q->oy + q->count, s->y[0], m);
+    f_compress(q->dx + q->count, s->x[1], m);
+    f_compress(q->dy + q->count, s->y[1], m);
+    f_compress(q->behind + q->count, worth, m);
+    f_compress(q->along + q->count, apart, m);
+    i_compress(q->number + q->count, number, m);
+    q->count += m_count(m);
+}
+
+// Finds the curves of those strips.
 static void curves_find(Tracer *t, const BoundaryJob *b, const Strips *all, int64_t first, const int32_t *kept, int32_t count,
                         Segments *q) {
     q->count = 0;
@@ -303,13 +352,7 @@ static void curves_find(Tracer *t, const BoundaryJob *b, const Strips *all, int6
         c.m = c.m & m & strips_inside(all, c.x, c.y);
         Float weight = m_any(c.m) ? curve_again(t, b, all, slot, &c) * f_set(1 / all->density) : f_set(0);
         c.m = c.m & m_gt(weight, f_set(0));
-        f_compress(q->ox + q->count, s.x[0], c.m);
-        f_compress(q->oy + q->count, s.y[0], c.m);
-        f_compress(q->dx + q->count, s.x[1], c.m);
-        f_compress(q->dy + q->count, s.y[1], c.m);
-        f_compress(q->behind + q->count, weight, c.m);
-        i_compress(q->number + q->count, i_load(kept + i), c.m);
-        q->count += m_count(c.m);
+        strip_keep(&s, weight, curve_apart(all, &c), i_load(kept + i), q, c.m);
     }
 }
 
@@ -318,22 +361,22 @@ KFN Strip strip_load(const Segments *q, int32_t k) {
     return s;
 }
 
-// The strip, with its ends so far apart that paths whose directions are rounded in another order pass the curve there, too.
-static Strip strip_widen(const Strips *all, const Strip *s) {
+// The strip with its ends that far apart.
+static Strip strip_widen(const Strip *s, Float length) {
     Float x = 0.5f * (s->x[0] + s->x[1]), y = 0.5f * (s->y[0] + s->y[1]), dx = s->x[1] - s->x[0], dy = s->y[1] - s->y[0];
-    Float r = f_safe_rcp(f_sqrt(dx * dx + dy * dy)), length = f_set(4 * all->end);
+    Float r = f_safe_rcp(f_sqrt(dx * dx + dy * dy));
     return strip_around(x, y, dx * r, dy * r, length, 0.5f * length);
 }
 
 // Starts the two paths of every strip: slots k and half + k.
-static void curves_start(Tracer *t, const Strips *all, const Segments *q, int64_t first, int32_t half) {
+static void curves_start(Tracer *t, const Segments *q, int64_t first, int32_t half) {
     for (int32_t k = 0; k < half; k++) {
         int64_t number = first + q->number[k < q->count ? k : 0];
         slot_number(t, k, number);
         slot_number(t, half + k, number);
     }
     for (int32_t k = 0; k < half; k += LANES) {
-        Strip near = strip_load(q, k), s = strip_widen(all, &near);
+        Strip near = strip_load(q, k), s = strip_widen(&near, f_load(q->along + k));
         Int slot = i_iota() + k;
         SampleKey own = slot_key(t, slot);
         f_store(t->ws.film_x + k, 0.5f * (s.x[0] + s.x[1]));

@@ -30,9 +30,13 @@ typedef struct PrimarySample {
 } PrimarySample;
 
 // Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
-static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e) {
+// Where surfaces pass through each other, rays that one lets pass start a step behind it and must meet the other one. scale: pixels
+// per length across the edge.
+static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
-    return f_select(smooth & m_set(b->chains), f_set(2 * film_resolution(t->sensor)), f_set(PRIMARY_STEP));
+    Float step = f_select(smooth & m_set(b->chains), f_set(2 * film_resolution(t->sensor)), f_set(PRIMARY_STEP));
+    Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
+    return f_select(e->meeting & m_set(b->chains), behind, step);
 }
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
@@ -52,7 +56,7 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->nx = f_copysign(rcp, turn) * -along.y;
     out->ny = f_copysign(rcp, turn) * along.x;
     out->weight = f_abs(turn) * f_safe_rcp(e.probability);
-    out->step = primary_step(t, b, &e);
+    out->step = primary_step(t, b, &e, f_abs(turn) * rcp);
     out->silhouette = edge_is_silhouette(t->scene, b, &e, n, s.d);
     out->m = m & s.valid & m_gt(r, f_set(0)) & m_gt(e.probability, f_set(0)) & m_finite(out->weight) &
              m_gt(out->weight, f_set(0)) & (out->silhouette | e.crease);

@@ -55,7 +55,7 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         BsdfSample b = bsdf_sample(&call, wi, u, at);
         Float pdf;
         Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
-        Mask turns = mine & (lobe_turns(b.lobe) | lobe_is(b.lobe, LOBE_NULL)) & m_set(!ends);
+        Mask turns = mine & lobe_follows(b.lobe) & m_set(!ends);
         turns = turns & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0));
         Vec3 wo = frame_to_world(&si.sh, b.wo);
         s->lobe[i] = i_select(turns, b.lobe, s->lobe[i]);
@@ -141,15 +141,10 @@ static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Ve
         }
         Vec3 next = v3_select(mi_eq(level, i_set(i + 1)), p, s->hit[i + 1].p);
         Float distance = v3_length(v3_sub(next, s->hit[i].p));
-        Mask passes = on & lobe_is(s->lobe[i], LOBE_NULL), turns = on & ~passes; // a ray that passes stays the same line
-        c.turn = v3_select(passes, v3_madd(c.turn, distance, c.drag), c.turn);
-        if (!m_any(turns)) {
-            continue;
-        }
-        Carried back = rays_turn_adj(t, s->hit + i, s->d[i], v3_select(turns, s->d[i + 1], v3_neg(s->d[i])), s->lobe[i],
-                                     distance, &c, sink, turns);
-        c.drag = v3_select(turns, back.drag, c.drag);
-        c.turn = v3_select(turns, back.turn, c.turn);
+        Carried back = rays_turn_adj(t, s->hit + i, s->d[i], v3_select(on, s->d[i + 1], v3_neg(s->d[i])), s->lobe[i], distance,
+                                     &c, sink, on);
+        c.drag = v3_select(on, back.drag, c.drag);
+        c.turn = v3_select(on, back.turn, c.turn);
     }
     return c;
 }

@@ -47,8 +47,8 @@ KFN void upstream_begin(Segments *q) {
     q->levels = 0;
 }
 
-// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end. chained: as in
-// upstream_leave.
+// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end. chained: the segments are
+// rays at their near points.
 static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, bool chained) {
     const Workspace *ws = &t->ws;
     const Paths *p = &ws->paths[t->current];
@@ -87,12 +87,11 @@ static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, bool chained
     }
 }
 
-// The particles of m, vertices of one bounce, have gone on with the lobes that the tracer has noted. chained: kinds of
-// boundaries whose segments are rays at their near points.
-static void upstream_leave(const Tracer *t, Segments *q, Int slot, int32_t bounce, bool chained, Mask m) {
+// The particles of m, vertices of one bounce, have gone on with the lobes that the tracer has noted. kind: that of the boundary.
+static void upstream_leave(const Tracer *t, Segments *q, Int slot, int32_t bounce, int32_t kind, Mask m) {
     Int arrived = i_gather(q->arrived, slot), lobe = i_gather(t->lobes, slot);
     Mask ray = m & mi_eq(arrived, i_set(UPSTREAM_RAY)), point = m & mi_eq(arrived, i_set(UPSTREAM_POINT));
-    Mask turns = lobe_turns(lobe) & (ray | point), ends = point & ~turns;
+    Mask turns = lobe_follows(lobe) & (ray | point), ends = point & ~turns;
     if (bounce >= MOST_UPSTREAM) {
         return;
     }
@@ -101,8 +100,12 @@ static void upstream_leave(const Tracer *t, Segments *q, Int slot, int32_t bounc
     i_scatter(q->arrived, slot, i_set(UPSTREAM_REST), ends);
     i_scatter(q->level, slot, i_set(bounce - 1), ends);
     if (bounce == 0) {
-        // Segments that are not rays have ordinary ends only.
+        // Segments that are not rays at their near points have ordinary ends only.
+        const bool chained = boundary_is_chained(kind);
         i_scatter(chained ? q->full : q->arrived, slot, i_set(chained ? 1 : UPSTREAM_NONE), turns);
+        if (boundary_is_horizon(kind)) { // nothing that passes lies in the plane of its triangle
+            i_scatter(q->arrived, slot, i_set(UPSTREAM_NONE), turns & lobe_is(lobe, LOBE_NULL));
+        }
     }
 }
 
@@ -130,12 +133,14 @@ static Vec3 rays_meet_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 dp, Sink
 }
 
 // Rays along d that are mirrored or refracted into wo, to meet something at a distance: carries the adjoints of their
-// position there and of their direction back.
+// position there and of their direction back. Rays that pass stay the same lines.
 static Carried rays_turn_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 wo, Int lobe, Float distance,
                              const Carried *ahead, Sink *sink, Mask m) {
     const SceneView *scene = t->scene;
-    Carried back = {v3_zero(), v3_zero()};
-    for (Mask left = m; m_any(left);) {
+    Mask passes = m & lobe_is(lobe, LOBE_NULL);
+    Vec3 turn = v3_madd(ahead->turn, distance, ahead->drag);
+    Carried back = {v3_select(passes, ahead->drag, v3_zero()), v3_select(passes, turn, v3_zero())};
+    for (Mask left = m & ~passes; m_any(left);) {
         int32_t id;
         SurfaceSweep s = {.m = m_set(false)};
         Mask mine = take_group(scene, hit, &left, &id, &s.hit);
@@ -154,7 +159,7 @@ static Carried rays_turn_adj(const Tracer *t, const Hit *hit, Vec3 d, Vec3 wo, I
             s.call.dsurface = &v.surface;
         }
         // d' = to_world(wo(wi)), and the ray's position is p + distance d'
-        Vec3 sampled = v3_select(mine, v3_madd(ahead->turn, distance, ahead->drag), v3_zero());
+        Vec3 sampled = v3_select(mine, turn, v3_zero());
         Vec3 dwo = frame_to_local(&s.si.sh, sampled);
         frame_to_world_adj(s.wo, sampled, &v.frame);
         Int own = i_select(mine, lobe, i_set(LOBE_SMOOTH));
@@ -172,7 +177,7 @@ static void upstream_turn_adj(const Tracer *t, const Segments *q, int32_t level,
                               Mask m) {
     UpstreamVertex at = upstream_load(q, level, k), before;
     Int next_met = level + 1 < MOST_UPSTREAM ? i_load(q->up[level + 1].met + k) : i_set(UPSTREAM_NONE);
-    m = m & mi_lt(i_set(UPSTREAM_NONE), at.met) & lobe_turns(at.lobe) & mi_eq(next_met, i_set(UPSTREAM_RAY));
+    m = m & mi_lt(i_set(UPSTREAM_NONE), at.met) & lobe_follows(at.lobe) & mi_eq(next_met, i_set(UPSTREAM_RAY));
     if (!m_any(m)) {
         return;
     }
