@@ -36,8 +36,8 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
     }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
         const bool used = view->bsdfs[i].used, chains = used && rey_bsdf_bends(view->bsdfs[i].kind);
-        if (used && rey_bsdf_opens(view->bsdfs[i].kind)) {
-            return "beside masks and thin glass";
+        if (chains && view->through && rey_bsdf_opens(view->bsdfs[i].kind)) {
+            return "beside masks and thin glass with 'volpath', whose shadow rays pass them";
         }
         if (chains && !rey_chains_known(view, sensor)) {
             return "beside these smooth mirrors and glass";

@@ -170,6 +170,7 @@ static const Motion motions[] = {
     {"veil_room.xml", "screen.to_world", SHIFT, {0.5f, 1, 0.3f}, 0.02, 4},
     {"veil_room.xml", "box.to_world", SHIFT, {1, 0.3f, 0}, 0.04, 10},
     {"veil_room.xml", "camera.to_world", SHIFT, {1, 0, 0.2f}, 0.02, 4},
+    {"veil_facing.xml", "slanted.normalmap.value", ADD, {0}, 0.02, 4},
     {"marks_bump.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.3f}, 0.03, 1},
     {"marks_bump.xml", "tile.to_world", TURN, {0.2f, 0.3f, 1}, 1, 1},
     {"marks_bump.xml", "kite.positions", SHEAR, {0, 0, 0}, 0.05, 1},
