@@ -25,7 +25,7 @@ static const OptionRow option_rows[] = {
     {OPTION_PARAM, 0, "param", "NAME", LISTS, "these parameters only; * stands for any text; may be repeated"},
     {OPTION_MODE, 0, "mode", "forward|reverse", GRADS, "which way to differentiate (default forward)"},
     {OPTION_ADJOINT, 0, "adjoint", "A", GRADS, "reverse mode: a number, or a picture (any format) of the image's size"},
-    {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "estimate these terms only (interior,primary,indirect,specular)"},
+    {OPTION_TERMS, 0, "terms", "T,...", GRADS | CHECKS, "these terms only (interior,primary,indirect,specular,terminator)"},
     {OPTION_SPP_TERMS, 0, "spp-terms", "T=N,...", GRADS, "samples per pixel of primary and indirect (default: by --spp)"},
     {OPTION_ALL, 0, "all", NULL, CHECKS, "every parameter of the scene, instead of --param"},
     {OPTION_ESTIMATOR, 0, "estimator", "probe|score", GRADS | CHECKS, "how extinctions are differentiated (default probe)"},

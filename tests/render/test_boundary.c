@@ -243,7 +243,7 @@ static void test_bits(void **state) {
     assert_memory_equal(gradients[0], gradients[1], 16 * sizeof gradients[0][0]);
 }
 
-// Edges behind mirrors and glass are not found beside surfaces that let light pass undeviated, nor those of tubes. Lines of
+// Edges behind mirrors and glass are not found beside mirrors whose normals are a map's, nor those of tubes. Lines of
 // textures that to_uv moves: not where two textures share them, nor where they lie on edges that mirrors may show. Nor what is
 // there twice.
 static void test_refused(void **state) {
@@ -252,7 +252,7 @@ static void test_refused(void **state) {
         const char *room, *param;
         int moved; // number of the parameter
         const char *word;
-    } cases[] = {{"materials.xml", "camera.to_world", 3, "'specular'"},
+    } cases[] = {{"layers.xml", "camera.to_world", 3, "'specular'"},
                  {"mirrored_rope.xml", "camera.to_world", 3,
                   "mirrors, glass and participating media show of the outlines of curves"},
                  {"marks_faces.xml", "grid.bsdf.bsdf_0.reflectance.to_uv", 0, "the same line"},

@@ -6,6 +6,7 @@
 // vertex before the chain. A segment's near point is that vertex, or it is part of the chain: which one the particle
 // that carries the light decides (upstream.h). Where it is that vertex, what jumps is only what the far points mirror
 // or refract; all other light of theirs is attached to them (indirect.h).
+// Surfaces that let a part of the light pass in its direction are pieces of chains as mirrors are: masks, thin glass.
 #pragma once
 
 #include "integrator/boundary/upstream.h"

@@ -5,7 +5,7 @@
 // surface, because the film position is fixed.
 // Edges along chains of smooth mirrors and glass (chained.h), and as collisions see them (riding.h), take the same way.
 // What the camera sees of this in mirrors and through glass: glimpse.h.
-// NOT differentiated: edges of surfaces that let light pass.
+// NOT differentiated: edges of surfaces that shadow rays pass (volpath).
 #pragma once
 
 #include "integrator/boundary/segments_move.h"

@@ -2,7 +2,7 @@
 // by dL along a curve that moves over the film with normal velocity v, its derivative has the line integral of f dL v
 // [li2018], docs/derivations/boundary.md, f the reconstruction filter. A sample is a point of an edge, seen by two paths on both
 // sides of it that share their random numbers.
-// NOT differentiated: jumps of volumes' voxels and of opacities. What is seen behind mirrors and glass: mirrored.h.
+// NOT differentiated: jumps of volumes' voxels. What is seen behind mirrors and glass: mirrored.h.
 #pragma once
 
 #include "integrator/boundary/segments.h"
