@@ -67,9 +67,7 @@ KFN void bumpmap_adj(const BsdfCall *call, const BumpMap *p, Vec3 wi, Vec3 wo, I
     Vec3 dvalid = v3_zero();
     turned_adj(call, bumpmap_normal(call, p, wi), p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi,
                dwo, duv);
-    Vec3 turned = bumpmap_turned(call, p);
-    turned_watch(turned, wi, sink, m);
-    turned_watch_inward(turned, sink, m);
+    turned_watch(bumpmap_turned(call, p), wi, true, sink, m);
     bumpmap_normal_adj(call, p, wi, dvalid, dp);
 }
 

@@ -42,9 +42,7 @@ KFN BsdfSample normalmap_sample(const BsdfCall *call, const NormalMap *p, Vec3 w
 KFN void normalmap_adj(const BsdfCall *call, const NormalMap *p, Vec3 wi, Vec3 wo, Int lobe, Spec df, Sink *sink, Mask m,
                        NormalMap *dp, Vec3 *dwi, Vec3 *dwo, Vec2 *duv) {
     Vec3 dvalid = v3_zero();
-    Vec3 n = v3_normalize(normalmap_encoded(p));
-    turned_watch(n, wi, sink, m);
-    turned_watch_inward(n, sink, m & m_set(p->flip_invalid_normals));
+    turned_watch(v3_normalize(normalmap_encoded(p)), wi, p->flip_invalid_normals, sink, m);
     turned_adj(call, normalmap_normal(p, wi), p->use_shadowing_function, wi, wo, lobe, df, sink, m, &dvalid, dwi, dwo, duv);
     normalmap_normal_adj(p, wi, dvalid, dp);
 }

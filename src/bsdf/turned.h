@@ -20,17 +20,14 @@ KFN Vec3 turned_valid(Vec3 n, Vec3 wi, int32_t flip_invalid) {
 }
 
 // Notes in the sink whether n faces the viewer as the surface does. Where it faces away from the light the value goes
-// to 0 continuously, with the cosine.
-KFN void turned_watch(Vec3 n, Vec3 wi, Sink *sink, Mask m) {
+// to 0 continuously, with the cosine. turns: where n points into the surface it is mirrored or turned round, and jumps once more;
+// that is noted, too.
+KFN void turned_watch(Vec3 n, Vec3 wi, bool turns, Sink *sink, Mask m) {
     if (sink->watch_turned) {
         Mask away = m_le(wi.z * v3_dot(wi, n), f_set(0));
         sink->faces |= (m_any(m & away) ? FACES_AWAY : 0) | (m_any(m & ~away) ? FACES_ALIKE : 0);
     }
-}
-
-// Notes normals that point into the surface, where they are mirrored or turned round: those jump once more.
-KFN void turned_watch_inward(Vec3 n, Sink *sink, Mask m) {
-    if (sink->watch_inward) {
+    if (sink->watch_inward && turns) {
         sink->faces |= m_any(m & m_lt(n.z, f_set(0))) ? FACES_INWARD : 0;
     }
 }

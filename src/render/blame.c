@@ -116,6 +116,15 @@ bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind)) {
     return found;
 }
 
+bool rey_bsdfs_used(const SceneView *view, bool (*are)(int kind)) {
+    for (int64_t i = 0; i < view->bsdfs_count; i++) {
+        if (view->bsdfs[i].used && are(view->bsdfs[i].kind)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 bool rey_name_bender(const rey_scene *scene, char name[OBJECT_NAME]) {
     for (int64_t i = 0; i < scene->view.shapes_count; i++) {
         if (rey_bsdf_holds(&scene->view, scene->view.shapes[i].bsdf, rey_bsdf_bends)) {

@@ -52,25 +52,16 @@ int rey_boundary_term(int32_t kind) {
     }
 }
 
-static bool has_bsdfs(const SceneView *view, bool (*are)(int kind)) {
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (view->bsdfs[i].used && are(view->bsdfs[i].kind)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 // Whether paths go on from surfaces in directions that follow from how they came.
-static bool has_chains(const SceneView *view) { return has_bsdfs(view, rey_bsdf_bends); }
+static bool has_chains(const SceneView *view) { return rey_bsdfs_used(view, rey_bsdf_bends); }
 
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const bool passed = view->through && has_bsdfs(view, rey_bsdf_opens);
+    const bool passed = view->through && rey_bsdfs_used(view, rey_bsdf_opens);
     const char *what = !rey_boundary_sees(sensor) ? "this sensor"
                        : view->has_media      ? "participating media"
-                       : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass,"
+                       : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
                        : step                 ? step
                        : !has_chains(view)    ? "functions that let light pass"
                                               : NULL;

@@ -19,7 +19,7 @@ static bool ends_with_cosine(const SceneView *view, const CornerRecord *c) {
 // Whether the wall's light is attached to it; mirrors show, and masks let pass, what is not.
 static bool wall_scatters(const SceneView *view, const CornerRecord *c) {
     int32_t bsdf = view->shapes[c->wall].bsdf;
-    return rey_bsdf_holds(view, bsdf, rey_bsdf_spreads) && !rey_bsdf_holds(view, bsdf, rey_bsdf_opens);
+    return view->bsdfs[bsdf].spreads && !rey_bsdf_holds(view, bsdf, rey_bsdf_opens);
 }
 
 rey_result rey_corners_begin(Render *r) {

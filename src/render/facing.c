@@ -2,6 +2,7 @@
 #include "render/facing.h"
 
 #include "bsdf/table.h"
+#include "render/blame.h"
 #include "render/boundary.h"
 #include "render/cuts.h"
 #include "shape/shape.h"
@@ -34,14 +35,11 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
     if (view->drops) {
         return "where 'path' with hide_emitters drops rays that only pass";
     }
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        const bool used = view->bsdfs[i].used, chains = used && rey_bsdf_bends(view->bsdfs[i].kind);
-        if (chains && view->through && rey_bsdf_opens(view->bsdfs[i].kind)) {
-            return "beside masks and thin glass with 'volpath', whose shadow rays pass them";
-        }
-        if (chains && !rey_chains_known(view, sensor)) {
-            return "beside these smooth mirrors and glass";
-        }
+    if (view->through && rey_bsdfs_used(view, rey_bsdf_opens)) {
+        return "beside masks and thin glass with 'volpath', whose shadow rays pass them";
+    }
+    if (rey_bsdfs_used(view, rey_bsdf_bends) && !rey_chains_known(view, sensor)) {
+        return "beside these smooth mirrors and glass";
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;

@@ -6,6 +6,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "math/rng.h"
+#include "render/blame.h"
 #include "render/rims.h"
 #include "sensor/kinds.h"
 
@@ -31,10 +32,7 @@ bool rey_traces_particles(const rey_scene *scene) {
 
 bool rey_particles_alone(const rey_scene *scene) {
     const SceneView *view = &scene->view;
-    bool alone = false;
-    for (int64_t i = 0; i < view->bsdfs_count && view->particles && !alone; i++) {
-        alone = view->bsdfs[i].used && (rey_bsdf_bends(view->bsdfs[i].kind) || rey_bsdf_opens(view->bsdfs[i].kind));
-    }
+    bool alone = view->particles && rey_bsdfs_used(view, rey_bsdf_bends);
     for (int64_t i = 0; i < view->emitters_count && view->particles && !alone; i++) {
         alone = view->emitters[i].kind == EMITTER_DIRECTIONALAREA;
     }

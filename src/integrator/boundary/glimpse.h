@@ -214,9 +214,8 @@ static Spec glimpse_radiance(const Indirect *in, Int slot, const Glimpse *g, int
 static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens, int32_t bounce) {
     Tracer *t = in->t;
     const PathJob *job = t->job;
-    int kind = t->scene->bsdfs[at->call.node].kind;
-    if (kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_THINDIELECTRIC || kind == BSDF_NULL) {
-        return; // they send nothing into other directions
+    if (!t->scene->bsdfs[at->call.node].spreads) {
+        return;
     }
     SampleKey key = slot_key(t, at->v.slot);
     key.scramble = rng_mix(key.scramble, 2 + (uint32_t)bounce);

@@ -202,7 +202,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         }
         t->placed = false;
         if (in->upstream) {
-            upstream_arrive(t, &in->q, bounce, boundary_is_chained(in->b->kind));
+            upstream_arrive(t, &in->q, bounce, in->b->kind);
             ways_advance(in, bounce, sink);
         }
         if (in->glimpses && in->upstream && in->b->job.mode == MODE_REVERSE) {

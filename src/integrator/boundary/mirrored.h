@@ -224,15 +224,11 @@ typedef struct Curve {
 // the scene's curves: what it hides, it takes from the curve along which the surfaces meet. Bands within smooth meshes count: those
 // end at edges, beside which primary.h sees them.
 static Mask curve_in_band(Tracer *t, const Sightline *line, Int level, Mask m) {
-    Vec3 o = v3_zero(), p = v3_zero();
-    Int shape = i_set(0);
-    for (int32_t i = 1; i < line->last; i++) {
-        Mask here = mi_eq(level, i_set(i));
-        o = v3_select(here, line->o[i], o);
-        p = v3_select(here, line->hit[i - 1].p, p);
-        shape = i_select(here, line->hit[i - 1].shape, shape);
-    }
-    Vec3 step = v3_sub(o, p);
+    Ends at, before;
+    ends_load(line, level, 0, &at);
+    ends_load(line, level - 1, 0, &before);
+    Vec3 o = at.o[0], step = v3_sub(o, before.hit[0].p);
+    Int shape = before.hit[0].shape;
     Float length = v3_length(step);
     Vec3 back = v3_select(m, v3_scale(step, -f_safe_rcp(length)), v3(f_set(0), f_set(0), f_set(1)));
     Ray ray = {v3_madd(o, -0.5f * length, back), back, 1.45f * length};

@@ -47,9 +47,8 @@ KFN void upstream_begin(Segments *q) {
     q->levels = 0;
 }
 
-// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end. chained: the segments are
-// rays at their near points.
-static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, bool chained) {
+// Notes where the particles of a bounce have arrived. Ways with more levels than there is room for end. kind: that of the boundary.
+static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, int32_t kind) {
     const Workspace *ws = &t->ws;
     const Paths *p = &ws->paths[t->current];
     for (int32_t k = 0; k < t->active; k += LANES) {
@@ -80,7 +79,7 @@ static void upstream_arrive(Tracer *t, Segments *q, int32_t bounce, bool chained
         f_scatter(u->unseen, slot, f_set(0), m);
         f_scatter(u->passed, slot, f_set(0), m);
         i_scatter(q->arrived, slot, i_set(UPSTREAM_RAY), m & collides);
-        if (bounce == 0 && chained) {
+        if (bounce == 0 && boundary_is_chained(kind)) {
             i_scatter(q->full, slot, i_set(1), m & collides);
         }
         q->levels = bounce + 1;
