@@ -29,29 +29,42 @@ KFN Hit walk_hit(const Hit *hit, Mask mine) {
     return safe;
 }
 
-// The medium at infinity: that of the sensor, unless surfaces enclose it.
+// The medium at infinity: that of the sensor, unless it is the inside of some surface.
 static Int medium_beyond(const Tracer *t) {
     int32_t id = t->sensor->medium;
     for (int64_t i = 0; i < t->scene->groups_count; i++) {
-        const Group *group = t->scene->groups + i;
-        id = group->interior == t->sensor->medium || group->exterior == t->sensor->medium ? -1 : id;
+        id = t->scene->groups[i].interior == t->sensor->medium ? -1 : id;
     }
     return i_set(id);
 }
 
-// The media around points: a ray along d says so where it meets a surface that has a medium on either side.
+static bool surfaces_separate(const SceneView *scene) {
+    for (int64_t i = 0; i < scene->groups_count; i++) {
+        if (scene->groups[i].interior >= 0 || scene->groups[i].exterior >= 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// The media around points: a ray along d says so where it meets a surface that has a medium on either side. All others leave light
+// in its medium: the ray passes those that let light pass, and is thrown back by those that do not. Where it gets away, it tries
+// the other way; where it finds no such surface, the medium is the sensor's.
 static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
-    Int medium = medium_beyond(t);
-    Mask left = m;
+    Int medium = i_set(t->sensor->medium), beyond = medium_beyond(t);
+    Mask left = surfaces_separate(scene) ? m : m_set(false), turned = m_set(false);
     for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
         Ray ray = {o, d, f_set(INFINITY)};
         Hit hit = trace_media(t, &ray, left, false);
         t->job->rays += m_count(left);
-        left = left & mi_lt(i_set(-1), hit.shape);
-        Mask known = m_set(false);
+        Mask met = left & mi_lt(i_set(-1), hit.shape), lost = left & ~met & turned;
+        medium = i_select(lost, beyond, medium);
+        turned = turned | (left & ~met);
+        d = v3_select(left & ~met, v3_neg(d), d);
+        left = left & ~lost;
         Int groups = SHAPE_FIELD(scene, i_max(hit.shape, i_set(0)), group);
-        for (Mask rest = left, mine; m_any(rest); rest = rest & ~mine) {
+        for (Mask rest = met, mine; m_any(rest); rest = rest & ~mine) {
             int32_t id = i_lane(groups, m_first(rest));
             const Group *group = scene->groups + id;
             mine = rest & mi_eq(groups, i_set(id));
@@ -59,11 +72,14 @@ static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
             if (group->interior >= 0 || group->exterior >= 0) {
                 medium = i_select(mine, medium_behind(group, si.ng, v3_neg(d), medium), medium);
-                known = known | mine;
+                left = left & ~mine;
+            } else if (scene->bsdfs[group->bsdf].transmits) {
+                o = v3_select(mine, interaction_behind(&si, d), o);
+            } else {
+                d = v3_select(mine, v3_neg(reflect(d, si.ng)), d);
+                o = v3_select(mine, interaction_offset(&si, d), o);
             }
-            o = v3_select(mine, interaction_behind(&si, d), o);
         }
-        left = left & ~known;
     }
     return medium;
 }
