@@ -168,8 +168,17 @@ KFN Spec border_gain(const Filling *f, Spec scattered, Spec radiance) {
     return spec_add(spec_mul(f->extinction, spec_sub(scattered, radiance)), f->emission);
 }
 
+// The point of the ray that led to the records whose adjoint is kept: its end, or where it has none, `from`, which is noted.
+static Vec3 ride_reference(const Tracer *t, Int slot, Vec3 from, Mask m) {
+    const Workspace *ws = &t->ws;
+    Mask open = mi_eq(i_gather(ws->next, slot), i_set(NEXT_NONE));
+    Vec3 ref = v3_select(open, from, LOAD_V3(*ws, next_px, next_py, next_pz, slot));
+    next_point(t, slot, from, m & open);
+    return ref;
+}
+
 // Where surfaces move (ride.h): adds the adjoint `all` of points of the ray that led to the records to that of the vertex where it
-// began, or to the sensor. Where it ends at an attached vertex, that turns it: `end` is the part that the radiance from there asks
+// began, or to the sensor. Where it ends at an attached vertex, that turns it: `end` is the part that what is attached there asks
 // for.
 static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int channel, Int slot, const Glide *all,
                               const Glide *end, Sink *sink, Mask m) {
@@ -178,19 +187,20 @@ static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int cha
     first_ride_adj(t, batch, slot, all->ref, &first, sink, m);
     rows_scatter(&ws->drag, channel, slot, v3_add(rows_gather(&ws->drag, channel, slot), all->position), m);
     Mask slides = mi_eq(i_load(ws->records.slides + batch->first), i_set(1));
-    m = m & ~slides & mi_lt(i_set(-1), i_gather(ws->next, slot));
-    if (m_any(m)) {
-        rows_scatter(&ws->pull, channel, slot, v3_add(rows_gather(&ws->pull, channel, slot), end->position), m);
-        rows_scatter(&ws->turn, channel, slot, v3_add(rows_gather(&ws->turn, channel, slot), end->turn), m);
+    Mask attached = m & ~slides & mi_lt(i_set(-1), i_gather(ws->next, slot));
+    Vec3 turn = v3_select(slides, all->turn, end->turn);
+    rows_scatter(&ws->turn, channel, slot, v3_add(rows_gather(&ws->turn, channel, slot), turn), (m & slides) | attached);
+    if (m_any(attached)) {
+        rows_scatter(&ws->pull, channel, slot, v3_add(rows_gather(&ws->pull, channel, slot), end->position), attached);
     }
 }
 
 // The same of one point p of the ray along d, given dp and the part of it that the end asks for.
 static void ride_add_point(const Tracer *t, const RecordBatch *batch, int channel, Int slot, Vec3 p, Vec3 d, Vec3 dp, Vec3 attached,
                            Sink *sink, Mask m) {
-    Glide end = {.ref = glide_reference(t, slot, p), .d = d}, all = {.ref = p, .d = d, .turn = v3_zero()};
+    Glide end = {.ref = ride_reference(t, slot, p, m), .d = d}, all = end;
     glide_add(&end, p, attached, m);
-    all.position = v3_select(m, dp, v3_zero());
+    glide_add(&all, p, dp, m);
     ride_add(t, batch, channel, slot, &all, &end, sink, m);
 }
 
@@ -240,8 +250,9 @@ static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     }
 }
 
-// What a border's motion along the ray brings, of which *lost is what the radiance from beyond it loses.
-static NOINLINE Spec border_jump(const Tracer *t, const RecordBatch *batch, const BorderSurface *s, Spec radiance, Spec *lost) {
+// What a border's motion along the ray brings; *lost: what of that the attached part of the radiance from beyond it loses.
+static NOINLINE Spec border_jump(const Tracer *t, const RecordBatch *batch, const BorderSurface *s, Spec radiance, Spec attached,
+                                 Spec *lost) {
     Spec jump = spec_zero();
     *lost = spec_zero();
     for (int side = 0; side < 2; side++) {
@@ -252,7 +263,7 @@ static NOINLINE Spec border_jump(const Tracer *t, const RecordBatch *batch, cons
             Filling f = medium_filling(t, id, s->p[side], s->d);
             Spec gain = border_gain(&f, border_scattered(t, batch, side, s->slot, mine), radiance);
             jump = spec_add(jump, spec_zero_unless(mine, spec_scale(gain, sign)));
-            *lost = spec_sub(*lost, spec_zero_unless(mine, spec_scale(spec_mul(f.extinction, radiance), sign)));
+            *lost = spec_sub(*lost, spec_zero_unless(mine, spec_scale(spec_mul(f.extinction, attached), sign)));
         }
     }
     return jump;
@@ -260,7 +271,9 @@ static NOINLINE Spec border_jump(const Tracer *t, const RecordBatch *batch, cons
 
 static void border_surface_sweep(Tracer *t, const RecordBatch *batch, Spec suffix, Mask finite, Sink *sink) {
     BorderSurface s = border_surface(t, batch);
-    Spec lost, jump = border_jump(t, batch, &s, spec_mul(spec_load(t->ws.records.weight, batch->first), suffix), &lost);
+    Spec weight = spec_load(t->ws.records.weight, batch->first), lost;
+    Spec attached = spec_mul(weight, spec_gather(t->ws.attached, s.slot));
+    Spec jump = border_jump(t, batch, &s, spec_mul(weight, suffix), attached, &lost);
     Mask m = s.m & finite & m_finite(spec_sum(jump));
     for (int c = 0; c < drives(t); c++) {
         Float dx = spec_dot(spec_mul(slot_adjoint(t, s.slot, c), s.beta), jump);
@@ -333,8 +346,9 @@ static void border_box_offer(Tracer *t, const RecordBatch *batch) {
     }
 }
 
-// onward, emission: what the flight's end and its way bring.
-static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, Spec emission, Mask finite, Sink *sink) {
+// onward, emission: what the flight's end and its way bring; attached: the part of the former that is attached to the end.
+static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, Spec attached, Spec emission, Mask finite,
+                             Sink *sink) {
     BorderBox b = border_box(t, batch);
     Spec gain[2];
     for (int k = 0; k < 2; k++) {
@@ -355,10 +369,9 @@ static void border_box_sweep(Tracer *t, const RecordBatch *batch, Spec onward, S
                 glide_add(&g, b.p[k], v3_neg(face_turn(b.face + k, b.d, dx)), b.face[k].m);
                 glide_store(t, &g, c, b.slot, b.face[k].m);
             } else if (t->job->rides) {
-                Float end = spec_dot(delta, spec_mul(b.inside[k].extinction, onward));
-                Vec3 all = face_turn(b.face + k, b.d, dx);
-                Vec3 attached = face_turn(b.face + k, b.d, k ? -end : end);
-                ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(attached), sink, b.face[k].m);
+                Float lost = spec_dot(delta, spec_mul(b.inside[k].extinction, attached));
+                Vec3 all = face_turn(b.face + k, b.d, dx), end = face_turn(b.face + k, b.d, k ? -lost : lost);
+                ride_add_point(t, batch, c, b.slot, b.p[k], b.d, v3_neg(all), v3_neg(end), sink, b.face[k].m);
             }
         }
         forward_flush(t, sink, b.slot, c, b.m);

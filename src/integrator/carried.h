@@ -20,6 +20,15 @@ static void camera_move_adj(const Tracer *t, Int slot, Vec3 target, const Carrie
                    m);
 }
 
+// Keeps points of rays that are attached to nothing (path_move.h).
+KFN void next_point(const Tracer *t, Int slot, Vec3 p, Mask m) {
+    const Workspace *ws = &t->ws;
+    i_scatter(ws->next, slot, i_set(NEXT_POINT), m);
+    f_scatter(ws->next_px, slot, p.x, m);
+    f_scatter(ws->next_py, slot, p.y, m);
+    f_scatter(ws->next_pz, slot, p.z, m);
+}
+
 // The lanes of a batch's records that lie on the sensor's ray, or at its end, where surfaces move in media.
 KFN Mask records_first(const Tracer *t, const RecordBatch *batch, Mask m) {
     return m & mi_eq(i_load(t->ws.records.depth + batch->first), i_set(0));

@@ -130,7 +130,7 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         }
     }
     if (t->job->rides) {
-        ride_collision(t, slot, s.m);
+        ride_collision(t, slot, s.hit.p, s.m);
     } else if (glides) {
         glide_refer(t, slot, s.hit.p, finite);
     }

@@ -73,6 +73,7 @@ typedef struct FlightAdj {
     FlightSweep f;
     const MediumNode *medium;
     Spec onward, emission;       // light from the flight's end, and from the way
+    Spec attached;               // the part of the former that is attached to it (path_move.h)
     Float emission_at;
     Spec emission_weight;
     Float point[FLIGHT_POINTS];
@@ -87,6 +88,7 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     const int32_t at = batch->first;
     FlightAdj a = {.f = flight_load(t, batch), .medium = scene->media + batch->group};
     a.onward = spec_mul(spec_load(ws->records.weight, at), suffix);
+    a.attached = t->job->rides ? spec_mul(spec_load(ws->records.weight, at), spec_gather(ws->attached, a.f.slot)) : a.onward;
     a.emission = spec_load(ws->records.local, at);
     a.emission_at = f_load(ws->records.u + at);
     a.emission_weight = spec_load(ws->records.light_weight, at);
@@ -145,7 +147,7 @@ KFN void flight_point_adj(const Tracer *t, const FlightAdj *a, int part, Float a
     }
 }
 
-// g: null unless the ray moves; end: of attached lanes, what the radiance of their end asks for alone (ride_add), else null.
+// g: null unless the ray moves; end: of attached lanes, what their end asks for alone (ride_add), else null.
 static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t live, Spec delta, Glide *g, Glide *end, Sink *sink) {
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, a->f.beta);
@@ -157,7 +159,7 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
             Spec lost = spec_scale(spec_mul(worth, spec_add(a->onward, behind)), -each);
             flight_point_adj(t, a, LOSS, a->point[k], lost, g, sink, m);
             if (end) {
-                flight_point_glide(t, a, LOSS, a->point[k], spec_scale(spec_mul(worth, a->onward), -each), end, m);
+                flight_point_glide(t, a, LOSS, a->point[k], spec_scale(spec_mul(worth, a->attached), -each), end, m);
             }
         }
         flight_point_adj(t, a, GAIN, a->end, spec_mul(worth, a->hit), g, sink, a->collided);
@@ -186,9 +188,9 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
     a.probed = a.probed & finite;
     a.collided = a.collided & finite;
     const bool glides = t->job->glides, rides = t->job->rides;
-    Vec3 ref = glides ? glide_reference(t, slot, a.f.o) : a.f.o;
+    Vec3 ref = rides ? ride_reference(t, slot, a.f.o, a.f.m) : glide_reference(t, slot, a.f.o);
     for (int c = 0; c < drives(t); c++) {
-        Glide g = {.ref = ref, .d = a.f.d}, end = {.ref = glide_reference(t, slot, ref), .d = a.f.d};
+        Glide g = {.ref = ref, .d = a.f.d}, end = g;
         if (glides) {
             g = glide_load(t, c, slot, ref, a.f.d);
         }
@@ -205,7 +207,7 @@ static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suf
         glide_refer(t, slot, ref, a.f.m);
     }
     if (live & LIVE_BORDER) {
-        border_box_sweep(t, batch, a.onward, a.emission, finite, sink);
+        border_box_sweep(t, batch, a.onward, a.attached, a.emission, finite, sink);
     }
 }
 

@@ -294,27 +294,25 @@ static void rung_store(Tracer *t, int32_t rung) {
 static void fork_store(Tracer *t, int32_t count) {
     const Paths *next = &t->ws.paths[1 - t->current];
     for (int c = 0; c < SPEC_N; c++) {
-        memcpy(t->fork->base[c], t->ws.radiance[c], CHUNK * sizeof(real));
+        memcpy(t->fork->first[c], t->ws.radiance[c], CHUNK * sizeof(real));
     }
-    memset(t->fork->chained, 0, CHUNK * sizeof(int32_t));
     for (int32_t k = 0; k < count; k += LANES) {
         Mask m = m_first_n(count - k);
-        i_scatter(t->fork->chained, i_select(m, i_load(next->slot + k), i_set(0)), i_set(1),
+        i_scatter(t->fork->way, i_select(m, i_load(next->slot + k), i_set(0)), i_set(FORK_CHAIN),
                   m & m_eq(f_load(next->pdf + k), f_set(PDF_DELTA)));
     }
 }
 
-// The same in media: which paths collide first. All that they bring is theirs; others have brought what media sent out on
+// In media, before that: which paths collide first. All that they bring is theirs; others have brought what media sent out on
 // their way.
 static void fork_air(Tracer *t) {
     const Paths *p = &t->ws.paths[t->current];
     for (int c = 0; c < SPEC_N; c++) {
-        memcpy(t->fork->base[c], t->ws.radiance[c], CHUNK * sizeof(real));
+        memcpy(t->fork->air[c], t->ws.radiance[c], CHUNK * sizeof(real));
     }
-    memset(t->fork->chained, 0, CHUNK * sizeof(int32_t));
     for (int32_t k = 0; k < t->active; k += LANES) {
         Mask m = m_first_n(t->active - k);
-        i_scatter(t->fork->chained, i_select(m, i_load(p->slot + k), i_set(0)), i_set(1),
+        i_scatter(t->fork->way, i_select(m, i_load(p->slot + k), i_set(0)), i_set(FORK_AIR),
                   m & mi_lt(i_set((int32_t)t->scene->groups_count), i_load(t->ws.hit_group + k)));
     }
 }
@@ -366,7 +364,7 @@ static void path_forward(Tracer *t, int32_t *begin) {
             rung_store(t, bounce - t->first_bounce);
         }
         shadow_stage(t, bounce);
-        if (t->fork && bounce == t->first_bounce && !scene->has_media) {
+        if (t->fork && bounce == t->first_bounce) {
             fork_store(t, next_count);
         }
         t->current = 1 - t->current;

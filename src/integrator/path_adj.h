@@ -170,7 +170,8 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, 
     if ((job->watch_turned || job->watch_smooth) && (live & (LIVE_SCATTERING | LIVE_MOTION)) && !batch->ends) {
         watch_normals(t, s, sink);
     }
-    if ((job->any_motion || job->any_places) && s->first && m_any(s->scattered & s->chained)) {
+    Mask seen = t->scene->has_media ? records_first(t, batch, s->m) : m_set(s->first);
+    if ((job->any_motion || job->any_places) && m_any(seen & s->scattered & s->chained)) {
         sink->faces |= CAMERA_MIRRORED;
     }
     if (t->scene->through) {

@@ -247,7 +247,7 @@ static NOINLINE void chain_move_adj(const Tracer *t, const SurfaceSweep *s, Spec
     Vec3 drag = rows_gather(&ws->drag, channel, s->slot), turn = rows_gather(&ws->turn, channel, s->slot);
     // The ray's position at the next vertex is p + distance d'; behind an environment there is none.
     Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, s->slot);
-    Mask meets = mi_lt(i_set(-1), i_gather(ws->next, s->slot));
+    Mask meets = ~mi_eq(i_gather(ws->next, s->slot), i_set(NEXT_NONE));
     Vec3 dd = v3_select(meets, v3_madd(turn, v3_length(v3_sub(q, s->si.p)), drag), turn);
     VertexAdj d;
     vertex_adj_clear(&d, true);
@@ -288,7 +288,9 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     }
     rows_scatter(&t->ws.back, channel, s->slot, back, s->m);
     rows_scatter(&t->ws.drag, channel, s->slot, carried.drag, s->m);
-    rows_scatter(&t->ws.turn, channel, s->slot, carried.turn, s->m);
+    // Rays that keep their direction are not turned, and what turns attached ones is kept there instead (ride_add).
+    Vec3 turn = v3_select(s->slides | m_set(!rides), carried.turn, v3_zero());
+    rows_scatter(&t->ws.turn, channel, s->slot, turn, s->m);
     if (rides) {
         rows_scatter(&t->ws.pull, channel, s->slot, v3_zero(), s->m);
     }

@@ -48,8 +48,8 @@ static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, co
 }
 
 // A collision has no point of a surface to which the vertex before it could be attached: it rides with that one.
-KFN void ride_collision(Tracer *t, Int slot, Mask m) {
-    i_scatter(t->ws.next, slot, i_set(-1), m);
+KFN void ride_collision(Tracer *t, Int slot, Vec3 p, Mask m) {
+    next_point(t, slot, p, m);
     spec_scatter(t->ws.attached, slot, spec_zero(), m);
 }
 
@@ -62,29 +62,32 @@ KFN void ride_flight(Tracer *t, const RecordBatch *batch, Int slot, Mask m) {
 }
 
 // The ends of rays at a batch of surface vertices, from which `radiance` leaves. Adds what that asks of the rays to their drag.
+// What is attached there asks for the length of attached rays, what goes on along chains for where they slide.
 static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec radiance, Mask finite, Sink *sink) {
     if (!t->job->rides) {
         return;
     }
     BorderSurface s = border_surface(t, batch);
     Mask slides = mi_eq(i_load(t->ws.records.slides + batch->first), i_set(1));
-    Spec gain = spec_zero(), lost = gain;
+    Spec gain = spec_zero(), extinction = gain, lost;
+    Spec attached = spec_zero_unless(~slides, spec_gather(t->ws.attached, s.slot));
     for (Mask left = s.m & mi_lt(i_set(-1), s.medium[0]), mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(s.medium[0], m_first(left));
         mine = left & mi_eq(s.medium[0], i_set(id));
         Filling f = medium_filling(t, id, s.p[0], s.d);
         Spec scattered = border_scattered(t, batch, 0, s.slot, mine);
         gain = spec_select(mine, spec_add(spec_mul(f.extinction, scattered), f.emission), gain);
-        lost = spec_select(mine, spec_mul(f.extinction, radiance), lost);
+        extinction = spec_select(mine, f.extinction, extinction);
     }
+    gain = spec_sub(gain, spec_mul(extinction, spec_sub(radiance, attached)));
+    lost = spec_mul(extinction, attached);
     Mask m = s.m & finite & m_finite(spec_sum(gain) + spec_sum(lost));
     for (int c = 0; c < drives(t); c++) {
         Spec worth = spec_mul(slot_adjoint(t, s.slot, c), s.beta);
         Float dx = spec_dot(worth, gain), length = spec_dot(worth, lost);
-        dx = f_select(slides, dx - length, dx);
         SurfaceAdj d = surface_adj_zero();
         d.p = v3_scale(s.si.ng, dx * s.rcp);
-        d.p = v3_select(m, v3_madd(d.p, f_zero_unless(~slides, -length), s.d), v3_zero());
+        d.p = v3_select(m, v3_madd(d.p, -length, s.d), v3_zero());
         if (t->job->live[batch->group] & LIVE_MOTION) {
             shape_move_adj(t->scene, s.group->shape_kind, s.group->shape_flags, &s.hit, &s.si, &d, sink, m);
         }

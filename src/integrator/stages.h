@@ -25,12 +25,13 @@ KFN uint32_t dimension(int32_t bounce, uint32_t purpose) { return (uint32_t)boun
 // Lobes whose own weight is 0 are still selected with this probability when derivatives are estimated.
 #define DERIVATIVE_FLOOR 0.05f
 
-// Of paths that begin within the scene: what their first vertex brings without going on, and whether they go on in a
-// direction that follows from how they came.
+// Of paths that begin within the scene: what media on the way to their first vertex and that vertex bring without their going on,
+// what media alone, and whether it is a collision, or goes on in a direction that follows from how they came.
 typedef struct Fork {
-    SpecRows base;
-    int32_t *chained;
+    SpecRows first, air;
+    int32_t *way;
 } Fork;
+enum { FORK_CHAIN = 1, FORK_AIR = 2 };
 
 typedef struct Tracer {
     PathJob *job;

@@ -75,6 +75,9 @@ typedef struct ChannelRows {
     real *x[SPEC_N], *y[SPEC_N], *z[SPEC_N];
 } ChannelRows;
 
+// What stands for the record of the next vertex where rays meet no surface: nothing, or a point of the ray, such as a collision.
+enum { NEXT_NONE = -1, NEXT_POINT = -2 };
+
 typedef struct Workspace {
     Paths paths[2];
     Shadows shadows;
@@ -90,7 +93,7 @@ typedef struct Workspace {
     SpecRows radiance, adjoint, suffix;
     SAMPLE_FLOATS(DECLARE_FLOAT)
     int32_t *pixel, *sample;
-    // per slot, of the vertex that the sweep has just left (path_move.h): its record (-1: none), position and normal, what
+    // per slot, of the vertex that the sweep has just left (path_move.h): its record (or NEXT_), position and normal, what
     // leaves it but does not go on along a chain, and per channel the adjoint of the direction back to the vertex before it,
     // and where the vertex slides, of the ray's position there and of its direction; where it is attached in media, of points on
     // the way to it, and of these times their distance beyond it (ride_add)

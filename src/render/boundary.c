@@ -52,15 +52,17 @@ int rey_boundary_term(int32_t kind) {
     }
 }
 
-// Whether paths go on from surfaces in directions that follow from how they came.
-static bool has_chains(const SceneView *view) { return rey_bsdfs_used(view, rey_bsdf_bends); }
+// Whether paths go on from surfaces in directions that follow from how they came. In media, surfaces of the kind null are passed by
+// all (sightline.h, leg.h).
+static bool has_chains(const SceneView *view) {
+    return rey_bsdfs_used(view, view->has_media ? rey_bsdf_mirrors : rey_bsdf_bends);
+}
 
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const bool passed = view->through && rey_bsdfs_used(view, rey_bsdf_opens);
+    const bool passed = view->through && rey_bsdfs_used(view, view->has_media ? rey_bsdf_veils : rey_bsdf_opens);
     const char *what = !rey_boundary_sees(sensor) ? "this sensor"
-                       : view->has_media      ? "participating media"
                        : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
                        : step                 ? step
                        : !has_chains(view)    ? "functions that let light pass"
@@ -93,7 +95,7 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
 // those that stand still.
 static rey_result check_borders(rey_scene *scene, int term) {
     Array meetings = {0};
-    rey_result result = rey_meetings_with_borders(scene, moves_always, NULL, &meetings);
+    rey_result result = rey_meetings_with_borders(scene, NULL, 0, moves_always, NULL, &meetings);
     for (size_t i = 0; i < meetings.count && result == REY_OK; i++) {
         const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, i);
         if (m->shape[1] < 0) {
@@ -306,11 +308,12 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     }
     // In media only edges are known; what else there is does not depend on lights, and is refused where surfaces move.
     bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || !r->scene->view.has_media;
+    bool chains = rey_chains_known(&r->scene->view, r->plan.sensor) && (rides || !r->scene->view.has_media);
     known |= rides && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_HORIZON);
     known |= rides && kind == BOUNDARY_MEETING;
     int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
-        edge_count = (r->job.any_motion || r->lines) && rey_chains_known(&r->scene->view, r->plan.sensor);
+        edge_count = (r->job.any_motion || r->lines) && chains;
     }
     edge_count = kind == BOUNDARY_FACING_VIEW ? 1 : edge_count;
     edge_count = kind == BOUNDARY_CHAINED_FACING && !has_chains(&r->scene->view) ? 0 : edge_count;
@@ -330,8 +333,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none,
                               .everywhere = r->turns_rays || r->lines, .lines = r->lines,
-                              .chains = boundary_is_rim(kind) ? has_chains(&r->scene->view)
-                                                              : rey_chains_known(&r->scene->view, r->plan.sensor),
+                              .chains = boundary_is_rim(kind) ? has_chains(&r->scene->view) : chains,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
     plan->job.job.y = r->plan.y;

@@ -18,13 +18,13 @@ static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
 
 static bool light_moves(const Render *r, int32_t light) {
     bool moves = false;
-    for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
+    for (int k = 0; k < MAX_EMITTER_SLOTS && light >= 0; k++) {
         moves |= r->job.place_at[MAX_EMITTER_SLOTS * light + k] >= 0;
     }
     return moves;
 }
 
-// The same, as the sensor sees it; id -1: of a light.
+// The same, as the sensor sees it; id -1: of a light, or a plane that moves with the sensor.
 static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
     return r->job.any_camera || (id < 0 ? light_moves(r, instance) : shape_moves_itself(r, id, instance));
@@ -46,6 +46,12 @@ static bool meeting_moves(const Render *r, const EdgeRecord *e) {
     const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
     return shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]) ||
            (m->shape[1] < 0 && light_moves(r, m->prim[1]));
+}
+
+// Whether it is where a plane cuts what the sensor sees.
+static bool clips(const Render *r, const EdgeRecord *e) {
+    const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
+    return m->shape[1] < 0 && m->prim[1] < 0;
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
@@ -146,6 +152,9 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     bool crosses = e->kind == EDGE_MEETING, still = crosses && !meeting_moves(r, e);
+    if (crosses && w->kind != BOUNDARY_PRIMARY && clips(r, e)) {
+        return 0;
+    }
     if (w->kind == BOUNDARY_PRIMARY) {
         return still && !r->job.any_camera ? 0 : rey_edge_on_film(r, &w->projection, w->eye, e);
     }
@@ -163,8 +172,10 @@ static bool seen_moving(const void *render, int32_t id, int32_t instance) {
 }
 
 static rey_result find_meetings(Render *r) {
+    LightBorder clip[4];
     r->meetings_found = true;
-    return rey_meetings_with_borders(r->scene, seen_moving, r, &r->meetings);
+    rey_clip_borders(&r->scene->view, &r->plan, clip);
+    return rey_meetings_with_borders(r->scene, clip, 4, seen_moving, r, &r->meetings);
 }
 
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.

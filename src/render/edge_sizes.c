@@ -163,7 +163,9 @@ static double see_meeting(const Render *r, const Projection *p, EdgeRecord *e) {
     for (int k = 0; k < 6; k++) {
         ends[k / 3][k % 3] = (double)m->ends[k];
     }
-    return rey_see_line(p, ends[0], ends[1], e);
+    Projection see = *p;
+    see.near *= m->shape[1] < 0 && m->prim[1] == BORDER_NEAR ? 0.999 : 1; // on which its own curves lie
+    return rey_see_line(&see, ends[0], ends[1], e);
 }
 
 // The world point of a mark's end.

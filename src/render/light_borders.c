@@ -156,9 +156,13 @@ static void leave_out_passed(const SceneView *view, Array *meetings) {
     meetings->count = view->has_media ? kept : meetings->count;
 }
 
-rey_result rey_meetings_with_borders(rey_scene *scene, MeetingMoves *moves, const void *user, Array *meetings) {
+rey_result rey_meetings_with_borders(rey_scene *scene, const LightBorder *clips, int clip_count, MeetingMoves *moves,
+                                     const void *user, Array *meetings) {
     Array borders = {0};
     rey_result result = find_borders(scene, &borders);
+    for (int i = 0; i < clip_count && result == REY_OK; i++) {
+        result = push_border(scene, &borders, clips[i]);
+    }
     if (result == REY_OK) {
         result = rey_meetings_find(scene, borders.data, (int32_t)borders.count, moves, user, meetings);
     }

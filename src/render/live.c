@@ -1,7 +1,9 @@
 // live.c: follows textures and nested scattering functions to find what depends on a selection.
 #include "render/live.h"
 
+#include "bsdf/table.h"
 #include "emitter/table.h"
+#include "render/blame.h"
 
 static bool texture_live(const SceneView *view, const PathJob *job, int32_t id) {
     if (id < 0) {
@@ -71,7 +73,7 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
         albedo |= volume_varies(view, medium->albedo);
         emission |= volume_varies(view, medium->emission);
         borders = true;
-        phase |= job->any_camera; // which then sees collisions from another side
+        phase |= job->any_camera || rey_bsdfs_used(view, rey_bsdf_mirrors); // which show collisions from another side
     }
     return (extinction ? LIVE_EXTINCTION : 0) | (albedo ? LIVE_ALBEDO : 0) | (phase ? LIVE_PHASE : 0) |
            (emission ? LIVE_GLOW : 0) | (medium->bounded && borders ? LIVE_BORDER : 0);

@@ -110,18 +110,15 @@ int32_t *rey_motion_slot(Render *r, const Param *p) {
     if (p->geometry >= 0) {
         bool pose = p->theta == view->shapes[p->geometry].to_world;
         *moves = true;
-        job->rides = job->any_motion && view->has_media;
         return (int32_t *)(uintptr_t)(pose ? job->pose_at : job->points_at) + p->geometry;
     }
     if (p->instance >= 0) {
         *moves = true;
-        job->rides = job->any_motion && view->has_media;
         return (int32_t *)(uintptr_t)job->instance_at + p->instance;
     }
     int32_t part = p->camera >= 0 ? camera_part(view, r->plan.sensor, p) : -1;
     if (part >= 0) {
         *(rey_cameras_glide(view) ? &job->glides : &job->any_motion) = true;
-        job->rides = job->any_motion && view->has_media;
         job->any_camera = true;
         return (int32_t *)(uintptr_t)job->camera_at + part * CAMERA_NUMBERS + p->camera;
     }
@@ -132,8 +129,9 @@ static bool normals_follow(const Render *r, int64_t shape) {
     return r->job.points_at[shape] >= 0 && (r->scene->view.shapes[shape].flags & SHAPE_SMOOTH_NORMALS);
 }
 
-void rey_motion_share_places(Render *r) {
+void rey_motion_settle(Render *r) {
     const SceneView *view = &r->scene->view;
+    r->job.rides = r->job.any_motion && view->has_media;
     int32_t *volume_at = (int32_t *)(uintptr_t)r->job.volume_at;
     for (int64_t i = 0; i < view->volumes_count && r->job.any_volumes; i++) {
         for (int64_t k = 0; k < view->volumes_count && view->volumes[i].to_world >= 0; k++) {

@@ -26,8 +26,9 @@ int32_t rey_motion_cameras(const SensorRecord *s);
 // Where the job notes that the values of such a parameter are selected; null when they do nothing to what the sensor sees.
 int32_t *rey_motion_slot(Render *r, const Param *p);
 
-// Volumes of one place (the pair of build_scattering.c and its sum) move together.
-void rey_motion_share_places(Render *r);
+// What follows from all that is selected: whether collisions ride, and volumes of one place (the pair of build_scattering.c and its
+// sum), which move together.
+void rey_motion_settle(Render *r);
 
 // Vertex normals that follow selected vertices (SHAPE_SMOOTH_NORMALS) get room behind the selection, from *size on.
 void rey_motion_add_normals(Render *r, int64_t *size);

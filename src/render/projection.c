@@ -16,7 +16,8 @@ double rey_pose_size(const float *m) {
 
 Projection rey_projection_of(const SceneView *view, const FilmPlan *plan) {
     const SensorRecord *s = plan->sensor;
-    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
+    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .far = (double)s->far_clip,
+                    .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
                     .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
     rey_affine_inverse(view->theta + s->to_world, p.inverse);
     p.lens = p.pinhole ? 0 : 3 * rey_pose_size(view->theta + s->to_world) * (double)view->theta[s->lens];
@@ -30,6 +31,30 @@ Projection rey_projection_of(const SceneView *view, const FilmPlan *plan) {
     p.high_x = plan->x + plan->width;
     p.high_y = plan->y + plan->height;
     return p;
+}
+
+void rey_clip_borders(const SceneView *view, const FilmPlan *plan, LightBorder borders[4]) {
+    static const double corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    static const int triangles[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    const Projection p = rey_projection_of(view, plan);
+    const float *m = view->theta + plan->sensor->to_world;
+    const double middle[2] = {0.5 * (p.low_x + p.high_x), 0.5 * (p.low_y + p.high_y)};
+    for (int i = 0; i < 4; i++) {
+        double z = i < 2 ? p.near : p.far, spread = p.parallel ? 1 : z;
+        borders[i] = (LightBorder){.light = i < 2 ? BORDER_NEAR : BORDER_FAR};
+        for (int k = 0; k < 3; k++) { // with room around what the film sees
+            const double *corner = corners[triangles[i % 2][k]];
+            double x = middle[0] + 1.1 * (p.low_x + corner[0] * (p.high_x - p.low_x) - middle[0]);
+            double y = middle[1] + 1.1 * (p.low_y + corner[1] * (p.high_y - p.low_y) - middle[1]);
+            double local[3] = {(x - p.shift_x) / p.scale_x * spread, (y - p.shift_y) / p.scale_y * spread, z};
+            local[0] += p.pinhole ? 0 : (2 * corner[0] - 1) * (p.scale_x > 0 ? 1 : -1) * p.lens;
+            local[1] += p.pinhole ? 0 : (2 * corner[1] - 1) * (p.scale_y > 0 ? 1 : -1) * p.lens;
+            for (int c = 0; c < 3; c++) {
+                borders[i].p[k][c] = (float)((double)m[4 * c] * local[0] + (double)m[4 * c + 1] * local[1] +
+                                             (double)m[4 * c + 2] * local[2] + (double)m[4 * c + 3]);
+            }
+        }
+    }
 }
 
 void rey_to_sensor(const Projection *p, const double *world, double *out) {

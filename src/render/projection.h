@@ -3,15 +3,18 @@
 
 #include "render/film.h"
 #include "shape/edges.h"
+#include "shape/meetings.h"
 
 typedef struct Projection {
     double inverse[12];     // of the sensor's pose
     double scale_x, scale_y, shift_x, shift_y; // pixels per slope, and the centre
     double low_x, low_y, high_x, high_y;       // what of the film counts [pixels]
-    double near, lens; // lens: no point of it is further from the middle
+    double near, far, lens; // lens: no point of it is further from the middle
     bool parallel, pinhole;
 } Projection;
 
+// The planes that cut what the film sees, two triangles each.
+void rey_clip_borders(const SceneView *view, const FilmPlan *plan, LightBorder borders[4]);
 // Largest entry of a pose's linear part.
 double rey_pose_size(const float *m);
 Projection rey_projection_of(const SceneView *view, const FilmPlan *plan);

@@ -292,7 +292,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         }
     }
     r->selection_size = at;
-    rey_motion_share_places(r);
+    rey_motion_settle(r);
     rey_motion_add_normals(r, &at);
     rey_dropped_add_sky(r, &at);
     r->gradient_size = at;

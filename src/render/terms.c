@@ -141,10 +141,9 @@ static const char *gap_of_rides(const SceneView *view) {
         if (passes && shape->emitter >= 0) {
             return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
         }
-        if (!passes && (rey_bsdf_holds(view, shape->bsdf, rey_bsdf_opens) || rey_bsdf_holds(view, shape->bsdf, rey_bsdf_bends))) {
-            return "in scenes with participating media, what moves changes the ways through masks and thin glass and those along "
-                   "smooth mirrors and glass. Known are volumes, lights, and what moves among surfaces that all scatter or are of "
-                   "the kind 'null', at which media end";
+        if (!passes && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_veils)) {
+            return "in scenes with participating media, what moves changes the ways through masks and thin glass. Known are "
+                   "volumes, lights, and what moves among surfaces of other kinds";
         }
     }
     if (has_projector(view)) {
@@ -182,8 +181,8 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     if (p->geometry >= 0 || p->instance >= 0) {
         return gap_of_rides(view);
     }
-    if (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR)) {
-        return "in scenes with participating media, rays that turn at smooth mirrors and glass pass the edges of what they see";
+    if (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR)) { // which turns rays at smooth mirrors and glass
+        return gap_of_rides(view);
     }
     if (p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) && has_jumping_media(view)) {
         return "in participating media with filter_type=\"nearest\", light that moves passes jumps from voxel to voxel";

@@ -9,6 +9,9 @@ typedef struct Quadric {
     float matrix[6]; // xx yy zz yz zx xy
 } Quadric;
 
+// Planes that cut what the sensor sees, in the place of a light's number: near_clip and far_clip.
+enum { BORDER_NEAR = -1, BORDER_FAR = -2 };
+
 // A triangle of the surface, in the air, at which the light of a lamp ends or jumps; of a cone, between two of its lines.
 typedef struct LightBorder {
     float p[3][3];
@@ -19,13 +22,13 @@ typedef struct LightBorder {
 
 // A piece of such a curve, close to the straight line between its ends.
 typedef struct MeetingRecord {
-    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, and prim its light; prim of meshes and tubes: triangle, segment
+    int32_t shape[2], prim[2]; // second shape -1: a LightBorder, prim its light or BORDER_; of meshes and tubes: triangle, segment
     int32_t instance[2]; // of shapes with SHAPE_INSTANCED, else 0
     float ends[6];       // two points
     Quadric surface[2];
 } MeetingRecord;
 
-// Whether a shape (of an instance) can move; shape -1: the light with the number `instance`.
+// Whether a shape (of an instance) can move; shape -1: the light with the number `instance`, or BORDER_.
 typedef bool MeetingMoves(const void *user, int32_t shape, int32_t instance);
 
 // Appends the curves of all surfaces of which at least one moves to `meetings`, an Array of MeetingRecord. What touches without

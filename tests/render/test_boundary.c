@@ -187,7 +187,8 @@ static void test_modes(void **state) {
         ramp[i] = (float)(i / 3 % SIZE) / SIZE - 0.3f * (float)(i % 3);
     }
     const bool chains = begins_with(m->room, "mirror_") || begins_with(m->room, "seen_") || begins_with(m->room, "smooth_");
-    const int all = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | (chains ? REY_TERM_SPECULAR : 0);
+    const int specular = chains ? REY_TERM_SPECULAR : info.terms & REY_TERM_SPECULAR;
+    const int all = REY_TERM_INTERIOR | REY_TERM_PRIMARY | REY_TERM_INDIRECT | specular;
     const int asked = all | rey_terms_stated(room.scene, 0, info.terms & REY_TERM_TERMINATOR);
     for (int term = REY_TERM_INTERIOR; term <= asked; term *= 2) {
         if (!(term & asked)) {

@@ -41,7 +41,7 @@ static Mask chained_between(Tracer *t, const Segment *s, Vec3 near, Mask m, Floa
     *behind = f_select(m, v3_length(v3_sub(near, e->p)), f_set(1));
     Float step = chained_step(e->p, e->meeting);
     Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, step, 0), chained_ray(e->p, s->d, s->n, *behind, step, 1)};
-    return edge_between(t, e, s->silhouette, s->n, rays, m);
+    return edge_between(t, e, false, s->silhouette, s->n, rays, m);
 }
 
 // Stores the segments of m, in any direction. Where surfaces pass through each other, the edge moves with both (meeting.h): `far`

@@ -4,6 +4,7 @@
 #include "integrator/boundary/facet.h"
 #include "integrator/boundary/mark.h"
 #include "integrator/boundary/round.h"
+#include "integrator/boundary/view.h"
 
 // How many steps of rays that start above a surface (interaction_step) paths keep off the curves along which surfaces meet, so that
 // those that one surface lets pass meet the other one behind it.
@@ -296,25 +297,26 @@ static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, con
     return silhouette;
 }
 
-// Lanes of m in which nothing hides the edge's point itself.
-static Mask edge_is_seen(Tracer *t, const EdgePoint *e, const Ray rays[2], Mask m) {
+// Lanes of m in which nothing hides the edge's point itself. viewed: from the sensor.
+static Mask edge_is_seen(Tracer *t, const EdgePoint *e, bool viewed, const Ray rays[2], Mask m) {
     Vec3 o = v3_scale(v3_add(rays[0].o, rays[1].o), f_set((real)0.5)), to = v3_sub(e->p, o);
     Float reach = v3_length(to);
     Ray ray = {o, v3_scale(to, f_safe_rcp(reach)), f_set(INFINITY)};
-    Hit hit = trace_solid(t->scene, &ray, m);
-    t->job->rays += m_count(m);
+    Int unused = i_set(0);
+    Hit hit = view_meet(t, &ray, viewed, m, &unused);
     Mask own = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance) &
                (e->round | mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other));
     return m & (mi_lt(hit.shape, i_set(0)) | own | m_gt(v3_dot(v3_sub(hit.p, o), ray.d), reach * (1.0f - 1e-4f)));
 }
 
 // Lanes of m in which two rays, the second one on the side of n, pass an edge between the surfaces that meet or end there. Next
-// to a corner a path may miss them; what it meets instead belongs to another edge's jump.
-static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
+// to a corner a path may miss them; what it meets instead belongs to another edge's jump. viewed: they come from the sensor.
+static Mask edge_between(Tracer *t, const EdgePoint *e, bool viewed, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
+    Int unused = i_set(0);
     Mask own[2], clear[2], grazed[2], above = m_gt(edge_first_rise(e, n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
-        Hit hit = trace_solid(t->scene, &ray, m);
+        Hit hit = view_meet(t, &ray, viewed, m, &unused);
         Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
         // Surfaces that pass through each other are met where the ray is as far from the curve, by the angle in which it does.
@@ -334,11 +336,10 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, Mask silhouette, Vec3 n,
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
         grazed[side] = ~clear[side] & m_gt(found, reach * (1.0f - 2e-2f));
     }
-    t->job->rays += 2 * m_count(m);
     // What the edge stands on is met just before it.
     Mask open = m & silhouette & ((above & own[1] & grazed[0]) | (~above & own[0] & grazed[1]));
     if (m_any(open)) {
-        Mask seen = edge_is_seen(t, e, rays, open);
+        Mask seen = edge_is_seen(t, e, viewed, rays, open);
         clear[0] = clear[0] | (seen & grazed[0]);
         clear[1] = clear[1] | (seen & grazed[1]);
     }

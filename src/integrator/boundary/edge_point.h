@@ -23,7 +23,7 @@ typedef struct EdgePoint {
     // Elsewhere 0.
     Vec3 normal, view, rise;
     Mask meeting;       // where the surface passes through that of the hit `met`, or through a light's border, where its
-                        // shape is -1 and its prim the light; across: the normals of both
+                        // shape is -1 and its prim the light or BORDER_; across: the normals of both
     Hit met;
     Vec3 across[2];
     Mask mark;          // a line of its surface's texture; beside: the points on both sides of it, the first one at side[0]
@@ -33,6 +33,11 @@ typedef struct EdgePoint {
     Int line;           // number of its mark, where its to_uv is selected, else -1
     Vec2 uv;
 } EdgePoint;
+
+// Lanes of curves along which a plane cuts what the sensor sees.
+KFN Mask edge_clips(const EdgePoint *e) {
+    return e->meeting & mi_lt(e->met.shape, i_set(0)) & mi_lt(e->met.prim, i_set(0));
+}
 
 // How narrow what is looked for on the film may be [pixels]: rounding of directions is some hundred times smaller.
 KFN real film_resolution(const SensorRecord *sensor) {

@@ -65,6 +65,9 @@ static void far_paths(Indirect *in, int32_t *begin) {
     for (int c = 0; c < SPEC_N; c++) {
         memset(t->ws.radiance[c], 0, CHUNK * sizeof(real));
     }
+    for (int32_t k = 0; k < t->active; k += LANES) { // they do not come from the sensor, from which lights may be hidden
+        f_store(t->ws.paths[0].pdf + k, f_set(PDF_DELTA));
+    }
     t->current = 0;
     t->record_count = t->batch_count = 0;
     t->overflow = false;
@@ -79,9 +82,10 @@ static void far_paths(Indirect *in, int32_t *begin) {
     t->job->paths += t->active;
     if (in->upstream) {
         t->fork = &q->fork;
-        memset(q->fork.chained, 0, CHUNK * sizeof(int32_t));
+        memset(q->fork.way, 0, CHUNK * sizeof(int32_t));
         for (int c = 0; c < SPEC_N; c++) {
-            memset(q->fork.base[c], 0, CHUNK * sizeof(real));
+            memset(q->fork.air[c], 0, CHUNK * sizeof(real));
+            memset(q->fork.first[c], 0, CHUNK * sizeof(real));
         }
     }
     path_forward(t, begin);
@@ -109,15 +113,17 @@ KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
 // first surface.
 KFN Spec far_chain(const Indirect *in, Int slot, int32_t bounce) {
     const Fork *fork = &in->q.fork;
-    Mask chained = mi_eq(i_gather(fork->chained, slot), i_set(1)) & m_set(far_rung(in, bounce) != 0);
-    Spec base = spec_gather(fork->base, slot), all = far_reflected(in, slot, bounce);
-    return in->t->scene->has_media ? spec_select(chained, all, base) : spec_zero_unless(chained, spec_sub(all, base));
+    Int way = i_gather(fork->way, slot);
+    Mask more = m_set(far_rung(in, bounce) != 0), chained = more & mi_eq(way, i_set(FORK_CHAIN));
+    Spec all = far_reflected(in, slot, bounce);
+    Spec chain = spec_zero_unless(chained, spec_sub(all, spec_gather(fork->first, slot)));
+    return spec_select(more & mi_eq(way, i_set(FORK_AIR)), all, spec_add(spec_gather(fork->air, slot), chain));
 }
 
 // What the surfaces that they meet first emit: what they brought with one segment, less what media sent out.
 KFN Spec far_emitted(const Indirect *in, Int slot) {
     Spec first = spec_gather(in->q.rungs, slot);
-    return in->upstream && in->t->scene->has_media ? spec_sub(first, spec_gather(in->q.fork.base, slot)) : first;
+    return in->upstream && in->t->scene->has_media ? spec_sub(first, spec_gather(in->q.fork.air, slot)) : first;
 }
 
 // What jumps at an edge along a chain: everything, if the near point is part of it. What far points on the lit side emit is

@@ -140,9 +140,19 @@ static Float glimpse_again(const Indirect *in, const SampleKey *key, Vec2 lens, 
     return count;
 }
 
+// A vertex of a particle that lines of sight are to lead to: on a surface, or a collision.
+typedef struct Glimpsed {
+    const Hit *hit;
+    Int slot;
+    Vec3 p;
+    bool air;
+} Glimpsed;
+
 // Adds what the motion of vertices at the ends of these lines is worth, drag: the adjoint of where the segment's line is there.
-static void glimpse_move_adj(const Tracer *t, const Glimpse *g, const Hit *hit, Vec3 drag, Vec2 lens, Sink *sink, Mask m) {
-    const Carried end = {rays_meet_adj(t, hit, g->d, drag, sink, m), v3_zero()};
+// Collisions lie at fixed distances on the lines.
+static void glimpse_move_adj(const Tracer *t, const Glimpse *g, const Glimpsed *at, Vec3 drag, Vec2 lens, Sink *sink, Mask m) {
+    const Hit *hit = at->hit;
+    const Carried end = {at->air ? drag : rays_meet_adj(t, hit, g->d, drag, sink, m), v3_zero()};
     Carried c = sightline_back(t, &g->line, g->turns, hit->p, &end, sink, m);
     if (sink->any_camera) {
         RayAdj adj = {g->line.hit[0].p, c.drag, c.turn};
@@ -151,17 +161,17 @@ static void glimpse_move_adj(const Tracer *t, const Glimpse *g, const Hit *hit, 
 }
 
 // What the vertices bring to the derivative, as near_book does.
-static void glimpse_book(Indirect *in, const Glimpse *g, const Landing *at, Spec l, Vec2 lens, int32_t bounce, Mask m) {
+static void glimpse_book(Indirect *in, const Glimpse *g, const Glimpsed *at, Spec l, Vec2 lens, int32_t bounce, Mask m) {
     Tracer *t = in->t;
     Segments *q = &in->q;
     const bool forward = in->b->job.mode == MODE_FORWARD;
-    Int slot = at->v.slot;
+    Int slot = at->slot;
     Mask slides = in->upstream ? m & mi_eq(i_gather(q->arrived, slot), i_set(UPSTREAM_RAY)) : m_set(false);
     Vec3 drag = v3_select(slides, LOAD_V3(*q, dragx, dragy, dragz, slot), v3_zero());
     real rate[LANES];
     if (forward && in->upstream) {
         in->sink->derivative = f_set(0);
-        glimpse_move_adj(t, g, &at->v.hit, drag, lens, in->sink, slides);
+        glimpse_move_adj(t, g, at, drag, lens, in->sink, slides);
         f_store(rate, real_gather(q->rate, slot) + in->sink->derivative);
         in->sink->derivative = f_set(0);
     }
@@ -193,7 +203,7 @@ static void glimpse_book(Indirect *in, const Glimpse *g, const Landing *at, Spec
     }
     if (!forward && m_any(slides)) {
         Mask finite = slides & m_finite(worth);
-        glimpse_move_adj(t, g, &at->v.hit, v3_scale(drag, f_zero_unless(finite, worth)), lens, in->sink, finite);
+        glimpse_move_adj(t, g, at, v3_scale(drag, f_zero_unless(finite, worth)), lens, in->sink, finite);
     }
 }
 
@@ -210,38 +220,102 @@ static Spec glimpse_radiance(const Indirect *in, Int slot, const Glimpse *g, int
     return l;
 }
 
+// In media, weighs l with what the pieces of the lines before the last one let through.
+static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce, Mask m, Spec l) {
+    for (int32_t i = 0; i + 1 < g->line.last; i++) {
+        Mask on = m & mi_lt(i_set(i), g->turns), blocked;
+        if (!m_any(on)) {
+            return l;
+        }
+        Vec3 o = g->line.o[i], d = g->line.d[i];
+        Ray ray = {o, d, v3_dot(v3_sub(g->line.hit[i].p, o), d) * (1.0f - SHADOW_SHORT)};
+        Fog fog = {medium_around(t, o, d, on), stream_key(t, slot, bounce + MAX_BOUNCES * (i + 1), STREAM_SHADOW)};
+        l = spec_select(on, spec_mul(l, walk_transmittance(t, ray, on, &fog, &blocked, NULL)), l);
+    }
+    return l;
+}
+
+// A line from a random film position that leads to the vertices of m; g->d, its direction, becomes that back to it.
+static Float glimpse_find(Indirect *in, const SampleKey *key, const Glimpsed *at, Vec2 lens, Sink *still, Mask m, Glimpse *g,
+                          Vec3 *back) {
+    const PathJob *job = in->t->job;
+    m = in->upstream ? m & mi_lt(i_set(UPSTREAM_NONE), i_gather(in->q.arrived, at->slot)) : m;
+    glimpse_try(in, key, lens, 0, at->p, still, m, g);
+    g->m = g->m & m_ge(g->x, f_set((real)job->x)) & m_lt(g->x, f_set((real)(job->x + job->width))) &
+           m_ge(g->y, f_set((real)job->y)) & m_lt(g->y, f_set((real)(job->y + job->height)));
+    Vec3 to = v3_sub(g->o, at->p);
+    Float length = v3_length(to);
+    *back = v3_select(g->m, v3_scale(to, f_safe_rcp(length)), v3(f_set(0), f_set(0), f_set(1)));
+    return length;
+}
+
+// Books what the vertices bring along these lines, f: what they scatter along them times what has come so far. The last pieces are
+// `ray`, in `medium`.
+static void glimpse_bring(Indirect *in, const SampleKey *key, Glimpse *g, const Glimpsed *at, const Ray *ray, Int medium, Spec f,
+                          Vec2 lens, Sink *still, int32_t bounce) {
+    Tracer *t = in->t;
+    Spec l = spec_scale(spec_mul(f, glimpse_through(g)), g->density);
+    l = spec_mul(l, glimpse_radiance(in, at->slot, g, bounce));
+    Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1))));
+    g->m = g->m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
+    if (!m_any(g->m)) {
+        return;
+    }
+    if (t->scene->has_media) {
+        Mask blocked;
+        Fog fog = {medium, stream_key(t, at->slot, bounce + MAX_BOUNCES, STREAM_SHADOW)};
+        l = spec_mul(l, walk_transmittance(t, *ray, g->m, &fog, &blocked, NULL));
+        g->m = g->m & m_gt(spec_max(spec_mul(l, l)), f_set(0));
+        l = glimpse_clear(t, g, at->slot, bounce + 1, g->m, l);
+    } else {
+        g->m = particle_open(t, ray, g->m);
+    }
+    if (m_any(g->m)) {
+        l = spec_scale(l, glimpse_again(in, key, lens, at->p, g, still));
+        glimpse_book(in, g, at, l, lens, bounce, g->m & m_gt(spec_max(spec_mul(l, l)), f_set(0)));
+    }
+}
+
+// Random numbers of the lines that lead to vertices of a bounce.
+KFN SampleKey glimpse_key(const Tracer *t, Int slot, int32_t bounce) {
+    SampleKey key = slot_key(t, slot);
+    key.scramble = rng_mix(key.scramble, 2 + (uint32_t)bounce);
+    return key;
+}
+
 // Connects vertices to the sensor along chains of smooth mirrors and glass.
 static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens, int32_t bounce) {
     Tracer *t = in->t;
-    const PathJob *job = t->job;
     if (!t->scene->bsdfs[at->call.node].spreads) {
         return;
     }
-    SampleKey key = slot_key(t, at->v.slot);
-    key.scramble = rng_mix(key.scramble, 2 + (uint32_t)bounce);
+    SampleKey key = glimpse_key(t, at->v.slot, bounce);
     Sink still = sink_of(in->b->still);
-    Mask m = at->v.m & m_gt(at->cosine, f_set(0));
-    m = in->upstream ? m & mi_lt(i_set(UPSTREAM_NONE), i_gather(in->q.arrived, at->v.slot)) : m;
+    const Glimpsed seen = {&at->v.hit, at->v.slot, at->si.p, false};
     Glimpse g;
-    glimpse_try(in, &key, lens, 0, at->si.p, &still, m, &g);
-    g.m = g.m & m_ge(g.x, f_set((real)job->x)) & m_lt(g.x, f_set((real)(job->x + job->width))) &
-          m_ge(g.y, f_set((real)job->y)) & m_lt(g.y, f_set((real)(job->y + job->height)));
+    Vec3 d;
+    Float length = glimpse_find(in, &key, &seen, lens, &still, at->v.m & m_gt(at->cosine, f_set(0)), &g, &d);
     if (!m_any(g.m)) {
         return;
     }
-    Vec3 to = v3_sub(g.o, at->si.p);
-    Float length = v3_length(to);
-    Vec3 d = v3_select(g.m, v3_scale(to, f_safe_rcp(length)), v3_neg(at->v.d));
     Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
-    Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * g.density;
-    Spec l = spec_scale(spec_mul(spec_mul(at->v.beta, f), glimpse_through(&g)), weight);
-    l = spec_mul(l, glimpse_radiance(in, at->v.slot, &g, bounce));
-    Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1))));
-    g.m = g.m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
+    f = spec_scale(spec_mul(at->v.beta, f), f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine));
     Ray ray = {interaction_offset(&at->si, d), d, length * (1.0f - 9e-4f)};
-    g.m = m_any(g.m) ? particle_open(t, &ray, g.m) : g.m;
+    Int medium = t->scene->has_media ? medium_behind(at->group, at->si.ng, d, at->v.medium) : i_set(-1);
+    glimpse_bring(in, &key, &g, &seen, &ray, medium, f, lens, &still, bounce);
+}
+
+// The same of collisions.
+static NOINLINE void glimpse_connect_air(Indirect *in, const Vertex *v, const Collision *c, Vec2 lens, int32_t bounce) {
+    SampleKey key = glimpse_key(in->t, v->slot, bounce);
+    Sink still = sink_of(in->b->still);
+    const Glimpsed seen = {&v->hit, v->slot, v->hit.p, true};
+    Glimpse g;
+    Vec3 d;
+    Float length = glimpse_find(in, &key, &seen, lens, &still, v->m, &g, &d);
     if (m_any(g.m)) {
-        l = spec_scale(l, glimpse_again(in, &key, lens, at->si.p, &g, &still));
-        glimpse_book(in, &g, at, l, lens, bounce, g.m & m_gt(spec_max(spec_mul(l, l)), f_set(0)));
+        Spec f = spec_mul(v->beta, spec_scale(c->albedo, collision_phase(c, d)));
+        Ray ray = {v->hit.p, d, length * (1.0f - 9e-4f)};
+        glimpse_bring(in, &key, &g, &seen, &ray, v->medium, f, lens, &still, bounce);
     }
 }

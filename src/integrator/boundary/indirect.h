@@ -115,6 +115,9 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
     m = near_clear(in, &ray, v.medium, v.slot, bounce, m, &l);
     near_book(in, &sight, l, v.slot, bounce, m);
+    if (in->glimpses && m_any(v.m)) {
+        glimpse_connect_air(in, &v, &c, near_lens(in, v.slot), bounce);
+    }
     SampleKey key = slot_key(t, v.slot);
     return collision_scatter(t, &v, &c, &key, bounce, v.m, -1, next_count);
 }

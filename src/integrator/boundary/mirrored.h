@@ -232,7 +232,7 @@ static Mask curve_in_band(Tracer *t, const Sightline *line, Int level, Mask m) {
     Float length = v3_length(step);
     Vec3 back = v3_select(m, v3_scale(step, -f_safe_rcp(length)), v3(f_set(0), f_set(0), f_set(1)));
     Ray ray = {v3_madd(o, -0.5f * length, back), back, 1.45f * length};
-    Hit hit = trace_closest(t->scene, &ray, m, false);
+    Hit hit = trace_solid(t->scene, &ray, m);
     t->job->rays += m_count(m);
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_select(m, shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     return m & mi_lt(i_set(-1), hit.shape) & ~(smooth & mi_eq(hit.shape, shape));

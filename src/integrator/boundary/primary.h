@@ -30,13 +30,13 @@ typedef struct PrimarySample {
 } PrimarySample;
 
 // Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
-// Where surfaces pass through each other, rays that one lets pass start a step behind it and must meet the other one. scale: pixels
-// per length across the edge.
+// Where surfaces pass through each other, rays that one lets pass start a step behind it and must meet the other one; where a plane
+// cuts surfaces, they start on that. scale: pixels per length across the edge.
 static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     Float step = f_select(smooth & m_set(b->chains), f_set(2 * film_resolution(t->sensor)), f_set(PRIMARY_STEP));
     Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
-    return f_select(e->meeting & m_set(b->chains), behind, step);
+    return f_select((e->meeting & m_set(b->chains)) | edge_clips(e), behind, step);
 }
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
@@ -48,6 +48,7 @@ static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinho
     out->view = view_make(t->scene, pinhole, t->sensor, lens);
     EdgePoint e = edge_sample(t->scene, b, rng_2d(&key, DIMENSION_EDGE), out->view.eye, pinhole->parallel);
     Seen s = view_see(&out->view, e.p);
+    s.valid = s.valid | (edge_clips(&e) & m_gt(s.local.z, f_set(0))); // which lie on the plane, as far as floats can tell
     Vec3 n = v3_normalize(v3_cross(s.d, e.tangent));
     Vec2 along = view_push(&out->view, &s, e.tangent), across = view_push(&out->view, &s, n);
     // The side of n: across, less its part along the edge.
@@ -85,27 +86,28 @@ static Mask primary_is_smooth(const Tracer *t, const PrimarySample *s) {
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
 static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     const Ray rays[2] = {primary_ray(t, s, -1).ray, primary_ray(t, s, 1).ray};
+    if (t->scene->hide_emitters) { // the sensor sees nothing of lights
+        m = m & mi_lt(SHAPE_FIELD(t->scene, i_select(m, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
+    }
     // Paths beside marks, where normals turn away and between triangles with vertex normals start on their surfaces (primary_look),
     // also where these are narrower than the paths' step.
     Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
     Mask inner = primary_is_smooth(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
-    Mask own = m & (s->edge.mark | turns | inner);
-    Mask visible = edge_between(t, &s->edge, s->silhouette, s->n, rays, m & ~own);
+    Mask clips = edge_clips(&s->edge), own = m & (s->edge.mark | turns | inner | clips);
+    Mask visible = edge_between(t, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
-        Hit hit = trace_solid(t->scene, &ray, own);
+        Int unused = i_set(0);
+        Hit hit = view_meet(t, &ray, true, own, &unused);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
-        t->job->rays += m_count(own);
-        if (t->scene->hide_emitters) {
-            own = own & mi_lt(SHAPE_FIELD(t->scene, i_select(own, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
-        }
         Mask same = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
         Mask here = same & m_le(f_abs(found - reach), 2e-5f * reach);
         // Triangles that are seen from their edge are met farther from the point than others, and rays to it may slip through
         // between two of them: what counts is that nothing lies before it.
         Mask clear = mi_lt(hit.shape, i_set(0)) | m_gt(found, reach * (1.0f - 2e-5f));
+        clear = clear | (clips & m_gt(found, reach - interaction_step(s->edge.p))); // rays may begin there
         clear = clear | (same & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other)));
-        visible = visible | (own & ((s->edge.mark & here) | ((turns | inner) & clear)));
+        visible = visible | (own & ((s->edge.mark & here) | ((turns | inner | clips) & clear)));
     }
     return visible;
 }
@@ -304,8 +306,13 @@ static void primary_meeting_adj(Tracer *t, const PrimarySample *s, Vec3 along, V
     *first = v3_select(m, v3_scale(a, (na - c * nb) * r), *first);
     Vec3 other = v3_scale(b, (nb - c * na) * r);
     points_move_adj(t, &s->edge.met, other, v3_zero(), sink, attached);
+    Mask clips = edge_clips(&s->edge) & m;
     if (sink->any_places) {
-        borders_move_adj(t->scene, s->edge.met.prim, s->edge.p, other, sink, m & ~attached);
+        borders_move_adj(t->scene, s->edge.met.prim, s->edge.p, other, sink, m & ~attached & ~clips);
+    }
+    if (sink->any_camera && m_any(clips)) { // the planes move with its pose
+        Vec3 unused = v3_zero();
+        pose_point_adj(t->scene, t->sensor, s->seen.local, other, &unused, sink, clips);
     }
 }
 

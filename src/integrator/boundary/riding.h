@@ -4,13 +4,15 @@
 //   dI += integral dl dw |w x T| n . (e' - r') (L- - L+) W.
 // Where a surface looks past an edge, this is so for what is scattered in the air behind it, before the light meets a surface;
 // surfaces behind it are attached (indirect.h). Lights at a point are attached, too.
-// Borders of media are passed.
+// Borders of media are passed. Smooth mirrors and glass are pieces of what collides: the segments of this kind are also those of
+// chained.h, with the flights of media between the vertices.
 #pragma once
 
 #include "integrator/boundary/chained.h"
 
-// Segments that end on lights and whose near points are collisions.
-static void riding_shine(Tracer *t, Segment *s, Int number, Segments *q) {
+// Segments that end on lights and whose near points are collisions or, where there are chains, pieces of these: no chain ends on a
+// light at a point or of one direction.
+static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
     Int around = medium_around(t, o, s->d, s->m);
     Mask m = segment_shine(t, s, o, around, number, s->m);
@@ -19,7 +21,7 @@ static void riding_shine(Tracer *t, Segment *s, Int number, Segments *q) {
     }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
-    m = leg.m & mi_lt(i_set(-1), leg.air);
+    m = leg.m & (mi_lt(i_set(-1), leg.air) | (mi_lt(s->source, i_set(0)) & m_set(b->chains)));
     // Directions stay, and the ends slide over their lights.
     s->attached = m_set(false);
     s->distance = f_select(mi_lt(s->source, i_set(0)), f_set(INFINITY), s->distance);
@@ -28,13 +30,13 @@ static void riding_shine(Tracer *t, Segment *s, Int number, Segments *q) {
     segment_keep(s, o, &leg.near, true, number, q, m);
 }
 
-// Segments in any direction. Surfaces see the same air on both sides of an edge between two faces.
-static void riding_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+// Segments in any direction. Surfaces that scatter see the same air on both sides of an edge between two faces.
+static void riding_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int number, Segments *q) {
     Vec3 o = chained_offset(s);
     Int around = medium_around(t, o, s->d, s->m);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
-    Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air));
+    Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air) | m_set(b->chains));
     if (m_any(m)) {
         Float behind;
         m = chained_between(t, s, leg.near.p, m, &behind);
@@ -135,9 +137,9 @@ static void ridings_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         t->focus = turn.lit ? focus : NULL; // what others bring from their first collisions is found from the sensor
         segment_sample(t, b, i_iota() + i, turn.lit, turn.share, m_first_n(count - i), &s);
         if (m_any(s.m) && turn.lit) {
-            riding_shine(t, &s, i_iota() + i, q);
+            riding_shine(t, b, &s, i_iota() + i, q);
         } else if (m_any(s.m)) {
-            riding_trace(t, &s, i_iota() + i, q);
+            riding_trace(t, b, &s, i_iota() + i, q);
         }
     }
     t->focus = focus;

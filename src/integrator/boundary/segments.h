@@ -82,8 +82,9 @@ static inline size_t segments_layout(Segments *q, char *block) {
     }
     WAY_FLOATS(CARVE_SEGMENT)
     WAY_INTS(CARVE_SEGMENT)
-    CARVE_SPEC(q->fork.base, n)
-    CARVE(q->fork.chained, n)
+    CARVE_SPEC(q->fork.air, n)
+    CARVE_SPEC(q->fork.first, n)
+    CARVE(q->fork.way, n)
     q->count = 0;
     return at;
 }

@@ -185,6 +185,7 @@ static void ways_carry(Indirect *in, int32_t bounce) {
             c = (Carried){record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, &still, m);
         }
+        upstream_ride_adj(in->t, q, bounce, k, &c, &still, m);
         carried_store(q, k, &c);
     }
 }

@@ -1,6 +1,7 @@
 // sightline.h: lines of sight: from a film position through smooth mirrors and glass, and what lets them pass, up to the first
 // vertex that scatters.
-// The random numbers are those of the path that path.h traces from there, which therefore takes the same way.
+// The random numbers are those of the path that path.h traces from there, which therefore takes the same way. In media, surfaces of
+// the kind null are passed: they are no vertices of lines, but bounces of those paths; whether a path collides has no part in it.
 #pragma once
 
 #include "integrator/boundary/upstream.h"
@@ -25,12 +26,26 @@ KFN bool sightline_ends_at_normals(const SceneView *scene, const Group *group) {
     return scene->bsdfs[group->bsdf].kind != BSDF_DIELECTRIC || group->emitter >= 0;
 }
 
+// The numbers that decide what the vertices of a bounce make of a ray.
+static void sightline_numbers(const SampleKey *key, Int bounce, Mask m, Float *u, Vec2 *at) {
+    *u = at->x = at->y = f_set(0);
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
+        int32_t number = i_lane(bounce, m_first(left));
+        Vec2 direction = rng_2d(key, dimension(number, PURPOSE_DIRECTION));
+        mine = left & mi_eq(bounce, i_set(number));
+        *u = f_select(mine, rng_1d(key, dimension(number, PURPOSE_LOBE)), *u);
+        at->x = f_select(mine, direction.x, at->x);
+        at->y = f_select(mine, direction.y, at->y);
+    }
+}
+
 // Where vertices of level i lie on surfaces that mirror or refract, turns the ray; returns these lanes.
-static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, Mask m, Sightline *s, Ray *ray) {
+static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, Int bounce, Mask m, Sightline *s, Ray *ray) {
     const SceneView *scene = t->scene;
     const Hit *hit = s->hit + i;
-    Float u = rng_1d(key, dimension(i, PURPOSE_LOBE));
-    Vec2 at = rng_2d(key, dimension(i, PURPOSE_DIRECTION));
+    Float u;
+    Vec2 at;
+    sightline_numbers(key, bounce, m, &u, &at);
     bool ends = scene->max_depth >= 0 && i + 1 >= scene->max_depth;
     Mask turned = m_set(false);
     s->through[i + 1] = spec_zero();
@@ -84,15 +99,12 @@ KFN Vec2 sightline_lens(const Tracer *t, const SampleKey *key) {
 static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens, Float x, Float y, Mask m, Sightline *s) {
     SensorRay start = sensor_ray(t->scene, t->sensor, x, y, lens);
     Ray ray = start.ray;
+    Int bounce = i_set(0);
     s->turns = i_set(0);
     s->through[0] = spec_set(start.weight);
     s->last = 0;
     for (int32_t i = 0; i <= MOST_SIGHT && m_any(m); i++) {
-        Hit hit = trace_closest(t->scene, &ray, m, i == 0);
-        t->job->rays += m_count(m);
-        if (i == 0 && t->scene->hide_emitters) {
-            hit = trace_past_emitters(t, ray, m, hit);
-        }
+        Hit hit = view_meet(t, &ray, i == 0, m, &bounce);
         s->hit[i] = hit;
         s->d[i] = ray.d;
         s->o[i] = ray.o;
@@ -101,8 +113,9 @@ static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens,
         s->uv[i] = (Vec2){f_set(0), f_set(0)};
         s->last = i + 1;
         m = m & mi_lt(i_set(-1), hit.shape);
-        m = i < MOST_SIGHT && m_any(m) ? sightline_turn(t, key, i, m, s, &ray) : m_set(false);
+        m = i < MOST_SIGHT && m_any(m) ? sightline_turn(t, key, i, bounce, m, s, &ray) : m_set(false);
         s->turns = s->turns + i_select(m, i_set(1), i_set(0));
+        bounce = bounce + i_set(1);
     }
 }
 

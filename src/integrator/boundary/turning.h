@@ -114,8 +114,9 @@ static void turning_sample(Tracer *t, const BoundaryJob *b, Int slot, Mask m, Tu
 }
 
 // In media, where the particles' flights from x have ended, and the medium of x; horizons, whose particles begin there: what is lit
-// through. Returns the lanes whose segments are this kind's: those of collisions keep their directions.
-static Mask turning_fly(Tracer *t, const Turning *s, const Ray *ray, int32_t kind, Int number, Segments *q, Hit *end) {
+// through. Returns the lanes whose segments are this kind's: those of collisions keep their directions, as chains do.
+static Mask turning_fly(Tracer *t, const BoundaryJob *b, const Turning *s, const Ray *ray, Int number, Segments *q, Hit *end) {
+    const int32_t kind = b->kind;
     Int around = medium_around(t, ray->o, ray->d, s->m);
     Leg leg = {.near = s->hit, .air = i_set(-1), .around = around, .weight = spec_set(f_set(1)), .m = s->m};
     Mask m = s->m;
@@ -123,7 +124,8 @@ static Mask turning_fly(Tracer *t, const Turning *s, const Ray *ray, int32_t kin
         SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
         leg = leg_trace(t, *ray, ray->o, around, leg.weight, &key, m);
         *end = leg.near;
-        m = leg.m & (mi_lt(leg.air, i_set(0)) ^ m_set(boundary_is_riding(kind)));
+        const bool rides = boundary_is_riding(kind);
+        m = leg.m & ((mi_lt(leg.air, i_set(0)) ^ m_set(rides)) | m_set(rides && b->chains)); // surfaces may be pieces of chains
     } else if (kind == BOUNDARY_HORIZON) {
         t->job->rays += m_count(m);
         *end = trace_solid(t->scene, ray, m);
@@ -134,8 +136,8 @@ static Mask turning_fly(Tracer *t, const Turning *s, const Ray *ray, int32_t kin
 }
 
 // Finds where the segments end and keeps those that do.
-static void turning_trace(Tracer *t, const Turning *s, int32_t kind, Int number, Segments *q) {
-    const bool horizon = !boundary_is_terminator(kind);
+static void turning_trace(Tracer *t, const BoundaryJob *b, const Turning *s, Int number, Segments *q) {
+    const bool horizon = !boundary_is_terminator(b->kind);
     Float step = interaction_step(s->p);
     // Where both normals are the same, what comes from above n is above the surface.
     Float up = v3_dot(s->ng, s->d);
@@ -144,7 +146,7 @@ static void turning_trace(Tracer *t, const Turning *s, int32_t kind, Int number,
     Hit end = {i_set(-1), i_set(0), f_set(0), f_set(0), s->p, i_set(0)};
     Mask m = s->m, met;
     if (t->scene->has_media) {
-        m = turning_fly(t, s, &ray, kind, number, q, &end);
+        m = turning_fly(t, b, s, &ray, number, q, &end);
         met = mi_lt(i_set(-1), end.shape);
     } else {
         t->job->rays += m_count(m);
@@ -186,7 +188,7 @@ static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_
         Turning s;
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
         if (m_any(s.m)) {
-            turning_trace(t, &s, b->kind, i_iota() + i, q);
+            turning_trace(t, b, &s, i_iota() + i, q);
         }
     }
 }

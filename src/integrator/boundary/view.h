@@ -51,9 +51,9 @@ KFN void view_film(const View *v, Float sx, Float sy, Float *x, Float *y) {
 KFN Seen view_see(const View *v, Vec3 point) {
     Seen s;
     s.local = view_local(v, v3_sub(point, v->pinhole->origin));
-    s.valid = m_ge(s.local.z, f_set(v->sensor->near_clip)) & m_le(s.local.z, f_set(v->sensor->far_clip)) &
-              m_gt(s.local.z, f_set(0));
-    Float z = f_select(s.valid, s.local.z, f_set(1));
+    Mask before = m_gt(s.local.z, f_set(0));
+    s.valid = before & m_ge(s.local.z, f_set(v->sensor->near_clip)) & m_le(s.local.z, f_set(v->sensor->far_clip));
+    Float z = f_select(before, s.local.z, f_set(1));
     if (v->pinhole->parallel) {
         view_film(v, s.local.x, s.local.y, &s.x, &s.y);
         s.d = v->eye;
@@ -81,4 +81,24 @@ KFN Vec2 view_push(const View *v, const Seen *s, Vec3 d) {
     }
     return (Vec2){x * (-0.5f * (real)v->sensor->width / p->tangent),
                   y * (-0.5f * (real)v->sensor->height * p->aspect / p->tangent)};
+}
+
+// What rays meet that the sensor may have sent out (viewed): from these, lights may be hidden. In media, surfaces of the kind null
+// are passed, and counted in *bounce.
+static NOINLINE Hit view_meet(Tracer *t, const Ray *given, bool viewed, Mask m, Int *bounce) {
+    const SceneView *scene = t->scene;
+    Ray ray = *given;
+    Hit met = {.shape = i_set(-1)};
+    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(m); i++) {
+        Hit hit = trace_media(t, &ray, m, false);
+        t->job->rays += m_count(m);
+        hit = viewed && scene->hide_emitters ? trace_past_emitters(t, ray, m, hit) : hit;
+        met = hit_select(m, &hit, &met);
+        m = scene->has_media ? null_lanes(scene, hit.shape, m & mi_lt(i_set(-1), hit.shape)) : m_set(false);
+        Vec3 o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
+        ray.tmax = f_select(m, ray.tmax - v3_dot(v3_sub(o, ray.o), ray.d), ray.tmax);
+        ray.o = v3_select(m, o, ray.o);
+        *bounce = *bounce + i_select(m, i_set(1), i_set(0));
+    }
+    return met;
 }
