@@ -179,7 +179,8 @@ static UInt strip_bits(const Strip *s) {
 
 // Halves strips until their ends lie next to where the lines part behind their first vertices; returns the levels, 0 or less
 // where they never do. Of two halves whose ends part, that is kept in which they do so behind their first vertices, or else
-// either: outlines and edges of the mirror hide what is beside them.
+// either: outlines and edges of the mirror hide what is beside them. If they do in both, that in which they do so earlier: where
+// two mirrors pass through each other, there is a band on either side of their curve (curve_in_band).
 static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKey *key, Vec2 lens, real end, Strip *s,
                                  Mask m) {
     Sightline line[2], middle;
@@ -195,7 +196,9 @@ static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKe
         sightline_trace(t, key, lens, x, y, open, &middle);
         Int before = lines_part(t, b, line, &middle, open), behind = lines_part(t, b, &middle, line + 1, open);
         Mask either = mi_eq(behind, i_set(0)) & mi_eq((Int)bits & 1, i_set(0)), only = mi_lt(behind, i_set(0));
-        Mask first = open & (mi_lt(i_set(0), before) | (mi_eq(before, i_set(0)) & (either | only))), second = open & ~first;
+        Mask later = mi_lt(i_set(0), behind) & mi_lt(behind, before);
+        Mask first = (mi_lt(i_set(0), before) & ~later) | (mi_eq(before, i_set(0)) & (either | only)), second = open & ~first;
+        first = first & open;
         sightline_take(line + 1, &middle, first);
         sightline_take(line, &middle, second);
         s->x[1] = f_select(first, x, s->x[1]);
