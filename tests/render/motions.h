@@ -192,6 +192,7 @@ static const Motion motions[] = {
     {"lines_bounce.xml", "lamp.emitter.radiance.to_uv", ADD, {0}, 0.04, 4},
     {"marks_bump.xml", "tile.bsdf.nested_texture.to_uv", ADD, {0}, 0.02, 1},
     {"veil_hidden.xml", "veil.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 3},
+    {"mirror_wedge.xml", "plate.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.01, 1},
     {"mirror_lamp.xml", "card.to_world", SHIFT, {0, 1, 0.5f}, 0.05, 2},
     {"mirror_lamp.xml", "lamp.to_world", SHIFT, {0, 1, 0.3f}, 0.05, 2},
     {"mirror_lamp.xml", "mirror.to_world", SHIFT, {1, 0.5f, 0}, 0.05, 4},
@@ -277,7 +278,6 @@ static const Motion motions[] = {
     {"ride_tank.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 2},
     {"ride_tank.xml", "tank.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 1},
     {"ride_tank.xml", "tank.to_world", TURN, {1, 0.3f, 0.5f}, 2, 2},
-    {"ride_tank.xml", "glass.eta", ADD, {0}, 0.02, 4},
     {"ride_light.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 2},
     {"ride_lamp.xml", "ball.positions", SHEAR, {0, 0, 0}, 0.02, 1},
 };
