@@ -308,7 +308,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     }
     // In media only edges are known; what else there is does not depend on lights, and is refused where surfaces move.
     bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || !r->scene->view.has_media;
-    bool chains = rey_chains_known(&r->scene->view, r->plan.sensor) && (rides || !r->scene->view.has_media);
+    bool chains = rey_chains_known(&r->scene->view, r->plan.sensor);
     known |= rides && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_HORIZON);
     known |= rides && kind == BOUNDARY_MEETING;
     int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;

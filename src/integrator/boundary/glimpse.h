@@ -235,7 +235,8 @@ static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce,
     return l;
 }
 
-// A line from a random film position that leads to the vertices of m; g->d, its direction, becomes that back to it.
+// A line from a random film position that leads to the vertices of m. *back: the direction from them to its last mirror, whose
+// distance it returns.
 static Float glimpse_find(Indirect *in, const SampleKey *key, const Glimpsed *at, Vec2 lens, Sink *still, Mask m, Glimpse *g,
                           Vec3 *back) {
     const PathJob *job = in->t->job;
