@@ -42,9 +42,7 @@ int rey_bsdf_kind_find(const char *name) {
     return -1;
 }
 
-bool rey_bsdf_veils(int kind) { return kind == BSDF_THINDIELECTRIC || kind == BSDF_MASK; }
-
-bool rey_bsdf_opens(int kind) { return rey_bsdf_veils(kind) || kind == BSDF_NULL; }
+bool rey_bsdf_opens(int kind) { return kind == BSDF_THINDIELECTRIC || kind == BSDF_MASK || kind == BSDF_NULL; }
 
 bool rey_bsdf_bends(int kind) {
     return kind == BSDF_CONDUCTOR || kind == BSDF_DIELECTRIC || kind == BSDF_PLASTIC || rey_bsdf_opens(kind);

@@ -37,8 +37,6 @@ bool rey_bsdf_opens(int kind);
 bool rey_bsdf_tints(int kind);
 // Whether light passes it undeviated and undimmed.
 bool rey_bsdf_passes(int kind);
-// Kinds that let a part of the light pass undeviated, and not all of it.
-bool rey_bsdf_veils(int kind);
 // Whether a function itself refracts into directions that end abruptly (rim.h).
 bool rey_bsdf_ends(const SceneView *view, const BsdfNode *node);
 // Whether a kind turns the shading normal of the function inside it.

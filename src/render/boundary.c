@@ -58,10 +58,21 @@ static bool has_chains(const SceneView *view) {
     return rey_bsdfs_used(view, view->has_media ? rey_bsdf_mirrors : rey_bsdf_bends);
 }
 
+// Whether surfaces let light pass undeviated: in media, other than those of the kind null.
+static bool has_veils(const SceneView *view) {
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        bool passes = view->has_media && rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind);
+        if (!passes && rey_bsdf_holds(view, view->shapes[i].bsdf, rey_bsdf_opens)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const bool passed = view->through && rey_bsdfs_used(view, view->has_media ? rey_bsdf_veils : rey_bsdf_opens);
+    const bool passed = view->through && has_veils(view);
     const char *what = !rey_boundary_sees(sensor) ? "this sensor"
                        : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
                        : step                 ? step

@@ -141,7 +141,7 @@ static const char *gap_of_rides(const SceneView *view) {
         if (passes && shape->emitter >= 0) {
             return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
         }
-        if (!passes && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_veils)) {
+        if (!passes && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_opens)) {
             return "in scenes with participating media, what moves changes the ways through masks and thin glass. Known are "
                    "volumes, lights, and what moves among surfaces of other kinds";
         }
