@@ -33,23 +33,3 @@ static NOINLINE Hit hit_touching(const SceneView *scene, const Hit *hit, const R
     Mask found = m & mi_lt(i_set(-1), other.shape), takes = found & ~null_lanes(scene, other.shape, found);
     return hit_select(takes, &other, hit);
 }
-
-// Closest hits on surfaces that are not of the kind null.
-static NOINLINE Hit trace_solid(const SceneView *scene, const Ray *given, Mask m) {
-    Ray ray = *given;
-    Hit hit = trace_closest(scene, &ray, m, false);
-    Mask left = scene->has_media ? m : m_set(false);
-    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
-        hit = scene->borders_touch ? hit_touching(scene, &hit, &ray, left) : hit;
-        left = null_lanes(scene, hit.shape, left & mi_lt(i_set(-1), hit.shape));
-        if (!m_any(left)) {
-            break;
-        }
-        Vec3 o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
-        ray.tmax = f_select(left, ray.tmax - v3_dot(v3_sub(o, ray.o), ray.d), ray.tmax);
-        ray.o = v3_select(left, o, ray.o);
-        Hit next = trace_closest(scene, &ray, left, false);
-        hit = hit_select(left, &next, &hit);
-    }
-    return hit;
-}

@@ -52,14 +52,14 @@ static bool surfaces_separate(const SceneView *scene) {
 // the other way; where it finds no such surface, the medium is the sensor's.
 static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
-    Int medium = i_set(t->sensor->medium), beyond = medium_beyond(t);
+    Int medium = i_set(t->sensor->medium);
     Mask left = surfaces_separate(scene) ? m : m_set(false), turned = m_set(false);
     for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
         Ray ray = {o, d, f_set(INFINITY)};
         Hit hit = trace_media(t, &ray, left, false);
         t->job->rays += m_count(left);
         Mask met = left & mi_lt(i_set(-1), hit.shape), lost = left & ~met & turned;
-        medium = i_select(lost, beyond, medium);
+        medium = m_any(lost) ? i_select(lost, medium_beyond(t), medium) : medium;
         turned = turned | (left & ~met);
         d = v3_select(left & ~met, v3_neg(d), d);
         left = left & ~lost;

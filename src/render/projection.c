@@ -16,8 +16,7 @@ double rey_pose_size(const float *m) {
 
 Projection rey_projection_of(const SceneView *view, const FilmPlan *plan) {
     const SensorRecord *s = plan->sensor;
-    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .far = (double)s->far_clip,
-                    .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
+    Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,
                     .pinhole = s->kind == SENSOR_PERSPECTIVE || s->kind == SENSOR_ORTHOGRAPHIC};
     rey_affine_inverse(view->theta + s->to_world, p.inverse);
     p.lens = p.pinhole ? 0 : 3 * rey_pose_size(view->theta + s->to_world) * (double)view->theta[s->lens];
@@ -40,7 +39,7 @@ void rey_clip_borders(const SceneView *view, const FilmPlan *plan, LightBorder b
     const float *m = view->theta + plan->sensor->to_world;
     const double middle[2] = {0.5 * (p.low_x + p.high_x), 0.5 * (p.low_y + p.high_y)};
     for (int i = 0; i < 4; i++) {
-        double z = i < 2 ? p.near : p.far, spread = p.parallel ? 1 : z;
+        double z = i < 2 ? p.near : (double)plan->sensor->far_clip, spread = p.parallel ? 1 : z;
         borders[i] = (LightBorder){.light = i < 2 ? BORDER_NEAR : BORDER_FAR};
         for (int k = 0; k < 3; k++) { // with room around what the film sees
             const double *corner = corners[triangles[i % 2][k]];

@@ -9,7 +9,7 @@ typedef struct Projection {
     double inverse[12];     // of the sensor's pose
     double scale_x, scale_y, shift_x, shift_y; // pixels per slope, and the centre
     double low_x, low_y, high_x, high_y;       // what of the film counts [pixels]
-    double near, far, lens; // lens: no point of it is further from the middle
+    double near, lens; // lens: no point of it is further from the middle
     bool parallel, pinhole;
 } Projection;
 

@@ -302,8 +302,7 @@ static Mask edge_is_seen(Tracer *t, const EdgePoint *e, bool viewed, const Ray r
     Vec3 o = v3_scale(v3_add(rays[0].o, rays[1].o), f_set((real)0.5)), to = v3_sub(e->p, o);
     Float reach = v3_length(to);
     Ray ray = {o, v3_scale(to, f_safe_rcp(reach)), f_set(INFINITY)};
-    Int unused = i_set(0);
-    Hit hit = view_meet(t, &ray, viewed, m, &unused);
+    Hit hit = trace_solid(t, &ray, viewed, m, NULL);
     Mask own = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance) &
                (e->round | mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other));
     return m & (mi_lt(hit.shape, i_set(0)) | own | m_gt(v3_dot(v3_sub(hit.p, o), ray.d), reach * (1.0f - 1e-4f)));
@@ -312,11 +311,10 @@ static Mask edge_is_seen(Tracer *t, const EdgePoint *e, bool viewed, const Ray r
 // Lanes of m in which two rays, the second one on the side of n, pass an edge between the surfaces that meet or end there. Next
 // to a corner a path may miss them; what it meets instead belongs to another edge's jump. viewed: they come from the sensor.
 static Mask edge_between(Tracer *t, const EdgePoint *e, bool viewed, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
-    Int unused = i_set(0);
     Mask own[2], clear[2], grazed[2], above = m_gt(edge_first_rise(e, n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
-        Hit hit = view_meet(t, &ray, viewed, m, &unused);
+        Hit hit = trace_solid(t, &ray, viewed, m, NULL);
         Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask met = mi_lt(i_set(-1), hit.shape), near = m_le(f_abs(found - reach), 1e-3f * reach);
         // Surfaces that pass through each other are met where the ray is as far from the curve, by the angle in which it does.

@@ -176,3 +176,20 @@ KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
         return spec_select(mi_eq(i_gather(q->lit, slot), i_set(1)), l, reflected);
     }
 }
+
+// ---- towards the sensor ------------------------------------------------------------------------------------------
+
+// Jumps have either sign.
+KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }
+
+// In media, lanes whose way to the sensor is open; *l becomes what of it arrives there.
+static Mask near_clear(Tracer *t, const Ray *ray, Int medium, Int slot, int32_t bounce, Mask m, Spec *l) {
+    if (!m_any(m)) {
+        return m;
+    }
+    Mask blocked;
+    Fog fog = {medium, stream_key(t, slot, bounce, STREAM_SHADOW)};
+    Spec through = walk_transmittance(t, *ray, m, &fog, &blocked, NULL);
+    *l = spec_mul(*l, through);
+    return m & m_gt(spec_max(through), f_set(0));
+}

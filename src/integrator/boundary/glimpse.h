@@ -221,16 +221,17 @@ static Spec glimpse_radiance(const Indirect *in, Int slot, const Glimpse *g, int
 }
 
 // In media, weighs l with what the pieces of the lines before the last one let through.
-static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce, Mask m, Spec l) {
+static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce, Spec l) {
     for (int32_t i = 0; i + 1 < g->line.last; i++) {
-        Mask on = m & mi_lt(i_set(i), g->turns), blocked;
+        Mask on = g->m & mi_lt(i_set(i), g->turns);
         if (!m_any(on)) {
             return l;
         }
+        Spec arrives = l;
         Vec3 o = g->line.o[i], d = g->line.d[i];
         Ray ray = {o, d, v3_dot(v3_sub(g->line.hit[i].p, o), d) * (1.0f - SHADOW_SHORT)};
-        Fog fog = {medium_around(t, o, d, on), stream_key(t, slot, bounce + MAX_BOUNCES * (i + 1), STREAM_SHADOW)};
-        l = spec_select(on, spec_mul(l, walk_transmittance(t, ray, on, &fog, &blocked, NULL)), l);
+        near_clear(t, &ray, medium_around(t, o, d, on), slot, bounce + MAX_BOUNCES * (i + 1), on, &arrives);
+        l = spec_select(on, arrives, l);
     }
     return l;
 }
@@ -257,17 +258,13 @@ static void glimpse_bring(Indirect *in, const SampleKey *key, Glimpse *g, const 
     Tracer *t = in->t;
     Spec l = spec_scale(spec_mul(f, glimpse_through(g)), g->density);
     l = spec_mul(l, glimpse_radiance(in, at->slot, g, bounce));
-    Float size = f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1))));
-    g->m = g->m & m_gt(size, f_set(0)) & m_finite(spec_sum(l));
+    g->m = g->m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (!m_any(g->m)) {
         return;
     }
     if (t->scene->has_media) {
-        Mask blocked;
-        Fog fog = {medium, stream_key(t, at->slot, bounce + MAX_BOUNCES, STREAM_SHADOW)};
-        l = spec_mul(l, walk_transmittance(t, *ray, g->m, &fog, &blocked, NULL));
-        g->m = g->m & m_gt(spec_max(spec_mul(l, l)), f_set(0));
-        l = glimpse_clear(t, g, at->slot, bounce + 1, g->m, l);
+        g->m = near_clear(t, ray, medium, at->slot, bounce + MAX_BOUNCES, g->m, &l);
+        l = glimpse_clear(t, g, at->slot, bounce + 1, l);
     } else {
         g->m = particle_open(t, ray, g->m);
     }

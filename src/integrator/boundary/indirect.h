@@ -40,26 +40,11 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
     }
 }
 
-// In media, lanes whose way to the sensor is open; *l becomes what of it arrives there.
-static Mask near_clear(Indirect *in, const Ray *ray, Int medium, Int slot, int32_t bounce, Mask m, Spec *l) {
-    if (!m_any(m)) {
-        return m;
-    }
-    Mask blocked;
-    Fog fog = {medium, stream_key(in->t, slot, bounce, STREAM_SHADOW)};
-    Spec through = walk_transmittance(in->t, *ray, m, &fog, &blocked, NULL);
-    *l = spec_mul(*l, through);
-    return m & m_gt(spec_max(through), f_set(0));
-}
-
 // Lanes of vertices in scenes with media from which paths to the sensor are not too deep.
 KFN Mask near_reaches(const Tracer *t, const Vertex *v) {
     int32_t depth = t->scene->max_depth;
     return depth < 0 ? v->m : v->m & mi_lt(v->depth + 1, i_set(depth));
 }
-
-// Jumps have either sign.
-KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }
 
 // Connects vertices to the sensor, as light tracing does (particle.h).
 static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
@@ -79,7 +64,7 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (t->scene->has_media) {
         Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
-        m = near_clear(in, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
+        m = near_clear(in->t, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
     } else if (m_any(m)) {
         // As the sensor's rays find it, which do not start above surfaces: where things touch, there is little between them.
         Ray ray = {v3_madd(at->si.p, sight.length, d), v3_neg(d), sight.length - 0.25f * interaction_step(at->si.p)};
@@ -113,7 +98,7 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
-    m = near_clear(in, &ray, v.medium, v.slot, bounce, m, &l);
+    m = near_clear(in->t, &ray, v.medium, v.slot, bounce, m, &l);
     near_book(in, &sight, l, v.slot, bounce, m);
     if (in->glimpses && m_any(v.m)) {
         glimpse_connect_air(in, &v, &c, near_lens(in, v.slot), bounce);

@@ -196,9 +196,8 @@ static NOINLINE Int strip_narrow(Tracer *t, const BoundaryJob *b, const SampleKe
         sightline_trace(t, key, lens, x, y, open, &middle);
         Int before = lines_part(t, b, line, &middle, open), behind = lines_part(t, b, &middle, line + 1, open);
         Mask either = mi_eq(behind, i_set(0)) & mi_eq((Int)bits & 1, i_set(0)), only = mi_lt(behind, i_set(0));
-        Mask later = mi_lt(i_set(0), behind) & mi_lt(behind, before);
-        Mask first = (mi_lt(i_set(0), before) & ~later) | (mi_eq(before, i_set(0)) & (either | only)), second = open & ~first;
-        first = first & open;
+        Mask earlier = mi_lt(i_set(0), before) & ~(mi_lt(i_set(0), behind) & mi_lt(behind, before));
+        Mask first = open & (earlier | (mi_eq(before, i_set(0)) & (either | only))), second = open & ~first;
         sightline_take(line + 1, &middle, first);
         sightline_take(line, &middle, second);
         s->x[1] = f_select(first, x, s->x[1]);
@@ -235,8 +234,7 @@ static Mask curve_in_band(Tracer *t, const Sightline *line, Int level, Mask m) {
     Float length = v3_length(step);
     Vec3 back = v3_select(m, v3_scale(step, -f_safe_rcp(length)), v3(f_set(0), f_set(0), f_set(1)));
     Ray ray = {v3_madd(o, -0.5f * length, back), back, 1.45f * length};
-    Hit hit = trace_solid(t->scene, &ray, m);
-    t->job->rays += m_count(m);
+    Hit hit = trace_solid(t, &ray, false, m, NULL);
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_select(m, shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     return m & mi_lt(i_set(-1), hit.shape) & ~(smooth & mi_eq(hit.shape, shape));
 }

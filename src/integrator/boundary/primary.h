@@ -97,8 +97,7 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     Mask visible = edge_between(t, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
-        Int unused = i_set(0);
-        Hit hit = view_meet(t, &ray, true, own, &unused);
+        Hit hit = trace_solid(t, &ray, true, own, NULL);
         Float reach = v3_dot(v3_sub(s->edge.p, ray.o), ray.d), found = v3_dot(v3_sub(hit.p, ray.o), ray.d);
         Mask same = mi_eq(hit.shape, s->edge.hit.shape) & mi_eq(hit.instance, s->edge.hit.instance);
         Mask here = same & m_le(f_abs(found - reach), 2e-5f * reach);

@@ -296,8 +296,7 @@ static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
     Vec3 p = s->edge.p, n;
     Float step = interaction_step(p);
     Ray back = {o, v3_neg(s->d), 32.0f * step};
-    Hit met = trace_solid(t->scene, &back, s->m);
-    t->job->rays += m_count(s->m);
+    Hit met = trace_solid(t, &back, false, s->m, NULL);
     Mask m = s->m & mi_lt(i_set(-1), met.shape);
     m = m & ~(mi_eq(met.shape, s->edge.hit.shape) & mi_eq(met.instance, s->edge.hit.instance));
     if (!m_any(m)) {
@@ -372,8 +371,7 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
         m = segment_shine(t, s, o, around, number, m);
     } else {
         Ray ahead = {o, s->d, f_set(INFINITY)};
-        s->far = trace_solid(t->scene, &ahead, m);
-        t->job->rays += m_count(m);
+        s->far = trace_solid(t, &ahead, false, m, NULL);
         m = s->attached = m & mi_lt(i_set(-1), s->far.shape);
     }
     if (!m_any(m)) {

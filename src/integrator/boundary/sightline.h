@@ -104,7 +104,7 @@ static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens,
     s->through[0] = spec_set(start.weight);
     s->last = 0;
     for (int32_t i = 0; i <= MOST_SIGHT && m_any(m); i++) {
-        Hit hit = view_meet(t, &ray, i == 0, m, &bounce);
+        Hit hit = trace_solid(t, &ray, i == 0, m, &bounce);
         s->hit[i] = hit;
         s->d[i] = ray.d;
         s->o[i] = ray.o;

@@ -127,8 +127,7 @@ static Mask turning_fly(Tracer *t, const BoundaryJob *b, const Turning *s, const
         const bool rides = boundary_is_riding(kind);
         m = leg.m & ((mi_lt(leg.air, i_set(0)) ^ m_set(rides)) | m_set(rides && b->chains)); // surfaces may be pieces of chains
     } else if (kind == BOUNDARY_HORIZON) {
-        t->job->rays += m_count(m);
-        *end = trace_solid(t->scene, ray, m);
+        *end = trace_solid(t, ray, false, m, NULL);
         m = m & (mi_lt(i_set(-1), end->shape) | m_set(t->scene->environment >= 0));
     }
     segment_keep_leg(around, &leg, q, m);

@@ -83,9 +83,9 @@ KFN Vec2 view_push(const View *v, const Seen *s, Vec3 d) {
                   y * (-0.5f * (real)v->sensor->height * p->aspect / p->tangent)};
 }
 
-// What rays meet that the sensor may have sent out (viewed): from these, lights may be hidden. In media, surfaces of the kind null
-// are passed, and counted in *bounce.
-static NOINLINE Hit view_meet(Tracer *t, const Ray *given, bool viewed, Mask m, Int *bounce) {
+// Closest hits on surfaces that are not, in media, of the kind null: these are passed, and counted in *bounce (null: not asked
+// for). viewed: rays that the sensor may have sent out, from which lights may be hidden.
+static NOINLINE Hit trace_solid(Tracer *t, const Ray *given, bool viewed, Mask m, Int *bounce) {
     const SceneView *scene = t->scene;
     Ray ray = *given;
     Hit met = {.shape = i_set(-1)};
@@ -98,7 +98,9 @@ static NOINLINE Hit view_meet(Tracer *t, const Ray *given, bool viewed, Mask m, 
         Vec3 o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
         ray.tmax = f_select(m, ray.tmax - v3_dot(v3_sub(o, ray.o), ray.d), ray.tmax);
         ray.o = v3_select(m, o, ray.o);
-        *bounce = *bounce + i_select(m, i_set(1), i_set(0));
+        if (bounce) {
+            *bounce = *bounce + i_select(m, i_set(1), i_set(0));
+        }
     }
     return met;
 }
