@@ -46,20 +46,18 @@ int rey_boundary_term(int32_t kind) {
     case BOUNDARY_FACING:
     case BOUNDARY_FACING_VIEW:
     case BOUNDARY_CHAINED_FACING:
+    case BOUNDARY_RIDING_FACING:
         return REY_TERM_TERMINATOR;
     default:
         return REY_TERM_INDIRECT;
     }
 }
 
-// Whether paths go on from surfaces in directions that follow from how they came. In media, surfaces of the kind null are passed by
-// all (sightline.h, leg.h).
-static bool has_chains(const SceneView *view) {
+bool rey_boundary_chained(const SceneView *view) {
     return rey_bsdfs_used(view, view->has_media ? rey_bsdf_mirrors : rey_bsdf_bends);
 }
 
-// Whether surfaces let light pass undeviated: in media, other than those of the kind null.
-static bool has_veils(const SceneView *view) {
+bool rey_boundary_veiled(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         bool passes = view->has_media && rey_bsdf_passes(view->bsdfs[view->shapes[i].bsdf].kind);
         if (!passes && rey_bsdf_holds(view, view->shapes[i].bsdf, rey_bsdf_opens)) {
@@ -72,11 +70,11 @@ static bool has_veils(const SceneView *view) {
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const bool passed = view->through && has_veils(view);
+    const bool passed = view->through && rey_boundary_veiled(view);
     const char *what = !rey_boundary_sees(sensor) ? "this sensor"
                        : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
                        : step                 ? step
-                       : !has_chains(view)    ? "functions that let light pass"
+                       : !rey_boundary_chained(view)    ? "functions that let light pass"
                                               : NULL;
     if (what) {
         return (ChainObstacle){what, -1, -1, what == step ? texture : -1};
@@ -119,19 +117,6 @@ static rey_result check_borders(rey_scene *scene, int term) {
     return result;
 }
 
-// Where surfaces move in media: what is not known of what collisions see.
-static rey_result check_rides(rey_scene *scene, int term) {
-    const SceneView *view = &scene->view;
-    char name[OBJECT_NAME];
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        if (view->bsdfs[i].used && rey_bsdf_turns(view->bsdfs[i].kind)) {
-            rey_name_bsdf(scene, (int32_t)i, name);
-            return refuse(scene, term, "where, in participating media, normals of maps turn away from what sees them", name);
-        }
-    }
-    return check_borders(scene, term);
-}
-
 // Whether lines of textures that a selection moves over their surfaces are known.
 static rey_result check_lines(const Render *r, int term) {
     int32_t bsdf, emitter, shape;
@@ -157,7 +142,7 @@ static const char *left_out(const SceneView *view, int term) {
             return "that 'direct' without emitter_samples never meets lights at a point or with one direction";
         }
     }
-    return view->scatter_samples == 0 && has_chains(view)
+    return view->scatter_samples == 0 && rey_boundary_chained(view)
                ? "that 'direct' without bsdf_samples sees nothing in mirrors and glass"
                : NULL;
 }
@@ -240,7 +225,7 @@ static rey_result boundary_check(const Render *r, int term) {
                           name);
         }
     }
-    return r->job.rides ? check_rides(scene, term) : term == REY_TERM_SPECULAR ? check_borders(scene, term) : REY_OK;
+    return r->job.rides || term == REY_TERM_SPECULAR ? check_borders(scene, term) : REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {
@@ -281,7 +266,8 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_CHAINED_HORIZON] = 4, [BOUNDARY_RIDING_TERMINATOR] = 4,
                                                   [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1,
                                                   [BOUNDARY_CHAINED_RIM] = 1, [BOUNDARY_FACING] = 4,
-                                                  [BOUNDARY_FACING_VIEW] = 1, [BOUNDARY_CHAINED_FACING] = 4};
+                                                  [BOUNDARY_FACING_VIEW] = 1, [BOUNDARY_CHAINED_FACING] = 4,
+                                                  [BOUNDARY_RIDING_FACING] = 4};
     int32_t asked = rey_boundary_term(kind) == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -321,19 +307,19 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     bool rides = r->job.rides, known = kind == BOUNDARY_INDIRECT || !r->scene->view.has_media;
     bool chains = rey_chains_known(&r->scene->view, r->plan.sensor);
     known |= rides && (kind == BOUNDARY_PRIMARY || kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_HORIZON);
-    known |= rides && kind == BOUNDARY_MEETING;
+    known |= rides && (kind == BOUNDARY_MEETING || kind == BOUNDARY_FACING);
     int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
         edge_count = (r->job.any_motion || r->lines) && chains;
     }
     edge_count = kind == BOUNDARY_FACING_VIEW ? 1 : edge_count;
-    edge_count = kind == BOUNDARY_CHAINED_FACING && !has_chains(&r->scene->view) ? 0 : edge_count;
+    edge_count = kind == BOUNDARY_CHAINED_FACING && !rey_boundary_chained(&r->scene->view) ? 0 : edge_count;
     const int32_t depth = r->scene->view.max_depth;
     if (boundary_is_rim(kind)) { // `direct` without emitter_samples meets no such lights
         bool lit = !r->scene->view.split || r->scene->view.light_samples > 0, deep = depth < 0 || depth > 2;
         bool chained = kind == BOUNDARY_CHAINED_RIM, moves = r->job.any_motion || r->job.any_places;
         edge_count = lit && (deep || kind == BOUNDARY_RIM_VIEW) && !r->scene->view.has_media;
-        edge_count = chained && !(moves && has_chains(&r->scene->view)) ? 0 : edge_count;
+        edge_count = chained && !(moves && rey_boundary_chained(&r->scene->view)) ? 0 : edge_count;
     }
     if (kind != BOUNDARY_PRIMARY && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
         edge_count = 0;
@@ -344,7 +330,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none,
                               .everywhere = r->turns_rays || r->lines, .lines = r->lines,
-                              .chains = boundary_is_rim(kind) ? has_chains(&r->scene->view) : chains,
+                              .chains = boundary_is_rim(kind) ? rey_boundary_chained(&r->scene->view) : chains,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;
     plan->job.job.y = r->plan.y;
@@ -369,7 +355,7 @@ static void watch_smooth_normals(Render *r, bool look_out) {
 }
 
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
-    return !has_chains(view) && rey_boundary_sees(sensor) && !view->has_media && !view->drops;
+    return !rey_boundary_chained(view) && rey_boundary_sees(sensor) && !view->has_media && !view->drops;
 }
 
 rey_result rey_boundaries_begin(Render *r) {

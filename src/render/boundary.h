@@ -11,6 +11,10 @@ void rey_boundaries_free(Render *r);
 bool rey_boundary_sees(const SensorRecord *sensor);
 // Whether a shape hides what is behind it, so that its outlines matter.
 bool rey_boundary_hides(const SceneView *view, const ShapeRecord *shape);
+// Whether paths go on from surfaces in directions that follow from how they came, and whether surfaces let light pass undeviated.
+// In media, those of the kind null are passed by all (sightline.h, leg.h), and count for neither.
+bool rey_boundary_chained(const SceneView *view);
+bool rey_boundary_veiled(const SceneView *view);
 // Whether what only vertex normals move is known for a sensor: silhouettes have no part in it.
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.

@@ -29,16 +29,13 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
     if (!rey_boundary_sees(sensor)) {
         return "of this sensor";
     }
-    if (view->has_media) {
-        return "in participating media";
-    }
     if (view->drops) {
         return "where 'path' with hide_emitters drops rays that only pass";
     }
-    if (view->through && rey_bsdfs_used(view, rey_bsdf_opens)) {
+    if (view->through && rey_boundary_veiled(view)) {
         return "beside masks and thin glass with 'volpath', whose shadow rays pass them";
     }
-    if (rey_bsdfs_used(view, rey_bsdf_bends) && !rey_chains_known(view, sensor)) {
+    if (rey_boundary_chained(view) && !rey_chains_known(view, sensor)) {
         return "beside these smooth mirrors and glass";
     }
     for (int64_t i = 0; i < view->shapes_count; i++) {
@@ -53,6 +50,10 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
         }
     }
     return NULL;
+}
+
+bool rey_facing_in_media(const SceneView *view, const Param *p) {
+    return view->has_media && p->texture >= 0 && (p->terms & REY_TERM_TERMINATOR);
 }
 
 int rey_terms_stated(const rey_scene *scene, int sensor, int terms) {

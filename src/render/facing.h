@@ -6,6 +6,9 @@
 // What keeps that from being known in a scene, null where it is.
 const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor);
 
+// Whether a parameter turns normals of maps in a scene with media, where that is known as what moves is (integrator/ride.h).
+bool rey_facing_in_media(const SceneView *view, const Param *p);
+
 // Of the terms that a parameter may need, those that it does: the jump is computed where it is known, and elsewhere looked out for.
 int rey_terms_stated(const rey_scene *scene, int sensor, int terms);
 

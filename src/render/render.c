@@ -283,7 +283,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
         bool behind = p->emitter < 0 && (p->terms & REY_TERM_SPECULAR) && (p->to_uv < 0 || (p->terms & REY_TERM_TERMINATOR));
-        r->job.any_motion |= behind;
+        r->job.any_motion |= behind || rey_facing_in_media(&r->scene->view, p);
         r->turns_rays |= behind && p->geometry < 0 && p->instance < 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;
         at += p->count;
@@ -341,7 +341,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     }
     r->job.spp = set_spp(r);
     r->rims = rey_rims_move(scene, selection);
-    r->facing = r->job.watch_turned && !rey_facing_gap(&scene->view, r->plan.sensor);
+    r->facing = r->job.watch_turned && !rey_facing_gap(&scene->view, r->plan.sensor) && (!scene->view.has_media || r->job.rides);
     r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
     return rey_boundaries_begin(r);
 }

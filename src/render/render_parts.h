@@ -43,7 +43,7 @@ typedef struct Render {
     const int32_t *none;   // the same of a selection of nothing
     bool lines;            // the selection moves lines along which textures jump over their surfaces
     bool rims;             // it moves the ends of rough refraction in the light of points or of single directions
-    bool facing;           // it moves where normals of maps turn away from what looks at them, which is known
+    bool facing;           // it moves where normals of maps turn away from what looks at them, and that is known
     bool turns_rays;       // the selection turns rays everywhere: the camera's, or mirrored and refracted ones
     float *adjoint;
     int terms;             // REY_TERM_ bits that are computed

@@ -368,8 +368,17 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
     return check_asked(scene, def, chains, selection);
 }
 
+// Whether something moves, and not only normals of maps turn.
+static bool selection_moves(const Render *r, rey_selection selection) {
+    int terms = 0;
+    for (int i = 0; i < selection.count; i++) {
+        terms |= ARRAY_AT(r->scene->params, Param, selection.params[i]).terms;
+    }
+    return terms & (REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR);
+}
+
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
-    if (result == REY_OK && (r->faces & LIGHT_WITHIN)) {
+    if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
                         "that move beside them, does not exist yet: points next to a light, from which its light is scattered, "
@@ -391,6 +400,7 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "and jump once more. --terms interior gives the part that does", p ? p->name : "", rey_term_name(bit));
     }
     const char *gap = rey_facing_gap(&r->scene->view, r->plan.sensor);
+    gap = !gap && r->scene->view.has_media && !r->job.rides ? "in participating media where no surface moves" : gap;
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                     "the gradient of %s needs the term '%s', which is not known %s: paths met shading normals that face the viewer "
                     "as the surface does and others that do not, and the picture jumps between them. --terms interior gives the "

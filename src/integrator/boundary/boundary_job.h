@@ -13,7 +13,7 @@
 // RIDING_HORIZON those that collisions see or light. RIM and RIM_VIEW are the ends of rough refraction in the light of a point or
 // of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h); CHAINED_RIM, those of segments that
 // keep their directions. FACING and FACING_VIEW are where normals of maps turn away, as other vertices and as the sensor see that
-// (facing.h, facing_view.h), and CHAINED_FACING as vertices see it along chains.
+// (facing.h, facing_view.h), and CHAINED_FACING and RIDING_FACING as vertices see it along chains, and as collisions do.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -35,6 +35,7 @@ enum {
     BOUNDARY_FACING,
     BOUNDARY_FACING_VIEW,
     BOUNDARY_CHAINED_FACING,
+    BOUNDARY_RIDING_FACING,
     BOUNDARY_KINDS
 };
 
@@ -63,7 +64,9 @@ typedef struct BoundaryJob {
 // Kinds of turning.h: curves on which n . w = 0, n the shading normal, or that of a map, of what is seen along w, or the geometric
 // normal of what looks along it; those whose segments keep their directions, as pieces of chains or because they begin one; and
 // those of them that compare what is seen on both sides of edges.
-static inline bool boundary_is_facing(int32_t kind) { return kind == BOUNDARY_FACING || kind == BOUNDARY_CHAINED_FACING; }
+static inline bool boundary_is_facing(int32_t kind) {
+    return kind == BOUNDARY_FACING || kind == BOUNDARY_CHAINED_FACING || kind == BOUNDARY_RIDING_FACING;
+}
 static inline bool boundary_is_terminator(int32_t kind) {
     return kind == BOUNDARY_TERMINATOR || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_RIDING_TERMINATOR ||
            boundary_is_facing(kind);
@@ -72,7 +75,8 @@ static inline bool boundary_is_horizon(int32_t kind) {
     return kind == BOUNDARY_HORIZON || kind == BOUNDARY_CHAINED_HORIZON || kind == BOUNDARY_RIDING_HORIZON;
 }
 static inline bool boundary_is_riding(int32_t kind) {
-    return kind == BOUNDARY_RIDING || kind == BOUNDARY_RIDING_TERMINATOR || kind == BOUNDARY_RIDING_HORIZON;
+    return kind == BOUNDARY_RIDING || kind == BOUNDARY_RIDING_TERMINATOR || kind == BOUNDARY_RIDING_HORIZON ||
+           kind == BOUNDARY_RIDING_FACING;
 }
 static inline bool boundary_is_chained(int32_t kind) {
     return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON ||
