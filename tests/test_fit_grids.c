@@ -251,7 +251,7 @@ static void test_carving(void **state) {
     assert_int_equal(rey_scene_load(f->ctx, result.scene, NULL, 0, &scene), REY_OK);
     int param = rey_param_find(scene, row->name), kept = 0;
     rey_render_def of = rey_default_render_def();
-    of.spp = 64;
+    of.spp = 16;
     assert_int_equal(rey_param_set(scene, param, values, row->count), REY_OK);
     assert_int_equal(rey_render(scene, &of, empty, NULL), REY_OK);
     for (int64_t i = 0; i < row->count; i++) {

@@ -190,10 +190,11 @@ typedef struct Score {
 // Adds seeds until the standard error is small enough; whether it became so.
 static bool measure(Room room, const Move *m, const Effort *effort, Blocks *blocks, double *rms, int *seeds) {
     static float derivative[NUMBERS];
+    const double coarse = 1 / sqrt(sample_share());
     double error = 0;
     *rms = 0;
     int seed = 0;
-    for (; seed < effort->most && (seed < effort->fewest || error > effort->aim * *rms); seed++) {
+    for (; seed < effort->most && (seed < effort->fewest || error > coarse * effort->aim * *rms); seed++) {
         double quotient[BLOCKS], forward[BLOCKS];
         difference(room, m, (uint32_t)seed, quotient, &blocks->level);
         rey_render_def def = def_make(effort->spp, (uint32_t)seed, 1);
@@ -209,13 +210,13 @@ static bool measure(Room room, const Move *m, const Effort *effort, Blocks *bloc
         *rms = seed ? rms_of(blocks, m, &error) : 0;
     }
     *seeds = seed;
-    if (getenv("REYNOLDS_TEST_VERBOSE") || error > effort->bound * *rms) {
+    if (getenv("REYNOLDS_TEST_VERBOSE") || error > coarse * effort->bound * *rms) {
         rey_param_info info;
         rey_param_get_info(room.scene, m->param, &info);
         print_message("%-44s RMS %10.3g, standard error %6.2f %%, %3d x %3d %s\n", info.name, *rms,
                       *rms > 0 ? 100 * error / *rms : 0, seed, effort->spp, m->replayed ? "replayed" : "samples");
     }
-    return error <= effort->bound * *rms;
+    return error <= coarse * effort->bound * *rms;
 }
 
 static void judge(Room room, const Move *m, const Blocks *blocks, double rms, Score *score) {
