@@ -29,11 +29,12 @@ KFN Hit walk_hit(const Hit *hit, Mask mine) {
     return safe;
 }
 
-// The medium at infinity: that of the sensor, unless it is the inside of some surface.
+// The medium at infinity: that of the sensor, unless it is the inside of some surface and not its outside, too.
 static Int medium_beyond(const Tracer *t) {
     int32_t id = t->sensor->medium;
     for (int64_t i = 0; i < t->scene->groups_count; i++) {
-        id = t->scene->groups[i].interior == t->sensor->medium ? -1 : id;
+        const Group *group = t->scene->groups + i;
+        id = group->interior == t->sensor->medium && group->exterior != t->sensor->medium ? -1 : id;
     }
     return i_set(id);
 }

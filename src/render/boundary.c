@@ -240,6 +240,7 @@ void rey_boundaries_free(Render *r) {
     }
     rey_array_free(ctx, &r->edges);
     rey_array_free(ctx, &r->fans);
+    rey_array_free(ctx, &r->sides);
     rey_array_free(ctx, &r->meetings);
     rey_array_free(ctx, &r->marks);
     rey_array_free(ctx, &r->corners);
@@ -326,7 +327,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     }
     plan->samples = sample_count(r, kind);
     plan->job = (BoundaryJob){.job = r->job, .kind = kind, .edges = plan->edges,
-                              .fans = r->fans.data, .meetings = r->meetings.data, .marks = r->marks.data, .cdf = plan->cdf,
+                              .fans = r->fans.data, .sides = r->sides.data, .meetings = r->meetings.data,
+                              .marks = r->marks.data, .cdf = plan->cdf,
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none,
                               .everywhere = r->turns_rays || r->lines, .lines = r->lines,

@@ -8,6 +8,7 @@
 #include "render/light_borders.h"
 #include "render/texture_steps.h"
 #include "shape/shape.h"
+#include "shape/shared.h"
 
 // Whether the selection moves a shape.
 static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
@@ -120,6 +121,19 @@ static bool ends_at_normals(const SceneView *view, const ShapeRecord *shape) {
 // Collisions see lights beside what they light, which is that much darker or so.
 #define RIDING_GLOW 8
 
+// Of records that stand for one edge, those of the surfaces that the selection moves count, in equal parts, or all of them where it
+// moves all or none.
+static bool counts(const Render *r, EdgeRecord *e) {
+    const bool own = shape_moves_itself(r, e->shape, e->instance);
+    int32_t all = e->side_count + 1, moved = own;
+    for (int32_t i = 0; i < e->side_count; i++) {
+        const SharedSide *side = &ARRAY_AT(r->sides, SharedSide, e->sides + i);
+        moved += shape_moves_itself(r, side->shape, side->instance);
+    }
+    e->sharers = moved > 0 ? moved : all;
+    return own || moved == 0;
+}
+
 // May cut the edge to what the film sees.
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
@@ -136,7 +150,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     }
     double factor = edge_moves(r, e) || (w->kind == BOUNDARY_PRIMARY && line_moves(r, e)) ? 1 : w->still;
     bool hides = rey_boundary_hides(view, view->shapes + e->shape);
-    if (factor == 0 || !hides || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
+    if (factor == 0 || !hides || !counts(r, e) || (w->kind == BOUNDARY_MEETING && e->kind != EDGE_MEETING)) {
         return 0;
     }
     bool turning = boundary_is_terminator(w->kind) || boundary_is_horizon(w->kind);
@@ -190,6 +204,11 @@ static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan,
     return result;
 }
 
+// Whether a shape's ends are edges of what it shares them with: lights that the sensor does not see are no faces for it.
+static bool ends_there(const SceneView *view, const ShapeRecord *shape) {
+    return rey_boundary_hides(view, shape) && !(view->hide_emitters && shape->emitter >= 0);
+}
+
 static rey_result find_edges(Render *r) {
     Array steps = {0};
     rey_result result = rey_texture_steps(r->scene, r->job.to_uv_at, &steps);
@@ -199,6 +218,7 @@ static rey_result find_edges(Render *r) {
     if (result == REY_OK) {
         result = rey_marks_find(r->scene, &steps, seen_moving, r, &r->edges, &r->marks);
     }
+    result = result == REY_OK ? rey_edges_share(r->scene, ends_there, &r->edges, &r->sides) : result;
     result = result == REY_OK ? rey_cuts_find(r->scene, &r->edges) : result;
     result = result == REY_OK && r->facing ? rey_facing_find(r->scene, &r->edges) : result;
     rey_array_free(r->scene->ctx, &steps);

@@ -50,6 +50,7 @@ typedef struct Render {
     TermRequest request;
     double booked;         // of a set's value: what its terms have brought so far
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
+    Array sides;           // of edges that several surfaces share (shape/shared.h)
     Array meetings;        // curves that two boundary terms share (shape/meetings.h)
     bool meetings_found;
     Array corners;         // where the interior term looks through lenses (shape/corners.h)

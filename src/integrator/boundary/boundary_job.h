@@ -4,6 +4,7 @@
 #include "integrator/job.h"
 #include "shape/marks.h"
 #include "shape/meetings.h"
+#include "shape/shared.h"
 
 // What the camera sees; silhouettes that other vertices see, and where they meet surfaces whose shading normals turn away, or
 // whose geometric normals do (turning.h); curves that they see along which surfaces pass through each other (meeting.h); edges
@@ -44,6 +45,7 @@ typedef struct BoundaryJob {
     int32_t kind;             // BOUNDARY_
     const EdgeRecord *edges;
     const int32_t *fans;      // see EdgeRecord
+    const SharedSide *sides;
     const MeetingRecord *meetings;
     const MarkRecord *marks;
     const StepRecord *steps;  // where textures jump: those of a shape from step_at[shape] to step_at[shape + 1]

@@ -36,12 +36,12 @@ KFN Vec3 chained_offset(const Segment *s) {
 }
 
 // Lanes of m from whose near points rays meet the edge between its surfaces.
-static Mask chained_between(Tracer *t, const Segment *s, Vec3 near, Mask m, Float *behind) {
+static Mask chained_between(Tracer *t, const BoundaryJob *b, const Segment *s, Vec3 near, Mask m, Float *behind) {
     const EdgePoint *e = &s->edge;
     *behind = f_select(m, v3_length(v3_sub(near, e->p)), f_set(1));
     Float step = chained_step(e->p, e->meeting);
     Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, step, 0), chained_ray(e->p, s->d, s->n, *behind, step, 1)};
-    return edge_between(t, e, false, s->silhouette, s->n, rays, m);
+    return edge_between(t, b, e, false, s->silhouette, s->n, rays, m);
 }
 
 // Stores the segments of m, in any direction. Where surfaces pass through each other, the edge moves with both (meeting.h): `far`
@@ -72,7 +72,7 @@ static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind
 }
 
 // Finds the near points of segments in any direction, and keeps those that meet the edge between its surfaces.
-static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) {
+static void chained_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int number, Segments *q) {
     Vec3 o = chained_offset(s);
     Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
     t->job->rays += m_count(s->m);
@@ -80,7 +80,7 @@ static void chained_trace(Tracer *t, const Segment *s, Int number, Segments *q) 
     Mask m = s->m & mi_lt(i_set(-1), near.shape);
     if (m_any(m)) {
         Float behind;
-        m = chained_between(t, s, near.p, m, &behind);
+        m = chained_between(t, b, s, near.p, m, &behind);
         chained_keep(s, o, &near, behind, number, q, m);
     }
 }
@@ -100,7 +100,7 @@ static void chained_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t
         if (m_any(s.m) && turn.lit) {
             segment_trace(t, &s, true, i_iota() + i, q);
         } else if (m_any(s.m)) {
-            chained_trace(t, &s, i_iota() + i, q);
+            chained_trace(t, b, &s, i_iota() + i, q);
         }
     }
     // The far points lie where the rays meet their surfaces.

@@ -17,6 +17,31 @@
     f_gather((const float *)(job)->meetings,                                                                           \
              (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4) + (k))
 
+#define SHARED_INT(job, i, field)                                                                                      \
+    i_gather((const int32_t *)(job)->sides,                                                                            \
+             (i) * (int32_t)(sizeof(SharedSide) / 4) + (int32_t)(offsetof(SharedSide, field) / 4))
+#define SHARED_FLOAT(job, i, k)                                                                                        \
+    f_gather((const float *)(job)->sides,                                                                              \
+             (i) * (int32_t)(sizeof(SharedSide) / 4) + (int32_t)(offsetof(SharedSide, side) / 4) + (k))
+
+// From the points p of edges into number i of the other surfaces that end there.
+static Vec3 edge_shared_side(const BoundaryJob *b, Int i, Vec3 p) {
+    Vec3 side = v3(SHARED_FLOAT(b, i, 0), SHARED_FLOAT(b, i, 1), SHARED_FLOAT(b, i, 2));
+    return v3_select(mi_eq(SHARED_INT(b, i, radial), i_set(1)), v3_sub(side, p), side);
+}
+
+// The points of edges that other surfaces share: these have two sides, as those within meshes.
+static void edge_of_several(const BoundaryJob *b, Int e, EdgePoint *out) {
+    Mask shared = mi_lt(i_set(0), out->side_count);
+    if (!m_any(shared)) {
+        return;
+    }
+    out->sides = i_select(shared, EDGE_FIELD(b, e, sides), i_set(0));
+    out->side[1] = v3_select(shared, edge_shared_side(b, out->sides, out->p), out->side[1]);
+    out->open = out->open & ~shared;
+    out->probability = out->probability * f_from_i(i_max(EDGE_FIELD(b, e, sharers), i_set(1)));
+}
+
 static void edge_of_mesh(const SceneView *scene, const BoundaryJob *b, Int e, Float t, Mask m, EdgePoint *out) {
     Int corner = i_select(m, EDGE_FIELD(b, e, corner), i_set(0));
     Hit hit = out->hit;
@@ -223,6 +248,8 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.other = EDGE_FIELD(b, e, other);
     out.fan = EDGE_FIELD(b, e, fan);
     out.fan_count = EDGE_FIELD(b, e, fan_count);
+    out.sides = i_set(0);
+    out.side_count = EDGE_FIELD(b, e, side_count);
     out.origin = v3_zero();
     out.crease = mi_lt(i_set(0), EDGE_FIELD(b, e, crease));
     Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
@@ -232,6 +259,7 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
         edge_of_mesh(scene, b, e, t, mesh, &out);
     }
     edge_of_round(scene, b, e, kind, t, eye, parallel, &out);
+    edge_of_several(b, e, &out);
     if (m_any(terminator)) {
         out.hit.prim = i_select(terminator, EDGE_FIELD(b, e, prim), out.hit.prim);
         edge_of_terminator(scene, t, eye, parallel, terminator, &out);
@@ -294,24 +322,46 @@ static Mask edge_is_silhouette(const SceneView *scene, const BoundaryJob *b, con
         }
         silhouette = silhouette & (~left | edge_goes_with(e, side, n, d, first));
     }
+    left = silhouette & mi_lt(i_set(1), e->side_count);
+    for (int32_t i = 1; m_any(left); i++, left = left & mi_lt(i_set(i), e->side_count)) {
+        Vec3 side = edge_shared_side(b, i_select(left, e->sides + i, i_set(0)), e->p);
+        silhouette = silhouette & (~left | edge_goes_with(e, side, n, d, first));
+    }
     return silhouette;
 }
 
+// Lanes of m in which hits lie on one of the other surfaces that end there; *faces: in its part that does.
+static Mask edge_meets_others(const BoundaryJob *b, const EdgePoint *e, const Hit *hit, Mask m, Mask *faces) {
+    Mask found = m_set(false), left = m & mi_lt(i_set(0), e->side_count);
+    *faces = found;
+    for (int32_t i = 0; m_any(left); i++, left = left & mi_lt(i_set(i), e->side_count)) {
+        Int at = i_select(left, e->sides + i, i_set(0)), prim = SHARED_INT(b, at, prim);
+        Mask one = left & mi_eq(hit->shape, SHARED_INT(b, at, shape)) & mi_eq(hit->instance, SHARED_INT(b, at, instance));
+        found = found | one;
+        *faces = *faces | (one & mi_eq(hit->prim, prim));
+    }
+    return found;
+}
+
 // Lanes of m in which nothing hides the edge's point itself. viewed: from the sensor.
-static Mask edge_is_seen(Tracer *t, const EdgePoint *e, bool viewed, const Ray rays[2], Mask m) {
+static Mask edge_is_seen(Tracer *t, const BoundaryJob *b, const EdgePoint *e, bool viewed, const Ray rays[2], Mask m) {
     Vec3 o = v3_scale(v3_add(rays[0].o, rays[1].o), f_set((real)0.5)), to = v3_sub(e->p, o);
     Float reach = v3_length(to);
     Ray ray = {o, v3_scale(to, f_safe_rcp(reach)), f_set(INFINITY)};
     Hit hit = trace_solid(t, &ray, viewed, m, NULL);
     Mask own = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance) &
                (e->round | mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other));
+    Mask faces;
+    edge_meets_others(b, e, &hit, m, &faces);
+    own = own | faces;
     return m & (mi_lt(hit.shape, i_set(0)) | own | m_gt(v3_dot(v3_sub(hit.p, o), ray.d), reach * (1.0f - 1e-4f)));
 }
 
 // Lanes of m in which two rays, the second one on the side of n, pass an edge between the surfaces that meet or end there. Next
 // to a corner a path may miss them; what it meets instead belongs to another edge's jump. viewed: they come from the sensor.
-static Mask edge_between(Tracer *t, const EdgePoint *e, bool viewed, Mask silhouette, Vec3 n, const Ray rays[2], Mask m) {
-    Mask own[2], clear[2], grazed[2], above = m_gt(edge_first_rise(e, n), f_set(0));
+static Mask edge_between(Tracer *t, const BoundaryJob *b, const EdgePoint *e, bool viewed, Mask silhouette, Vec3 n,
+                         const Ray rays[2], Mask m) {
+    Mask own[2], clear[2], grazed[2], here[2], above = m_gt(edge_first_rise(e, n), f_set(0));
     for (int side = 0; side < 2; side++) {
         Ray ray = rays[side];
         Hit hit = trace_solid(t, &ray, viewed, m, NULL);
@@ -324,23 +374,29 @@ static Mask edge_between(Tracer *t, const EdgePoint *e, bool viewed, Mask silhou
         own[side] = mi_eq(hit.shape, e->hit.shape) & mi_eq(hit.instance, e->hit.instance);
         Mask faces = own[side] & (mi_eq(hit.prim, e->hit.prim) | mi_eq(hit.prim, e->other) |
                                   (own_near & mi_eq(e->other, i_set(EDGE_ANY))));
+        Mask their_faces, others = edge_meets_others(b, e, &hit, met, &their_faces);
+        faces = faces | their_faces;
         if (m_any(e->meeting)) {
             Mask other = met & mi_eq(hit.shape, e->met.shape) & mi_eq(hit.instance, e->met.instance);
             faces = faces | (e->meeting & met_near & other);
         }
         // Of a rim that is seen edge-on, one half hides the other.
         Mask rim = mi_eq(e->other, i_set(EDGE_ANY)) & ~e->round;
-        own[side] = (silhouette & own[side] & (~rim | near)) | faces;
+        own[side] = (silhouette & (own[side] | others) & (~rim | near)) | faces;
+        here[side] = own[side] & m_le(f_abs(found - reach), 1e-2f * reach);
         clear[side] = ~met | m_gt(found, reach * (1.0f - 1e-4f));
         grazed[side] = ~clear[side] & m_gt(found, reach * (1.0f - 2e-2f));
     }
     // What the edge stands on is met just before it.
     Mask open = m & silhouette & ((above & own[1] & grazed[0]) | (~above & own[0] & grazed[1]));
     if (m_any(open)) {
-        Mask seen = edge_is_seen(t, e, viewed, rays, open);
+        Mask seen = edge_is_seen(t, b, e, viewed, rays, open);
         clear[0] = clear[0] | (seen & grazed[0]);
         clear[1] = clear[1] | (seen & grazed[1]);
     }
     Mask inside = (above & own[1] & clear[0]) | (~above & own[0] & clear[1]);
-    return m & ((silhouette & inside) | (~silhouette & own[0] & own[1]));
+    // Where the side of a cylinder comes into view beside a disk that closes it, it is narrower than the rays are apart.
+    Mask closed = mi_eq(e->other, i_set(EDGE_ANY)) & mi_lt(i_set(0), e->side_count);
+    Mask beside = closed & ((here[0] & clear[1]) | (here[1] & clear[0]));
+    return m & ((silhouette & inside) | (~silhouette & ((own[0] & own[1]) | beside)));
 }

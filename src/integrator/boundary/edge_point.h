@@ -12,6 +12,7 @@ typedef struct EdgePoint {
     Mask open, crease;
     Int other;          // the second triangle, or EDGE_
     Int fan, fan_count; // see EdgeRecord; 0 where none
+    Int sides, side_count; // the same; the first of these is side[1]
     Vec3 origin;        // of a mesh's edge: its first vertex, in its own space
     Mask round;         // which points it has depends on the eye
     Vec3 inner, middle; // of round ones: the point beside it whose normal is turned to the eye by OUTLINE_TURN; a point inside,

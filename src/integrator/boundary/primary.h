@@ -84,7 +84,7 @@ static Mask primary_is_smooth(const Tracer *t, const PrimarySample *s) {
 }
 
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
-static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
+static Mask primary_visible(Tracer *t, const BoundaryJob *b, const PrimarySample *s, Mask m) {
     const Ray rays[2] = {primary_ray(t, s, -1).ray, primary_ray(t, s, 1).ray};
     if (t->scene->hide_emitters) { // the sensor sees nothing of lights
         m = m & mi_lt(SHAPE_FIELD(t->scene, i_select(m, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
@@ -94,7 +94,7 @@ static Mask primary_visible(Tracer *t, const PrimarySample *s, Mask m) {
     Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
     Mask inner = primary_is_smooth(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
     Mask clips = edge_clips(&s->edge), own = m & (s->edge.mark | turns | inner | clips);
-    Mask visible = edge_between(t, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
+    Mask visible = edge_between(t, b, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
         Hit hit = trace_solid(t, &ray, true, own, NULL);
@@ -120,7 +120,7 @@ static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinh
         batch_numbers(t, i, first);
         PrimarySample s;
         primary_sample(t, b, pinhole, slot, m, &s);
-        Mask visible = m_any(s.m) ? primary_visible(t, &s, s.m) : s.m;
+        Mask visible = m_any(s.m) ? primary_visible(t, b, &s, s.m) : s.m;
         i_compress(kept + kept_count, slot, visible);
         kept_count += m_count(visible);
     }

@@ -39,7 +39,7 @@ static void riding_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int 
     Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air) | m_set(b->chains));
     if (m_any(m)) {
         Float behind;
-        m = chained_between(t, s, leg.near.p, m, &behind);
+        m = chained_between(t, b, s, leg.near.p, m, &behind);
         segment_keep_leg(around, &leg, q, m);
         i_compress(q->sighted + q->count, i_set(0), m);
         chained_keep(s, o, &leg.near, behind, number, q, m);
@@ -93,7 +93,7 @@ static NOINLINE Spec extinction_at(const Tracer *t, Int medium, Vec3 p, Vec3 d, 
 }
 
 // Keeps those of them that the edge sees.
-static void riding_see(Tracer *t, Segment *s, Vec3 near, Int number, Segments *q) {
+static void riding_see(Tracer *t, const BoundaryJob *b, Segment *s, Vec3 near, Int number, Segments *q) {
     Vec3 o = chained_offset(s), d = v3_neg(s->d);
     Leg leg = {.air = medium_around(t, near, s->d, s->m)};
     leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
@@ -109,7 +109,7 @@ static void riding_see(Tracer *t, Segment *s, Vec3 near, Int number, Segments *q
     leg.around = leg.air;
     m = m & m_gt(spec_max(leg.weight), f_set(0));
     Float behind;
-    m = chained_between(t, s, near, m, &behind);
+    m = chained_between(t, b, s, near, m, &behind);
     segment_keep_leg(around, &leg, q, m);
     i_compress(q->sighted + q->count, i_set(1), m);
     chained_keep(s, o, &leg.near, behind, number, q, m);
@@ -129,7 +129,7 @@ static void ridings_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         if (turn.sighted) {
             Vec3 near = riding_sight(t, b, pinhole, i_iota() + i, turn.share, m_first_n(count - i), &s);
             if (m_any(s.m)) {
-                riding_see(t, &s, near, i_iota() + i, q);
+                riding_see(t, b, &s, near, i_iota() + i, q);
             }
             continue;
         }
