@@ -48,6 +48,17 @@ static bool surfaces_separate(const SceneView *scene) {
     return false;
 }
 
+// The directions from o, on the side of a wall that `up` points to, in which rays look for what parts media after number i of the
+// walls that have thrown them back: towards such surfaces by turns, or as mirrors would have it.
+static Vec3 beacon_direction(const SceneView *scene, int32_t i, Vec3 o, Vec3 up, Vec3 mirrored) {
+    if (i % 2 || scene->beacons_count == 0) {
+        return mirrored;
+    }
+    const float *p = scene->beacons[i / 2 % scene->beacons_count];
+    Vec3 d = v3_normalize(v3_sub(v3(f_set((real)p[0]), f_set((real)p[1]), f_set((real)p[2])), o));
+    return v3_select(m_gt(v3_dot(d, up), f_set((real)1e-3)), d, mirrored);
+}
+
 // The media around points: a ray along d says so where it meets a surface that has a medium on either side. All others leave light
 // in its medium: the ray passes those that let light pass, and is thrown back by those that do not. Where it gets away, it tries
 // the other way; where it finds no such surface, the medium is the sensor's.
@@ -77,8 +88,10 @@ static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
             } else if (scene->bsdfs[group->bsdf].transmits) {
                 o = v3_select(mine, interaction_behind(&si, d), o);
             } else {
-                d = v3_select(mine, v3_neg(reflect(d, si.ng)), d);
-                o = v3_select(mine, interaction_offset(&si, d), o);
+                Vec3 mirrored = v3_neg(reflect(d, si.ng)), from = interaction_offset(&si, mirrored);
+                Vec3 up = v3_scale(si.ng, f_copysign(f_set(1), v3_dot(si.ng, mirrored)));
+                d = v3_select(mine, beacon_direction(scene, i, from, up, mirrored), d);
+                o = v3_select(mine, from, o);
             }
         }
     }

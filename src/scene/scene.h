@@ -214,7 +214,7 @@ typedef struct Group {
     int32_t interior, exterior;
 } Group;
 
-enum { MOST_OWN_SPHERES = 32 };
+enum { MOST_OWN_SPHERES = 32, MOST_BEACONS = 8 };
 
 // What a kernel sees: the arrays, and uniform facts.
 typedef struct SceneView {
@@ -232,6 +232,8 @@ typedef struct SceneView {
     void *embree;             // RTCScene
     // Spheres that stand in the scene by themselves and that kernels meet instead of Embree: all of them, or none.
     int32_t own_spheres[MOST_OWN_SPHERES], own_spheres_count;
+    int32_t beacons_count;    // of the next: points of surfaces that part media, or within them
+    float beacons[MOST_BEACONS][3];
     bool borders_touch;       // faces at which media end lie in other faces (shape/touches.h)
     int32_t collections;      // number of shapegroups
     bool uniform_emitters;    // every emitter is chosen with the same probability

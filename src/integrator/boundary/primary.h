@@ -128,12 +128,18 @@ static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinh
 }
 
 // In media, what lies before the edge is on both sides the same: the paths k and half + k begin half-way between the edge and the
-// last border before it, in lanes of m, with what gets there; their media begin at the edge.
+// last border before it, in lanes of m, with what gets there; their media begin at the edge. Where the near plane cuts surfaces, nothing
+// lies before the edge.
 static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32_t half, Mask m) {
     Paths *p = &t->ws.paths[0];
     const EdgePoint *e = &s->edge;
     Ray ray = primary_ray(t, s, 0).ray;
     Float reach = v3_dot(v3_sub(e->p, ray.o), ray.d), step = interaction_step(e->p);
+    Mask begins = edge_clips(e) & mi_eq(e->met.prim, i_set(BORDER_NEAR));
+    m = m & ~begins;
+    if (!m_any(m)) {
+        return;
+    }
     Vec3 out = v3_scale(s->n, f_select(m_gt(edge_first_rise(e, s->n), f_set(0)), -step, step));
     Vec3 from = v3_select(s->silhouette, v3_add(e->p, out), v3_madd(e->p, -4.0f * step, ray.d));
     Ray back = {from, v3_neg(ray.d), reach};
@@ -148,13 +154,13 @@ static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32
     for (int side = 0; side < 2; side++) {
         int32_t at = side * half + k;
         Vec3 d = record_v3(p->dx, p->dy, p->dz, at), o = record_v3(p->ox, p->oy, p->oz, at);
-        o = v3_madd(o, reach - 0.5f * clear, d);
+        o = v3_madd(o, f_zero_unless(~begins, reach - 0.5f * clear), d);
         f_store(p->ox + at, o.x);
         f_store(p->oy + at, o.y);
         f_store(p->oz + at, o.z);
-        f_store(p->skip + at, -0.5f * clear);
-        i_store(p->medium + at, medium);
-        spec_store(p->beta, at, spec_mul(spec_load(p->beta, at), spec_zero_unless(m, arrives)));
+        f_store(p->skip + at, f_zero_unless(~begins, -0.5f * clear));
+        i_store(p->medium + at, i_select(begins, i_load(p->medium + at), medium));
+        spec_store(p->beta, at, spec_mul(spec_load(p->beta, at), spec_select(begins, spec_set(f_set(1)), spec_zero_unless(m, arrives))));
     }
 }
 
