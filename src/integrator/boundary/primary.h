@@ -128,8 +128,8 @@ static int32_t primary_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinh
 }
 
 // In media, what lies before the edge is on both sides the same: the paths k and half + k begin half-way between the edge and the
-// last border before it, in lanes of m, with what gets there; their media begin at the edge. Where the near plane cuts surfaces, nothing
-// lies before the edge.
+// last border before it, in lanes of m, with what gets there; their media begin at the edge. Where the near plane cuts surfaces,
+// nothing lies before the edge.
 static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32_t half, Mask m) {
     Paths *p = &t->ws.paths[0];
     const EdgePoint *e = &s->edge;
@@ -160,7 +160,8 @@ static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32
         f_store(p->oz + at, o.z);
         f_store(p->skip + at, f_zero_unless(~begins, -0.5f * clear));
         i_store(p->medium + at, i_select(begins, i_load(p->medium + at), medium));
-        spec_store(p->beta, at, spec_mul(spec_load(p->beta, at), spec_select(begins, spec_set(f_set(1)), spec_zero_unless(m, arrives))));
+        arrives = spec_select(begins, spec_set(f_set(1)), spec_zero_unless(m, arrives));
+        spec_store(p->beta, at, spec_mul(spec_load(p->beta, at), arrives));
     }
 }
 
