@@ -48,20 +48,35 @@ static bool surfaces_separate(const SceneView *scene) {
     return false;
 }
 
-// The directions from o, on the side of a wall that `up` points to, in which rays look for what parts media after number i of the
-// walls that have thrown them back: towards such surfaces by turns, or as mirrors would have it.
-static Vec3 beacon_direction(const SceneView *scene, int32_t i, Vec3 o, Vec3 up, Vec3 mirrored) {
+// The direction from o towards number i of the surfaces that part media.
+static Vec3 beacon_direction(const SceneView *scene, int32_t i, Vec3 o) {
+    const float *p = scene->beacons[i % scene->beacons_count];
+    return v3_normalize(v3_sub(v3(f_set((real)p[0]), f_set((real)p[1]), f_set((real)p[2])), o));
+}
+
+// The directions in which rays along d that got away look for such surfaces: not straight back, where there may be an edge, between
+// whose faces rays slip through.
+static Vec3 medium_other_way(const SceneView *scene, Vec3 o, Vec3 d) {
+    if (scene->beacons_count > 0) {
+        return beacon_direction(scene, 0, o);
+    }
+    Frame across = frame_from_normal(d);
+    return v3_normalize(v3_madd(v3_neg(d), f_set((real)0.02), v3_madd(across.s, f_set((real)0.37), across.t)));
+}
+
+// Those in which they go on from a wall that threw them back, number i of these: towards such surfaces by turns where they lie on
+// its side, which `up` points to, else as mirrors would have it.
+static Vec3 medium_thrown_back(const SceneView *scene, int32_t i, Vec3 o, Vec3 up, Vec3 mirrored) {
     if (i % 2 || scene->beacons_count == 0) {
         return mirrored;
     }
-    const float *p = scene->beacons[i / 2 % scene->beacons_count];
-    Vec3 d = v3_normalize(v3_sub(v3(f_set((real)p[0]), f_set((real)p[1]), f_set((real)p[2])), o));
+    Vec3 d = beacon_direction(scene, i / 2, o);
     return v3_select(m_gt(v3_dot(d, up), f_set((real)1e-3)), d, mirrored);
 }
 
 // The media around points: a ray along d says so where it meets a surface that has a medium on either side. All others leave light
 // in its medium: the ray passes those that let light pass, and is thrown back by those that do not. Where it gets away, it tries
-// the other way; where it finds no such surface, the medium is the sensor's.
+// another way; where it finds no such surface, the medium is the sensor's.
 static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
     const SceneView *scene = t->scene;
     Int medium = i_set(t->sensor->medium);
@@ -73,7 +88,9 @@ static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
         Mask met = left & mi_lt(i_set(-1), hit.shape), lost = left & ~met & turned;
         medium = m_any(lost) ? i_select(lost, medium_beyond(t), medium) : medium;
         turned = turned | (left & ~met);
-        d = v3_select(left & ~met, v3_neg(d), d);
+        if (m_any(left & ~met)) {
+            d = v3_select(left & ~met, medium_other_way(scene, o, d), d);
+        }
         left = left & ~lost;
         Int groups = SHAPE_FIELD(scene, i_max(hit.shape, i_set(0)), group);
         for (Mask rest = met, mine; m_any(rest); rest = rest & ~mine) {
@@ -90,7 +107,7 @@ static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
             } else {
                 Vec3 mirrored = v3_neg(reflect(d, si.ng)), from = interaction_offset(&si, mirrored);
                 Vec3 up = v3_scale(si.ng, f_copysign(f_set(1), v3_dot(si.ng, mirrored)));
-                d = v3_select(mine, beacon_direction(scene, i, from, up, mirrored), d);
+                d = v3_select(mine, medium_thrown_back(scene, i, from, up, mirrored), d);
                 o = v3_select(mine, from, o);
             }
         }

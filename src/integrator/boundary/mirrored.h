@@ -239,6 +239,19 @@ static Mask curve_in_band(Tracer *t, const Sightline *line, Int level, Mask m) {
     return m & mi_lt(i_set(-1), hit.shape) & ~(smooth & mi_eq(hit.shape, shape));
 }
 
+// How near to its edge a point of a triangle lies beyond it, as far as floats can tell [barycentric].
+#define TRIANGLE_END 3e-7f
+
+// Lanes of m in which rays leave a triangle at its very edge: of a convex body they may begin outside of the next face, which they
+// should meet at once. What they see instead parts them from others, in a band that is as narrow as rounding.
+static Mask curve_at_end(const SceneView *scene, const Sightline *line, Int level, Mask m) {
+    Ends before;
+    ends_load(line, level - 1, 0, &before);
+    const Hit *h = before.hit;
+    Mask mesh = mi_eq(SHAPE_FIELD(scene, i_select(m, h->shape, i_set(0)), kind), i_set(SHAPE_MESH));
+    return m & mesh & m_lt(f_min(f_min(h->u, h->v), 1.0f - h->u - h->v), f_set(TRIANGLE_END));
+}
+
 static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const Strip *s, Mask m, Curve *c) {
     SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
     Sink still = sink_of(b->still);
@@ -248,6 +261,7 @@ static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const
     c->level = lines_part(t, b, c->line, c->line + 1, m);
     m = m & mi_lt(i_set(0), c->level);
     m = m & ~curve_in_band(t, c->line, c->level, m) & ~curve_in_band(t, c->line + 1, c->level, m);
+    m = m & ~curve_at_end(t->scene, c->line, c->level, m) & ~curve_at_end(t->scene, c->line + 1, c->level, m);
     c->crossing = crossing_find(t, b, c->line, c->level, m);
     Carried carried = crossing_move_adj(t, &c->crossing, c->line, c->level, f_set(1), &still);
     c->x = 0.5f * (s->x[0] + s->x[1]);

@@ -33,7 +33,7 @@ static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number
 // Segments in any direction. Surfaces that scatter see the same air on both sides of an edge between two faces.
 static void riding_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int number, Segments *q) {
     Vec3 o = chained_offset(s);
-    Int around = medium_around(t, o, s->d, s->m);
+    Int around = medium_around(t, o, v3_neg(s->d), s->m); // towards the edge, rays may slip through between its faces
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
     Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air) | m_set(b->chains));
@@ -95,14 +95,14 @@ static NOINLINE Spec extinction_at(const Tracer *t, Int medium, Vec3 p, Vec3 d, 
 // Keeps those of them that the edge sees.
 static void riding_see(Tracer *t, const BoundaryJob *b, Segment *s, Vec3 near, Int number, Segments *q) {
     Vec3 o = chained_offset(s), d = v3_neg(s->d);
-    Leg leg = {.air = medium_around(t, near, s->d, s->m)};
+    Leg leg = {.air = medium_around(t, near, d, s->m)};
     leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
     leg.weight = extinction_at(t, leg.air, near, d, s->m);
     Mask m = s->m & m_gt(spec_max(leg.weight), f_set(0)), blocked;
     if (!m_any(m)) {
         return;
     }
-    Int around = medium_around(t, o, s->d, m);
+    Int around = medium_around(t, o, d, m);
     Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE)};
     Ray back = {o, d, v3_length(v3_sub(near, o))};
     leg.weight = spec_mul(leg.weight, walk_transmittance(t, back, m, &fog, &blocked, NULL));
