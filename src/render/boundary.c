@@ -368,6 +368,7 @@ rey_result rey_boundaries_begin(Render *r) {
     if (look_out && !r->rims) {
         r->terms &= REY_TERM_INTERIOR | REY_TERM_TERMINATOR;
     }
+    result = rey_check_clipped_media(r);
     bool twins_sought = !(r->job.any_motion || r->job.any_places);
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
         bool facing = boundary_is_facing(i) || i == BOUNDARY_FACING_VIEW;

@@ -192,12 +192,16 @@ static rey_result find_meetings(Render *r) {
     return rey_meetings_with_borders(r->scene, clip, 4, seen_moving, r, &r->meetings);
 }
 
+static EdgeRecord meeting_edge(const Render *r, size_t i) {
+    return (EdgeRecord){.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
+                        .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};
+}
+
 // Keeps the curves along which surfaces pass through each other, as far as the sensor sees them.
 static rey_result keep_meetings(Render *r, const Weigher *w, BoundaryPlan *plan, Array *kept, Array *weights) {
     rey_result result = r->meetings_found ? REY_OK : find_meetings(r);
     for (size_t i = 0; i < r->meetings.count && result == REY_OK; i++) {
-        EdgeRecord e = {.kind = EDGE_MEETING, .shape = ARRAY_AT(r->meetings, MeetingRecord, i).shape[0], .prim = (int32_t)i,
-                        .opposite = EDGE_OPEN, .other = EDGE_ANY, .crease = EDGE_CREASE, .last = 1};
+        EdgeRecord e = meeting_edge(r, i);
         double weight = edge_weight(r, w, &e);
         result = keep_edge(r, &e, weight, &plan->job.round, kept, weights);
     }
@@ -243,4 +247,38 @@ rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan) {
     rey_array_free(r->scene->ctx, &kept);
     rey_array_free(r->scene->ctx, &weights);
     return result;
+}
+
+// Whether a surface is the border of a medium, and no more, and the sensor sees it move.
+static bool border_moves(const void *render, int32_t id, int32_t instance) {
+    const Render *r = render;
+    const SceneView *view = &r->scene->view;
+    const ShapeRecord *shape = view->shapes + (id < 0 ? 0 : id);
+    const Group *group = view->groups + shape->group;
+    bool border = id >= 0 && !rey_boundary_hides(view, shape) && group->interior != group->exterior;
+    return border && moves_on_film(r, id, instance);
+}
+
+rey_result rey_check_clipped_media(const Render *given) {
+    Render r = *given; // with meetings of its own
+    LightBorder clip[4];
+    char name[OBJECT_NAME] = "";
+    r.meetings = (Array){0};
+    if (!r.scene->view.has_media || r.def.terms || !rey_boundary_sees(r.plan.sensor)) {
+        return REY_OK;
+    }
+    rey_clip_borders(&r.scene->view, &r.plan, clip);
+    rey_result result = rey_meetings_find(r.scene, clip, 4, border_moves, &r, &r.meetings);
+    const Weigher w = weigher_of(&r, BOUNDARY_PRIMARY);
+    for (size_t i = 0; i < r.meetings.count && result == REY_OK && !name[0]; i++) {
+        EdgeRecord e = meeting_edge(&r, i);
+        if (clips(&r, &e) && border_moves(&r, e.shape, 0) && rey_edge_on_film(&r, &w.projection, w.eye, &e) > 0) {
+            rey_name_shape(r.scene, e.shape, name);
+        }
+    }
+    rey_array_free(r.scene->ctx, &r.meetings);
+    return name[0] ? rey_fail(r.scene->ctx, REY_ERROR_INCOMPLETE,
+                              "the gradient does not exist yet of what moves while near_clip or far_clip cuts the border of a medium "
+                              "('%s'): the picture jumps where rays begin or end on it. --terms interior gives the rest", name)
+                   : result;
 }

@@ -7,3 +7,6 @@
 // of edges that move, by its length on the film; silhouettes that any vertex may see, by length and by the angle that they are
 // silhouettes in; or triangles, by area and by the angle between their normals.
 rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan);
+
+// Refuses what moves where the sensor's near or far plane cuts the border of a medium in view, unless terms were asked for by name.
+rey_result rey_check_clipped_media(const Render *given);
