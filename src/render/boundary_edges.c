@@ -278,7 +278,8 @@ rey_result rey_check_clipped_media(const Render *given) {
     }
     rey_array_free(r.scene->ctx, &r.meetings);
     return name[0] ? rey_fail(r.scene->ctx, REY_ERROR_INCOMPLETE,
-                              "the gradient does not exist yet of what moves while near_clip or far_clip cuts the border of a medium "
-                              "('%s'): the picture jumps where rays begin or end on it. --terms interior gives the rest", name)
+                              "the gradient does not exist yet of what moves while near_clip or far_clip cuts the border of a "
+                              "medium ('%s'): the picture jumps where rays begin or end on it. --terms interior gives the rest",
+                              name)
                    : result;
 }
