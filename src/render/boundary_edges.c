@@ -263,8 +263,12 @@ rey_result rey_check_clipped_media(const Render *given) {
     Render r = *given; // with meetings of its own
     LightBorder clip[4];
     char name[OBJECT_NAME] = "";
+    bool any = false;
     r.meetings = (Array){0};
-    if (!r.scene->view.has_media || r.def.terms || !rey_boundary_sees(r.plan.sensor)) {
+    for (int32_t i = 0; i < r.scene->view.shapes_count && r.scene->view.has_media && !any; i++) {
+        any = border_moves(&r, i, 0) || r.scene->view.shapes[i].collection >= 0;
+    }
+    if (!any || r.def.terms || !rey_boundary_sees(r.plan.sensor)) {
         return REY_OK;
     }
     rey_clip_borders(&r.scene->view, &r.plan, clip);
