@@ -270,14 +270,17 @@ static rey_result add_shape(rey_scene *scene, int32_t id) {
 
 // The middle of a sphere, or about that of a mesh.
 static void middle_of(const SceneView *view, const ShapeRecord *shape, float p[3]) {
-    const int32_t n = shape->vertex_count, step = 1 + n / 256;
+    if (shape->kind == SHAPE_SPHERE) {
+        memcpy(p, view->tables + shape->table, 3 * sizeof *p);
+        return;
+    }
+    const int32_t step = 1 + shape->vertex_count / 256;
     for (int k = 0; k < 3; k++) {
-        double sum = shape->kind == SHAPE_SPHERE ? (double)view->tables[shape->table + k] : 0;
-        int32_t count = shape->kind == SHAPE_SPHERE;
-        for (int64_t v = 0; v < n && shape->kind == SHAPE_MESH; v += step, count++) {
+        double sum = 0, count = 0;
+        for (int64_t v = 0; v < shape->vertex_count; v += step, count++) {
             sum += (double)view->theta[shape->positions + 3 * v + k];
         }
-        p[k] = (float)(sum / (count > 0 ? count : 1));
+        p[k] = (float)(sum / count);
     }
 }
 
@@ -287,7 +290,8 @@ static void find_beacons(SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count && view->has_media && view->beacons_count < MOST_BEACONS; i++) {
         const ShapeRecord *shape = view->shapes + i;
         const Group *group = view->groups + shape->group;
-        bool placed = is_seen(shape) && shape->collection < 0 && (shape->kind == SHAPE_SPHERE || shape->kind == SHAPE_MESH);
+        bool has_middle = shape->kind == SHAPE_SPHERE || (shape->kind == SHAPE_MESH && shape->vertex_count > 0);
+        bool placed = is_seen(shape) && shape->collection < 0 && has_middle;
         if (placed && (group->interior >= 0 || group->exterior >= 0)) {
             middle_of(view, shape, view->beacons[view->beacons_count++]);
         }
@@ -297,7 +301,6 @@ static void find_beacons(SceneView *view) {
 static void set_bounds(rey_scene *scene) {
     SceneView *view = &scene->view;
     struct RTCBounds b = {0};
-    find_beacons(view);
     rtcGetSceneBounds(view->embree, &b);
     for (int32_t i = 0; i < view->own_spheres_count; i++) {
         const float *s = view->tables + view->shapes[view->own_spheres[i]].table;
@@ -438,6 +441,7 @@ rey_result rey_accel_update(rey_scene *scene) {
         rtcCommitScene(scene->view.embree);
         result = check_device(scene);
         set_bounds(scene);
+        find_beacons(&scene->view);
     }
     if (result != REY_OK && fresh) {
         accel_free(scene); // the next attempt starts anew

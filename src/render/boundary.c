@@ -71,11 +71,11 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
     const bool passed = view->through && rey_boundary_veiled(view);
-    const char *what = !rey_boundary_sees(sensor) ? "this sensor"
-                       : passed               ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
-                       : step                 ? step
-                       : !rey_boundary_chained(view)    ? "functions that let light pass"
-                                              : NULL;
+    const char *what = !rey_boundary_sees(sensor)    ? "this sensor"
+                       : passed                      ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
+                       : step                        ? step
+                       : !rey_boundary_chained(view) ? "functions that let light pass"
+                                                     : NULL;
     if (what) {
         return (ChainObstacle){what, -1, -1, what == step ? texture : -1};
     }
@@ -363,12 +363,11 @@ bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
 rey_result rey_boundaries_begin(Render *r) {
     r->lines = rey_lines_selected(&r->scene->view, r->job.to_uv_at);
     bool moves = r->job.any_motion || r->job.any_places || r->lines;
-    rey_result result = REY_OK;
+    rey_result result = rey_check_clipped_media(r);
     bool look_out = !moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor); // paths do, instead
     if (look_out && !r->rims) {
         r->terms &= REY_TERM_INTERIOR | REY_TERM_TERMINATOR;
     }
-    result = rey_check_clipped_media(r);
     bool twins_sought = !(r->job.any_motion || r->job.any_places);
     for (int i = 0; i < BOUNDARY_KINDS && result == REY_OK; i++) {
         bool facing = boundary_is_facing(i) || i == BOUNDARY_FACING_VIEW;

@@ -39,13 +39,9 @@ static void to_world(const SceneView *view, const EdgeRecord *e, double p[3]) {
 }
 
 static void straight(const SceneView *view, const EdgeRecord *e, Curve *c) {
-    const ShapeRecord *shape = view->shapes + e->shape;
-    const int32_t *corners = rey_mesh_triangle(view, shape, e->prim);
     double p[3][3], half[3];
     for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++) {
-            p[i][k] = (double)view->theta[shape->positions + 3 * (int64_t)corners[(e->corner + i) % 3] + k];
-        }
+        rey_cut_corner(view, e->shape, e->prim, (e->corner + i) % 3, p[i]);
         to_world(view, e, p[i]);
     }
     for (int k = 0; k < 3; k++) {
