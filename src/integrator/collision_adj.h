@@ -52,21 +52,24 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
     Spec worth = spec_mul(delta, s->beta);
     Spec lit = spec_zero_unless(s->connected, spec_mul(worth, s->lit)), onward = spec_mul(worth, s->onward);
     LightMove move = light_move_zero();
-    Vec3 dwi = v3_zero(), dwo = v3_zero();
+    Vec3 dwi = v3_zero(), dwo = v3_zero(), slope = v3_zero(), light_slope = v3_zero(); // the latter: where volumes are looked up
     const bool moves = sink->any_places || g;
     if (t->job->live_lights && m_any(s->connected)) {
         Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
         Vec2 at = {f_set(0), f_set(0)};
         sink->at = t->job->rides ? &at : NULL; // shadow rays that ride slide over their lights
+        sink->point = t->job->rides ? &light_slope : NULL;
         lights_adj(scene, s->light, s->connected, s->light_uv, s->light_prim, s->light_distance,
                    spec_zero_unless(s->connected, spec_scale(dl, s->light_phase)), moves ? &move : NULL, sink);
         sink->at = NULL;
+        sink->point = NULL;
         if (t->job->rides) {
             Connection to = {s->hit.p, s->light_d, s->light_distance, s->light, s->light_prim, s->connected};
-            glide_add(g, s->hit.p, connection_end_adj(t, &to, &move, at, true, sink), s->connected);
+            glide_add(g, s->hit.p, connection_end_adj(t, &to, &move, at, light_slope, true, sink), s->connected);
             move.uv = (Vec2){f_set(0), f_set(0)};
         }
     }
+    sink->point = g ? &slope : NULL;
     if (moves && m_any(s->connected)) {
         phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
         lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
@@ -85,8 +88,9 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
         }
         phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), sink, s->scattered, &dwi, &dwo);
     }
+    sink->point = NULL;
     if (g) {
-        glide_add(g, s->hit.p, move.ref, s->connected);
+        glide_add(g, s->hit.p, v3_add(slope, v3_select(s->connected, move.ref, v3_zero())), s->m);
         g->turn = v3_select(s->m, v3_neg(dwi), v3_zero());
     }
 }

@@ -9,7 +9,7 @@
 // Shadow rays from collisions keep their direction, and their ends slide over the lights; those from surfaces keep both ends.
 // Borders of media are passed, and points of the way between attached ends move with both (ride_add). The sensor's ray moves as
 // the sensor says: by o' + s d' at the distance s, with a collision there or where it meets a surface (first_ride_adj).
-// NOT differentiated: surfaces other than null that rays pass, volumes of phase functions.
+// NOT differentiated: surfaces other than null that rays pass.
 #pragma once
 
 #include "integrator/border.h"
@@ -23,9 +23,10 @@ typedef struct Connection {
     Mask m;
 } Connection;
 
-// Of connections to surfaces, given the adjoint of direction, length and uv: returns that of where they begin.
-static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, const LightMove *move, Vec2 at, bool slides,
-                                        Sink *sink) {
+// Of connections to surfaces, given the adjoint of direction, length, uv, barycentrics and the end's point in space: returns that
+// of where they begin.
+static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, const LightMove *move, Vec2 at, Vec3 point,
+                                        bool slides, Sink *sink) {
     const SceneView *scene = t->scene;
     Int light = i_select(c->m, c->light, i_set(0)), shape = EMITTER_FIELD(scene, light, shape);
     Mask attached = c->m & mi_lt(i_set(-1), shape);
@@ -36,7 +37,7 @@ static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, co
     Hit hit = point_hit(scene, i_select(attached, shape, i_set(-1)), i_select(attached, c->prim, i_set(0)), i_set(0), end, &n);
     if (slides) {
         SurfaceAdj worth = surface_adj_zero();
-        worth.p = dr;
+        worth.p = v3_add(dr, point);
         worth.uv = move->uv;
         worth.at = at;
         return v3_select(attached, v3_sub(rays_find_adj(t, &hit, c->d, &worth, sink, attached), dr), v3_zero());

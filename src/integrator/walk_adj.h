@@ -151,7 +151,7 @@ static Vec3 connection_passage_adj(const Tracer *t, const Walk *walk, Spec trans
     move.distance = f_zero_unless(c->m, turn.distance);
     lights_move_adj(t->scene, c->light, c->m, c->from, c->d, c->distance, &move, sink);
     Vec3 dp = v3_select(c->m, v3_add(turn.shift, move.ref), v3_zero());
-    return t->job->rides ? v3_add(dp, connection_end_adj(t, c, &move, (Vec2){f_set(0), f_set(0)}, slides, sink))
+    return t->job->rides ? v3_add(dp, connection_end_adj(t, c, &move, (Vec2){f_set(0), f_set(0)}, v3_zero(), slides, sink))
                           : dp;
 }
 

@@ -62,9 +62,12 @@ KFN void matrix_scatter(const SceneView *scene, int32_t texture, Vec3 p, PhaseMa
     if (grid) {
         Vec3 q = volume_to_local(scene, grid, p, 1), dq = v3_zero();
         bool moves = volume_moves(scene, grid, sink);
-        gridvolume_adj_six(scene, grid, q, d.m, at, moves ? &dq : NULL, sink, m);
+        gridvolume_adj_six(scene, grid, q, d.m, at, moves || sink->point ? &dq : NULL, sink, m);
         if (moves) {
             volume_place_adj(scene, grid, q, dq, sink, m);
+        }
+        if (sink->point) {
+            v3_acc(sink->point, v3_select(m, volume_to_world_adj(scene, grid, dq), v3_zero()));
         }
         return;
     }

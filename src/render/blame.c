@@ -116,6 +116,19 @@ bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind)) {
     return found;
 }
 
+bool rey_is_volume(const SceneView *view, const TextureNode *t) {
+    UNUSED(view);
+    return t->kind == TEXTURE_VOLUME;
+}
+
+bool rey_texture_holds(const SceneView *view, int32_t texture, bool (*is)(const SceneView *view, const TextureNode *t)) {
+    if (texture < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + texture;
+    return is(view, t) || rey_texture_holds(view, t->child[0], is) || rey_texture_holds(view, t->child[1], is);
+}
+
 bool rey_bsdfs_used(const SceneView *view, bool (*are)(int kind)) {
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
         if (view->bsdfs[i].used && are(view->bsdfs[i].kind)) {

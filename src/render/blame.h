@@ -17,6 +17,9 @@ void rey_name_emitter(const rey_scene *scene, int32_t emitter, char name[OBJECT_
 void rey_name_obstacle(const rey_scene *scene, const SensorRecord *sensor, char text[OBJECT_NAME]);
 // Whether a scattering function, or one inside of it, is of such a kind (bsdf/table.h); -1: it has none.
 bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind));
+// Whether a texture, or one inside it, is of a sort.
+bool rey_texture_holds(const SceneView *view, int32_t texture, bool (*is)(const SceneView *view, const TextureNode *t));
+bool rey_is_volume(const SceneView *view, const TextureNode *t);
 // Whether surfaces use some function of a sort.
 bool rey_bsdfs_used(const SceneView *view, bool (*are)(int kind));
 // The first shape whose scattering function bends paths; false when there is none.

@@ -79,33 +79,8 @@ static bool has_jumping_media(const SceneView *view) {
     return false;
 }
 
-static bool is_volume(const SceneView *view, const TextureNode *t) {
-    UNUSED(view);
-    return t->kind == TEXTURE_VOLUME;
-}
-
 static bool is_jumping_volume(const SceneView *view, const TextureNode *t) {
     return t->kind == TEXTURE_VOLUME && jumps(view->volumes + t->volume);
-}
-
-// Whether a texture, or one inside it, is of a sort.
-static bool texture_holds(const SceneView *view, int32_t texture, bool (*is)(const SceneView *view, const TextureNode *t)) {
-    if (texture < 0) {
-        return false;
-    }
-    const TextureNode *t = view->textures + texture;
-    return is(view, t) || texture_holds(view, t->child[0], is) || texture_holds(view, t->child[1], is);
-}
-
-static bool phases_read_volumes(const SceneView *view) {
-    for (int64_t i = 0; i < view->phases_count; i++) {
-        for (int k = 0; k < MAX_PHASE_SLOTS; k++) {
-            if (texture_holds(view, view->phases[i].slot[k], is_volume)) {
-                return true;
-            }
-        }
-    }
-    return false;
 }
 
 static bool has_projector(const SceneView *view) {
@@ -121,9 +96,6 @@ static bool has_projector(const SceneView *view) {
 static const char *gap_of_glides(const SceneView *view) {
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
-    }
-    if (phases_read_volumes(view)) {
-        return "collisions that move with the camera look up volumes of phase functions elsewhere";
     }
     for (int64_t i = 0; i < view->volumes_count; i++) {
         if (jumps(view->volumes + i)) {
@@ -154,7 +126,7 @@ static const char *gap_of_rides(const SceneView *view) {
             return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
         }
     }
-    return phases_read_volumes(view) ? "collisions that move with surfaces look up volumes of phase functions elsewhere" : NULL;
+    return NULL;
 }
 
 // Whether one of the volumes that stand where a parameter says does.
@@ -194,23 +166,20 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
 static const char *gap_of_lookups(const SceneView *view) {
     for (int32_t i = 0; i < view->bsdfs_count && view->volumes_count > 0; i++) {
         for (int k = 0; k < MAX_SLOTS && view->bsdfs[i].used; k++) {
-            if (texture_holds(view, view->bsdfs[i].slot[k], is_jumping_volume)) {
+            if (rey_texture_holds(view, view->bsdfs[i].slot[k], is_jumping_volume)) {
                 return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to "
                        "voxel pass over points that move";
             }
-            if (texture_holds(view, view->bsdfs[i].slot[k], is_volume) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
+            if (rey_texture_holds(view, view->bsdfs[i].slot[k], rey_is_volume) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
                 return "surfaces that let a part of the light pass have volumes as textures, which rays that move pass elsewhere";
             }
         }
     }
     for (int64_t i = 0; i < view->emitters_count && view->volumes_count > 0; i++) {
         const EmitterRecord *e = view->emitters + i;
-        if (e->shape >= 0 && texture_holds(view, e->slot[0], is_jumping_volume)) {
+        if (e->shape >= 0 && rey_texture_holds(view, e->slot[0], is_jumping_volume)) {
             return "lights have volumes of filter_type=\"nearest\" as radiance, whose jumps from voxel to voxel pass over points "
                    "that move";
-        }
-        if (e->shape >= 0 && view->has_media && texture_holds(view, e->slot[0], is_volume)) {
-            return "in scenes with participating media, lights have volumes as radiance, which points that move look up elsewhere";
         }
     }
     return NULL;

@@ -286,6 +286,8 @@ static const Motion motions[] = {
     {"ride_facing.xml", "skin.normalmap.value", ADD, {0}, 0.04, 3},
     {"ride_facing.xml", "ball.to_world", SHIFT, {1, 0.2f, -0.3f}, 0.03, 2},
     {"ride_facing.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.3f}, 0.03, 1},
+    {"ride_phase.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.6f}, 0.04, 2},
+    {"ride_phase.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
     {"ride_mirror.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.05, 1},
     {"ride_tank.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 2},
     {"ride_tank.xml", "tank.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 1},
