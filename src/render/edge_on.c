@@ -80,7 +80,7 @@ static bool runs_along(const Beam *beam, const Face *face) {
     normalise(way);
     bool along = fabs(dot(way, face->n)) < EDGE_ON, seen = !beam->film;
     for (int i = 0; i < face->corners && along && !seen; i++) {
-        EdgeRecord side;
+        EdgeRecord side = {.last = 1};
         seen = rey_see_line(beam->film, face->p[i], face->p[(i + 1) % face->corners], &side) > 0;
     }
     return along && seen;

@@ -367,7 +367,7 @@ double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
         return turning_weight(view, e);
     case EDGE_MESH:
         angle = mesh_edge_angle(view, e, &length);
-        return length * angle;
+        return length * angle * (double)(e->last - e->first);
     default:
         return 10 / 3.0 * round_ball(view, e, centre, &reach) * round_length(e); // a silhouette in an angle of about pi
     }

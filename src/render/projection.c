@@ -85,7 +85,7 @@ double rey_see_line(const Projection *p, const double from[3], const double to[3
     double a[3], b[3], fa[2], fb[2];
     rey_to_sensor(p, from, a);
     rey_to_sensor(p, to, b);
-    double t0 = 0, t1 = 1;
+    double t0 = (double)e->first, t1 = (double)e->last;
     clip(a[2], b[2], p->near, INFINITY, &t0, &t1);
     if (t0 >= t1) {
         return 0;

@@ -1,4 +1,5 @@
 // edges.c: which triangles of a mesh share which edges. Vertices at the same position are one (UV seams are no edges).
+#include "shape/edge_pieces.h"
 #include "shape/marks.h"
 #include "shape/shape.h"
 
@@ -26,17 +27,48 @@ static const int32_t *mesh_indices(const SceneView *view, const ShapeRecord *sha
     return view->triangles + 3 * (int64_t)shape->triangle;
 }
 
+static const float *vertex_of(const SceneView *view, const ShapeRecord *shape, int32_t vertex) {
+    return view->theta + shape->positions + 3 * (int64_t)vertex;
+}
+
+// Whether a triangle's corners lie on one line, as those do that fill what is left between others: no ray meets it.
+static bool is_sliver(const SceneView *view, const ShapeRecord *shape, const int32_t *corners) {
+    double e[2][3], area2 = 0, longest2 = 0, largest = 0;
+    for (int i = 0; i < 3; i++) {
+        const float *p = vertex_of(view, shape, corners[i]), *q = vertex_of(view, shape, corners[(i + 1) % 3]);
+        double length2 = 0;
+        for (int k = 0; k < 3; k++) {
+            double d = (double)q[k] - (double)p[k];
+            length2 += d * d;
+            largest = fmax(largest, fabs((double)p[k]));
+            if (i < 2) {
+                e[i][k] = d;
+            }
+        }
+        longest2 = fmax(longest2, length2);
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        double n = e[0][i] * e[1][j] - e[0][j] * e[1][i];
+        area2 += n * n;
+    }
+    const double height = CORNER_TOLERANCE * largest;
+    return area2 <= height * height * longest2;
+}
+
+// Those of slivers have the same end twice.
 static void mesh_sides(const SceneView *view, const ShapeRecord *shape, Side *sides) {
     const int32_t *indices = mesh_indices(view, shape), *welded = view->welded + shape->welded;
     for (int32_t i = 0; i < 3 * shape->triangle_count; i++) {
         int32_t a = welded[indices[i]], b = welded[indices[i / 3 * 3 + (i % 3 + 1) % 3]];
         sides[i] = (Side){a < b ? a : b, a < b ? b : a, i};
     }
+    for (int32_t t = 0; t < shape->triangle_count; t++) {
+        for (int32_t i = 3 * t; i < 3 * t + 3 && is_sliver(view, shape, indices + 3 * t); i++) {
+            sides[i].high = sides[i].low;
+        }
+    }
     qsort(sides, 3 * (size_t)shape->triangle_count, sizeof *sides, compare_sides);
-}
-
-static const float *vertex_of(const SceneView *view, const ShapeRecord *shape, int32_t vertex) {
-    return view->theta + shape->positions + 3 * (int64_t)vertex;
 }
 
 // From an edge (at a, along the unit vector e) into a triangle with this third corner: unit, at right angles to the edge.
@@ -272,9 +304,13 @@ static rey_result mesh_edges(rey_scene *scene, int32_t id, const Array *steps, s
 
 // Triangles whose shading normals may turn away from a viewer.
 static rey_result mesh_terminators(rey_scene *scene, int32_t id, Array *edges) {
-    const ShapeRecord *shape = scene->view.shapes + id;
+    const SceneView *view = &scene->view;
+    const ShapeRecord *shape = view->shapes + id;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < shape->triangle_count && (shape->flags & SHAPE_HAS_NORMALS) && result == REY_OK; i++) {
+        if (is_sliver(view, shape, mesh_indices(view, shape) + 3 * (int64_t)i)) {
+            continue;
+        }
         EdgeRecord e = {.kind = EDGE_TERMINATOR, .shape = id, .prim = i, .opposite = EDGE_OPEN,
                         .other = EDGE_ANY, .crease = EDGE_CREASE,
                         .last = 1};

@@ -2,8 +2,7 @@
 #include "shape/shared.h"
 
 #include "shape/affine.h"
-#include "shape/cut.h"
-#include "shape/edges.h"
+#include "shape/edge_pieces.h"
 #include "shape/shape.h"
 
 #include <math.h>
@@ -40,13 +39,11 @@ static void to_world(const SceneView *view, const EdgeRecord *e, double p[3]) {
 
 static void straight(const SceneView *view, const EdgeRecord *e, Curve *c) {
     double p[3][3], half[3];
-    for (int i = 0; i < 3; i++) {
-        rey_cut_corner(view, e->shape, e->prim, (e->corner + i) % 3, p[i]);
-        to_world(view, e, p[i]);
-    }
+    rey_edge_corners(view, e, p);
     for (int k = 0; k < 3; k++) {
-        c->middle[k] = 0.5 * (p[0][k] + p[1][k]);
-        half[k] = 0.5 * (p[1][k] - p[0][k]);
+        double whole = p[1][k] - p[0][k];
+        c->middle[k] = p[0][k] + 0.5 * (double)(e->first + e->last) * whole;
+        half[k] = 0.5 * (double)(e->last - e->first) * whole;
         c->side.side[k] = (float)(p[2][k] - p[0][k]);
     }
     add_moment(c, half);
@@ -89,7 +86,7 @@ static int compare_rims(const void *first, const void *second) {
 
 // Whether two surfaces end along the same curve.
 static bool share(const Curve *a, const Curve *b) {
-    bool same = a->side.shape != b->side.shape || a->side.instance != b->side.instance;
+    bool same = a->side.shape != b->side.shape || a->side.instance != b->side.instance || a->side.prim != b->side.prim;
     for (int i = 0; i < 3 && same; i++) {
         same = fabs(a->middle[i] - b->middle[i]) <= (double)a->tolerance;
     }
@@ -123,7 +120,7 @@ static rey_result find_others(rey_scene *scene, const Curve *curves, int64_t cou
 
 // Of an open edge of a mesh, or of the first piece of a rim; false for others.
 static bool curve_of(const SceneView *view, const EdgeRecord *e, Curve *c) {
-    bool open = e->kind == EDGE_MESH && e->opposite == EDGE_OPEN && e->fan_count == 0;
+    bool open = rey_edge_is_open(e);
     if (!open && !(e->kind == EDGE_RIM && e->first <= 0)) {
         return false;
     }
@@ -162,8 +159,9 @@ static void spread_rims(const Array *edges, Curve *curves, int64_t count) {
 rey_result rey_edges_share(rey_scene *scene, bool (*stands)(const SceneView *view, const ShapeRecord *shape), Array *edges,
                            Array *sides) {
     const SceneView *view = &scene->view;
+    rey_result result = rey_edges_cut(scene, stands, edges);
     Curve *curves = rey_alloc_array(scene->ctx, edges->count + 1, sizeof *curves);
-    rey_result result = curves ? REY_OK : REY_ERROR_MEMORY;
+    result = curves ? result : REY_ERROR_MEMORY;
     int64_t count = 0;
     for (size_t i = 0; i < edges->count && result == REY_OK; i++) {
         const EdgeRecord *e = &ARRAY_AT(*edges, EdgeRecord, i);
