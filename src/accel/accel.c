@@ -2,6 +2,7 @@
 // few big walls around dense meshes and is the form wanted for meshes that change.
 #include "accel/accel.h"
 
+#include "accel/open.h"
 #include "base/parallel.h"
 #include "shape/shape.h"
 
@@ -226,12 +227,6 @@ static rey_result set_surface(rey_scene *scene, int32_t id, RTCGeometry geometry
     return result;
 }
 
-static bool is_seen(const ShapeRecord *shape) { return !(shape->flags & SHAPE_UNSEEN); }
-
-static bool stands_alone(const ShapeRecord *shape) {
-    return shape->kind == SHAPE_SPHERE && shape->collection < 0 && is_seen(shape);
-}
-
 // Kernels meet the scene's own spheres themselves where these are few.
 static void find_own_spheres(SceneView *view) {
     view->own_spheres_count = 0;
@@ -249,7 +244,8 @@ static void find_own_spheres(SceneView *view) {
 
 // Shapes that Embree knows.
 static bool is_embrees(const SceneView *view, const ShapeRecord *shape) {
-    return is_seen(shape) && !(view->own_spheres_count && stands_alone(shape));
+    bool open = view->open_apart && shape->kind == SHAPE_MESH && rey_is_open(view, shape);
+    return is_seen(shape) && !(view->own_spheres_count && stands_alone(shape)) && !open;
 }
 
 static rey_result add_shape(rey_scene *scene, int32_t id) {
@@ -302,6 +298,12 @@ static void set_bounds(rey_scene *scene) {
     SceneView *view = &scene->view;
     struct RTCBounds b = {0};
     rtcGetSceneBounds(view->embree, &b);
+    b.lower_x = fminf(b.lower_x, view->open_low[0]);
+    b.lower_y = fminf(b.lower_y, view->open_low[1]);
+    b.lower_z = fminf(b.lower_z, view->open_low[2]);
+    b.upper_x = fmaxf(b.upper_x, view->open_high[0]);
+    b.upper_y = fmaxf(b.upper_y, view->open_high[1]);
+    b.upper_z = fmaxf(b.upper_z, view->open_high[2]);
     for (int32_t i = 0; i < view->own_spheres_count; i++) {
         const float *s = view->tables + view->shapes[view->own_spheres[i]].table;
         b.lower_x = fminf(b.lower_x, s[0] - s[3]);
@@ -341,6 +343,7 @@ static rey_result accel_create(rey_scene *scene) {
         return check_device(scene);
     }
     find_own_spheres(&scene->view);
+    rey_open_find(&scene->view);
     // Rays look for what lies in the borders of media (trace_beside).
     enum RTCSceneFlags flags = scene->view.has_media ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : RTC_SCENE_FLAG_NONE;
     rtcSetSceneFlags(scene->view.embree, flags);
@@ -440,6 +443,7 @@ rey_result rey_accel_update(rey_scene *scene) {
     if (result == REY_OK && changed) {
         rtcCommitScene(scene->view.embree);
         result = check_device(scene);
+        rey_open_take(&scene->view);
         set_bounds(scene);
         find_beacons(&scene->view);
     }

@@ -32,11 +32,22 @@ KFN const float *sphere_table(const SceneView *scene, int32_t i) {
     return scene->tables + scene->shapes[scene->own_spheres[i]].table;
 }
 
-// Distances of the closest spheres within the rays' ranges, else tmax; *shape: their numbers, else -1.
-KFN Float spheres_meet(const SceneView *scene, const Ray *ray, Mask m, Int *shape) {
+// Which surfaces rays are to meet: those that let no light pass, those that let some pass, or both.
+enum { MEET_SOLID = 1, MEET_OPEN = 2, MEET_ALL = 3 };
+
+KFN bool sphere_is(const SceneView *scene, int32_t i, int which) {
+    const ShapeRecord *shape = scene->shapes + scene->own_spheres[i];
+    return (which & (scene->bsdfs[shape->bsdf].transmits ? MEET_OPEN : MEET_SOLID)) != 0;
+}
+
+// Distances of the closest spheres of a sort within the rays' ranges, else tmax; *shape: their numbers, else -1.
+KFN Float spheres_meet(const SceneView *scene, const Ray *ray, int which, Mask m, Int *shape) {
     Float rcp_length2 = f_safe_rcp(v3_dot(ray->d, ray->d)), t = ray->tmax;
     *shape = i_set(-1);
     for (int32_t i = 0; i < scene->own_spheres_count; i++) {
+        if (!sphere_is(scene, i, which)) {
+            continue;
+        }
         SphereChord c = sphere_chord(sphere_table(scene, i), ray, rcp_length2, m);
         if (m_any(c.meets)) {
             Float at = f_select(m_gt(c.front, f_set(0)), c.front, c.back);
@@ -48,11 +59,14 @@ KFN Float spheres_meet(const SceneView *scene, const Ray *ray, Mask m, Int *shap
     return t;
 }
 
-// Lanes in whose way a sphere is.
-KFN Mask spheres_block(const SceneView *scene, const Ray *ray, Mask m) {
+// Lanes in whose way a sphere of a sort is.
+KFN Mask spheres_block(const SceneView *scene, const Ray *ray, int which, Mask m) {
     Float rcp_length2 = f_safe_rcp(v3_dot(ray->d, ray->d));
     Mask blocked = m_set(false);
     for (int32_t i = 0; i < scene->own_spheres_count; i++) {
+        if (!sphere_is(scene, i, which)) {
+            continue;
+        }
         SphereChord c = sphere_chord(sphere_table(scene, i), ray, rcp_length2, m);
         if (m_any(c.meets)) {
             Mask front = m_gt(c.front, f_set(0)) & m_lt(c.front, ray->tmax);

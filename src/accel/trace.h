@@ -3,6 +3,7 @@
 #pragma once
 
 #include "accel/spheres.h"
+#include "accel/triangles.h"
 #include "accel/tubes.h"
 
 #include <embree3/rtcore.h>
@@ -45,8 +46,10 @@ KFN Mask packet_set(RayPacket *packet, const Ray *ray, Mask m) {
     return m;
 }
 
-// Where the rays of m meet what Embree knows; `sphere`: what they meet otherwise at ray->tmax, -1 = nothing.
-KFN Hit packet_closest(const SceneView *scene, const Ray *ray, Int sphere, Mask m, struct RTCIntersectContext *context) {
+#define HIT_NONE (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), v3_zero(), i_set(0)}
+
+// Where the rays of m meet what Embree knows; `otherwise`: what they meet otherwise, at ray->tmax.
+KFN Hit packet_closest(const SceneView *scene, const Ray *ray, const Hit *otherwise, Mask m, struct RTCIntersectContext *context) {
     RayHitPacket ALIGNED(64) packet;
     m = packet_set(&packet.ray, ray, m);
     i_store(PACKET_I(packet.ray.id), i_iota());
@@ -65,22 +68,21 @@ KFN Hit packet_closest(const SceneView *scene, const Ray *ray, Int sphere, Mask 
     rtcIntersect8(valid, scene->embree, context, &packet);
 #endif
 #endif
-    Hit hit;
+    Hit hit = *otherwise;
     Int shape = i_select(m, i_load(PACKET_I(packet.hit.geomID)), i_set(-1));
     Mask found = mi_lt(i_set(-1), shape);
-    hit.shape = i_select(m & ~found, sphere, shape);
-    hit.prim = i_select(found, i_load(PACKET_I(packet.hit.primID)), i_set(0));
-    hit.u = f_zero_unless(found, f_load(PACKET_F(packet.hit.u)));
-    hit.v = f_zero_unless(found, f_load(PACKET_F(packet.hit.v)));
-    hit.instance = i_set(0);
+    hit.shape = i_select(found, shape, hit.shape);
+    hit.prim = i_select(found, i_load(PACKET_I(packet.hit.primID)), hit.prim);
+    hit.u = f_select(found, f_load(PACKET_F(packet.hit.u)), hit.u);
+    hit.v = f_select(found, f_load(PACKET_F(packet.hit.v)), hit.v);
     if (scene->instances_count) {
         // Instances are numbered behind the shapes.
         Int number = i_load(PACKET_I(packet.hit.instID[0]));
         Mask inside = found & mi_lt(i_set(-1), number);
-        hit.instance = i_select(inside, number - (int32_t)scene->shapes_count, i_set(0));
+        hit.instance = i_select(found, i_select(inside, number - (int32_t)scene->shapes_count, i_set(0)), hit.instance);
     }
-    found = mi_lt(i_set(-1), hit.shape);
-    hit.p = v3_madd(ray->o, f_zero_unless(found, f_load(PACKET_F(packet.ray.tfar))), ray->d);
+    Mask any = mi_lt(i_set(-1), hit.shape);
+    hit.p = v3_madd(ray->o, f_zero_unless(any, f_select(m, f_load(PACKET_F(packet.ray.tfar)), ray->tmax)), ray->d);
     if (scene->segments_count) {
         tubes_refine(scene, ray, &hit, m);
     }
@@ -92,13 +94,24 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-    Int sphere = i_set(-1);
-    if (!scene->own_spheres_count) {
-        return packet_closest(scene, ray, sphere, m, &context);
-    }
     Ray range = *ray;
-    range.tmax = spheres_meet(scene, ray, m, &sphere);
-    return packet_closest(scene, &range, sphere, m, &context);
+    Hit hit = HIT_NONE;
+    if (scene->own_spheres_count) {
+        range.tmax = spheres_meet(scene, ray, MEET_ALL, m, &hit.shape);
+    }
+    if (scene->open_triangles_count) {
+        triangles_meet(scene, ray, i_set(-1), m, &range.tmax, &hit);
+    }
+    return packet_closest(scene, &range, &hit, m, &context);
+}
+
+// Closest hits on surfaces that let light pass, where Embree does not know them (open_apart).
+static NOINLINE Hit trace_open(const SceneView *scene, const Ray *ray, Mask m) {
+    Hit hit = HIT_NONE;
+    Float t = spheres_meet(scene, ray, MEET_OPEN, m, &hit.shape);
+    triangles_meet(scene, ray, i_set(-1), m, &t, &hit);
+    hit.p = v3_madd(ray->o, f_zero_unless(mi_lt(i_set(-1), hit.shape), t), ray->d);
+    return hit;
 }
 
 // The surfaces that rays leave aside, lane by lane.
@@ -132,16 +145,16 @@ static NOINLINE Hit trace_beside(const SceneView *scene, const Hit *hit, Vec3 d,
     i_store(aside.shape, hit->shape);
     i_store(aside.instance, i_select(inside, hit->instance + (int32_t)scene->shapes_count, i_set(-1)));
     Ray ray = {v3_madd(hit->p, -step, d), d, step + f_min(behind, step)};
-    return packet_closest(scene, &ray, i_set(-1), m, &aside.context);
+    Hit other = HIT_NONE;
+    if (scene->open_triangles_count) {
+        triangles_meet(scene, &ray, hit->shape, m, &ray.tmax, &other);
+    }
+    return packet_closest(scene, &ray, &other, m, &aside.context);
 }
 
-// Transmittance along shadow rays: 1 where nothing is in the way, 0 behind a surface. A colour and not a bit, because
-// media will attenuate segment by segment.
-KFN Spec trace_transmittance(const SceneView *scene, const Ray *ray, Mask m) {
+// Lanes of m in whose way nothing is that Embree knows.
+KFN Mask packet_clear(const SceneView *scene, const Ray *ray, Mask m) {
     RayPacket ALIGNED(64) packet;
-    if (scene->own_spheres_count) {
-        m = m & ~spheres_block(scene, ray, m);
-    }
     m = packet_set(&packet, ray, m);
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -160,6 +173,23 @@ KFN Spec trace_transmittance(const SceneView *scene, const Ray *ray, Mask m) {
 #endif
 #endif
     // Embree sets tfar to -infinity where it found something.
-    Mask open = m & m_ge(f_load(PACKET_F(packet.tfar)), f_set(0));
-    return spec_set(f_zero_unless(open, f_set(1)));
+    return m & m_ge(f_load(PACKET_F(packet.tfar)), f_set(0));
+}
+
+// Lanes of m in whose way there is no surface that lets no light pass, where Embree knows only those (open_apart).
+static NOINLINE Mask trace_clear(const SceneView *scene, const Ray *ray, Mask m) {
+    m = scene->own_spheres_count ? m & ~spheres_block(scene, ray, MEET_SOLID, m) : m;
+    return packet_clear(scene, ray, m);
+}
+
+// Transmittance along shadow rays: 1 where nothing is in the way, 0 behind a surface. A colour and not a bit, because
+// media will attenuate segment by segment.
+KFN Spec trace_transmittance(const SceneView *scene, const Ray *ray, Mask m) {
+    if (scene->own_spheres_count) {
+        m = m & ~spheres_block(scene, ray, MEET_ALL, m);
+    }
+    if (scene->open_triangles_count) {
+        m = m & ~triangles_block(scene, ray, m);
+    }
+    return spec_set(f_zero_unless(packet_clear(scene, ray, m), f_set(1)));
 }

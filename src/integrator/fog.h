@@ -66,6 +66,7 @@ KFN Track track_of(const Tracer *t, int32_t medium) {
 typedef struct Fog {
     Int medium; // that it is in
     SampleKey key;
+    bool past_lights; // that hide from the sensor, from which the ray comes
 } Fog;
 
 // Transmittance of a segment of shadow rays number `segment`, each in a medium of its own.

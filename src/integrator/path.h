@@ -258,7 +258,7 @@ static void shadow_stage(Tracer *t, int32_t bounce) {
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
         Mask blocked;
-        Fog fog;
+        Fog fog = {.past_lights = false};
         if (media) {
             fog.medium = i_select(m, i_load(q->medium + k), i_set(-1));
             fog.key = stream_key(t, i_select(m, i_load(q->slot + k), i_set(0)), bounce, STREAM_SHADOW);

@@ -153,11 +153,17 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Ma
     Spec transmittance = spec_set(f_zero_unless(m, f_set(1)));
     const Float beyond = ray.tmax * (SHADOW_SHORT / (1.0f - SHADOW_SHORT));
     Float skip = f_set(0); // of the medium, by the step off the surface before
-    Mask left = m;
-    *blocked = m_set(false);
+    const bool past_lights = fog && fog->past_lights;
+    // What lets no light pass is asked first, and need not be met again behind each surface that does.
+    const bool apart = t->scene->open_apart && !past_lights && !(fog && t->scene->borders_touch);
+    Mask left = apart ? trace_clear(t->scene, &ray, m) : m;
+    *blocked = m & ~left;
+    transmittance = spec_zero_unless(left, transmittance);
+    t->job->rays += apart ? m_count(m) : 0;
     for (int32_t i = 0; m_any(left); i++) {
-        Hit hit = trace_media(t, &ray, left, false);
-        t->job->rays += m_count(left);
+        Hit hit = apart ? trace_open(t->scene, &ray, left) : trace_media(t, &ray, left, false);
+        t->job->rays += apart ? 0 : m_count(left);
+        hit = past_lights ? trace_past_emitters(t, ray, left, hit) : hit;
         Vec3 o = ray.o;
         Mask found = left & mi_lt(i_set(-1), hit.shape), may = m_set(false);
         Int medium = fog ? fog->medium : i_set(-1);

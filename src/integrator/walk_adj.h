@@ -53,7 +53,7 @@ static NOINLINE void passage_find(Tracer *t, const RecordBatch *batch, const Ray
     const Records *r = &t->ws.records;
     const int32_t at = batch->first;
     Mask blocked;
-    Fog fog;
+    Fog fog = {.past_lights = false};
     Walk *walk = &p->walk;
     if (p->found) {
         return;

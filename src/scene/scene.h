@@ -214,7 +214,13 @@ typedef struct Group {
     int32_t interior, exterior;
 } Group;
 
-enum { MOST_OWN_SPHERES = 32, MOST_BEACONS = 8 };
+enum { MOST_OWN_SPHERES = 32, MOST_OPEN_TRIANGLES = 36, MOST_BEACONS = 8 };
+
+// A triangle of a surface that lets light pass, in the world.
+typedef struct OpenTriangle {
+    float corner[3][3];
+    int32_t shape, prim;
+} OpenTriangle;
 
 // What a kernel sees: the arrays, and uniform facts.
 typedef struct SceneView {
@@ -232,6 +238,11 @@ typedef struct SceneView {
     void *embree;             // RTCScene
     // Spheres that stand in the scene by themselves and that kernels meet instead of Embree: all of them, or none.
     int32_t own_spheres[MOST_OWN_SPHERES], own_spheres_count;
+    // Where shadow rays pass surfaces (through) and few of these stand in the scene: Embree knows them not (accel/triangles.h).
+    bool open_apart;
+    OpenTriangle open_triangles[MOST_OPEN_TRIANGLES];
+    int32_t open_triangles_count;
+    float open_low[3], open_high[3]; // what they lie in
     int32_t beacons_count;    // of the next: points of surfaces that part media, or within them
     float beacons[MOST_BEACONS][3];
     bool borders_touch;       // faces at which media end lie in other faces (shape/touches.h)
