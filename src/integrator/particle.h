@@ -73,20 +73,20 @@ typedef struct Landing {
     const Group *group;
 } Landing;
 
-// Lanes of m in which nothing stands in the way of rays, nor do lights that hide.
-KFN Mask rays_open(Tracer *t, const Ray *ray, Mask m) {
+// Lanes of m in which nothing stands in the way of rays. seen: nor do lights that hide from the sensor, which they lead to.
+KFN Mask rays_open(Tracer *t, const Ray *ray, bool seen, Mask m) {
     t->job->rays += m_count(m);
-    if (t->scene->hide_emitters) {
+    if (seen && t->scene->hide_emitters) {
         Hit hit = trace_past_emitters(t, *ray, m, trace_closest(t->scene, ray, m, false));
         return m & mi_lt(hit.shape, i_set(0));
     }
     return m & m_gt(spec_max(trace_transmittance(t->scene, ray, m)), f_set(0));
 }
 
-// Lanes of m whose ray reaches the sensor. Tubes stop rays from outside alone: what counts is what the sensor's ray meets.
-KFN Mask particle_open(Tracer *t, const Ray *ray, Mask m) {
+// Lanes of m whose ray reaches the sensor, or where `seen` is not set, what it sees the vertex in. Tubes stop rays from outside alone: what counts is what the sensor's ray meets.
+KFN Mask particle_open(Tracer *t, const Ray *ray, bool seen, Mask m) {
     Ray back = {v3_madd(ray->o, ray->tmax, ray->d), v3_neg(ray->d), ray->tmax};
-    return rays_open(t, t->scene->segments_count ? &back : ray, m);
+    return rays_open(t, t->scene->segments_count ? &back : ray, seen, m);
 }
 
 // What the sensor sees of a vertex: the place of the light sample is the position on the film.
@@ -133,8 +133,8 @@ static void particle_connect(Tracer *t, const Pinhole *pinhole, const Landing *a
     Spec l = spec_scale(spec_mul(at->v.beta, f), weight);
     // A derivative may be non-zero where the value is 0, wherever scattering has a positive density.
     m = m & (t->derivative ? m_gt(pdf, f_set(0)) | m_gt(spec_max(f), f_set(0)) : m_gt(spec_max(l), f_set(0)));
-    Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
-    m = particle_open(t, &ray, m);
+    Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - SHADOW_SHORT)};
+    m = particle_open(t, &ray, true, m);
     if (t->derivative) {
         record_sight(t, record, &sight, d, f_zero_unless(m, weight), f);
     } else {

@@ -251,6 +251,10 @@ static void trace_stage(Tracer *t, int32_t bounce) {
         Hit hit = trace_media(t, &ray, m, bounce == 0);
         if (t->scene->hide_emitters && (bounce == 0 || t->scene->through)) {
             Mask seen = t->scene->through ? m & mi_eq(i_load(p->depth + k), i_set(0)) : m;
+            Mask found = seen & mi_lt(i_set(-1), hit.shape);
+            Mask lights = found & mi_lt(i_set(-1), SHAPE_FIELD(t->scene, i_max(hit.shape, i_set(0)), emitter));
+            bool in_fog = t->scene->has_media && m_any(lights & mi_lt(i_set(-1), i_load(p->medium + k)));
+            t->job->faces |= in_fog ? LIGHT_HIDDEN : 0;
             hit = trace_past_emitters(t, ray, seen, hit);
         }
         hit_store(t, k, &hit);

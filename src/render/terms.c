@@ -346,7 +346,22 @@ static bool selection_moves(const Render *r, rey_selection selection) {
     return terms & (REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR);
 }
 
+// Whether lights on surfaces move, or the sensor does.
+static bool hidden_lights_move(const Render *r) {
+    const SceneView *view = &r->scene->view;
+    bool moves = r->job.any_camera;
+    for (int64_t i = 0; i < view->shapes_count; i++) {
+        moves |= view->shapes[i].emitter >= 0 && (r->job.live[view->shapes[i].group] & LIVE_MOTION);
+    }
+    return moves;
+}
+
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
+    if (result == REY_OK && (r->faces & LIGHT_HIDDEN) && hidden_lights_move(r)) {
+        return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                        "the gradient of lights that hide (hide_emitters) within a participating medium, and of cameras that look past "
+                        "them, does not exist yet: what the medium scatters jumps where the camera's ray passes such a light");
+    }
     if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "

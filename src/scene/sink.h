@@ -10,7 +10,8 @@
 enum { FACES_ALIKE = 1, FACES_AWAY = 2, FACES_BOTH = 3 };
 // Beside these: a light at a point that moves was met within a medium.
 // The camera saw something smooth mirror or refract while something moves. And a map's normal pointed into its surface.
-enum { LIGHT_WITHIN = 4, CAMERA_MIRRORED = 8, FACES_INWARD = 16 };
+// The sensor looked past a hidden light within a medium, which is lit before the light and not behind it.
+enum { LIGHT_WITHIN = 4, CAMERA_MIRRORED = 8, FACES_INWARD = 16, LIGHT_HIDDEN = 32 };
 
 typedef struct Sink {
     double *gradient;          // reverse, else null

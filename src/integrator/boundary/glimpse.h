@@ -230,7 +230,7 @@ static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce,
         Spec arrives = l;
         Vec3 o = g->line.o[i], d = g->line.d[i];
         Ray ray = {o, d, v3_dot(v3_sub(g->line.hit[i].p, o), d) * (1.0f - SHADOW_SHORT)};
-        near_clear(t, &ray, medium_around(t, o, d, on), slot, bounce + MAX_BOUNCES * (i + 1), on, &arrives);
+        near_clear(t, &ray, medium_around(t, o, d, on), slot, bounce + MAX_BOUNCES * (i + 1), i == 0, on, &arrives);
         l = spec_select(on, arrives, l);
     }
     return l;
@@ -263,10 +263,10 @@ static void glimpse_bring(Indirect *in, const SampleKey *key, Glimpse *g, const 
         return;
     }
     if (t->scene->has_media) {
-        g->m = near_clear(t, ray, medium, at->slot, bounce + MAX_BOUNCES, g->m, &l);
+        g->m = near_clear(t, ray, medium, at->slot, bounce + MAX_BOUNCES, false, g->m, &l);
         l = glimpse_clear(t, g, at->slot, bounce + 1, l);
     } else {
-        g->m = particle_open(t, ray, g->m);
+        g->m = particle_open(t, ray, false, g->m);
     }
     if (m_any(g->m)) {
         l = spec_scale(l, glimpse_again(in, key, lens, at->p, g, still));
@@ -298,7 +298,8 @@ static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens,
     }
     Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
     f = spec_scale(spec_mul(at->v.beta, f), f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine));
-    Ray ray = {interaction_offset(&at->si, d), d, length * (1.0f - 9e-4f)};
+    Ray ray;
+    shadow_ray(&at->si, d, length, &ray);
     Int medium = t->scene->has_media ? medium_behind(at->group, at->si.ng, d, at->v.medium) : i_set(-1);
     glimpse_bring(in, &key, &g, &seen, &ray, medium, f, lens, &still, bounce);
 }
@@ -313,7 +314,7 @@ static NOINLINE void glimpse_connect_air(Indirect *in, const Vertex *v, const Co
     Float length = glimpse_find(in, &key, &seen, lens, &still, v->m, &g, &d);
     if (m_any(g.m)) {
         Spec f = spec_mul(v->beta, spec_scale(c->albedo, collision_phase(c, d)));
-        Ray ray = {v->hit.p, d, length * (1.0f - 9e-4f)};
+        Ray ray = {v->hit.p, d, length * (1.0f - SHADOW_SHORT)};
         glimpse_bring(in, &key, &g, &seen, &ray, v->medium, f, lens, &still, bounce);
     }
 }

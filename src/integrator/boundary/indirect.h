@@ -63,12 +63,12 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (t->scene->has_media) {
-        Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - 9e-4f)};
-        m = near_clear(in->t, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, m, &l);
+        Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - SHADOW_SHORT)};
+        m = near_clear(in->t, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, true, m, &l);
     } else if (m_any(m)) {
         // As the sensor's rays find it, which do not start above surfaces: where things touch, there is little between them.
         Ray ray = {v3_madd(at->si.p, sight.length, d), v3_neg(d), sight.length - 0.25f * interaction_step(at->si.p)};
-        m = rays_open(t, &ray, m);
+        m = rays_open(t, &ray, true, m);
     }
     near_book(in, &sight, l, at->v.slot, bounce, m);
 }
@@ -97,8 +97,8 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Spec f = spec_scale(c.albedo, collision_phase(&c, d) * sight.density);
     Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
-    Ray ray = {v.hit.p, d, sight.length * (1.0f - 9e-4f)};
-    m = near_clear(in->t, &ray, v.medium, v.slot, bounce, m, &l);
+    Ray ray = {v.hit.p, d, sight.length * (1.0f - SHADOW_SHORT)};
+    m = near_clear(in->t, &ray, v.medium, v.slot, bounce, true, m, &l);
     near_book(in, &sight, l, v.slot, bounce, m);
     if (in->glimpses && m_any(v.m)) {
         glimpse_connect_air(in, &v, &c, near_lens(in, v.slot), bounce);

@@ -56,7 +56,7 @@ static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     Vec2 lens = sensor_has_lens(t->sensor) ? rng_2d(&key, DIMENSION_LENS) : (Vec2){f_set(0.5f), f_set(0.5f)};
     Float x = (real)job->x + film.x * (real)job->width, y = (real)job->y + film.y * (real)job->height;
     Ray ray = sensor_ray(scene, t->sensor, x, y, lens).ray;
-    Hit hit = trace_solid(t, &ray, false, m, NULL);
+    Hit hit = trace_solid(t, &ray, true, m, NULL);
     Mask ends = mi_lt(i_set(-1), hit.shape);
     Float length = f_select(ends, v3_dot(v3_sub(hit.p, ray.o), ray.d), f_set(INFINITY));
     s->edge = edge_sample(scene, b, u, v3_zero(), false);
@@ -103,7 +103,7 @@ static void riding_see(Tracer *t, const BoundaryJob *b, Segment *s, Vec3 near, I
         return;
     }
     Int around = medium_around(t, o, d, m);
-    Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE)};
+    Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE), false};
     Ray back = {o, d, v3_length(v3_sub(near, o))};
     leg.weight = spec_mul(leg.weight, walk_transmittance(t, back, m, &fog, &blocked, NULL));
     leg.around = leg.air;
