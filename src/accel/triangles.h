@@ -6,7 +6,7 @@
 #include "scene/ray.h"
 #include "scene/scene.h"
 
-// Corners relative to the rays' beginnings, so that two triangles see the same of an edge that they share, and rays pass between no two.
+// Corners relative to where rays begin: two triangles see the same of an edge that they share, so that no ray passes between them.
 KFN Float edge_volume(Vec3 a, Vec3 b, Vec3 d) { return v3_dot(v3_cross(v3_add(a, b), v3_sub(a, b)), d); }
 
 KFN Vec3 open_corner(const OpenTriangle *triangle, int k, Vec3 o) {

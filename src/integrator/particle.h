@@ -83,7 +83,7 @@ KFN Mask rays_open(Tracer *t, const Ray *ray, bool seen, Mask m) {
     return m & m_gt(spec_max(trace_transmittance(t->scene, ray, m)), f_set(0));
 }
 
-// Lanes of m whose ray reaches the sensor, or where `seen` is not set, what it sees the vertex in. Tubes stop rays from outside alone: what counts is what the sensor's ray meets.
+// Lanes of m whose ray reaches the sensor, or unless it is `seen`, what the sensor sees it in: tubes stop only what that sends out.
 KFN Mask particle_open(Tracer *t, const Ray *ray, bool seen, Mask m) {
     Ray back = {v3_madd(ray->o, ray->tmax, ray->d), v3_neg(ray->d), ray->tmax};
     return rays_open(t, t->scene->segments_count ? &back : ray, seen, m);

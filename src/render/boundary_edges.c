@@ -86,9 +86,8 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
     }
     *edge = *e;
     *number = (float)weight;
-    bool smooth = e->kind == EDGE_MESH && (r->scene->view.shapes[e->shape].flags & SHAPE_HAS_NORMALS);
     *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_TUBE || e->kind == EDGE_MARK ||
-              e->kind == EDGE_TERMINATOR || smooth;
+              e->kind == EDGE_TERMINATOR || e->kind == EDGE_MESH;
     return REY_OK;
 }
 

@@ -359,8 +359,8 @@ static bool hidden_lights_move(const Render *r) {
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
     if (result == REY_OK && (r->faces & LIGHT_HIDDEN) && hidden_lights_move(r)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
-                        "the gradient of lights that hide (hide_emitters) within a participating medium, and of cameras that look past "
-                        "them, does not exist yet: what the medium scatters jumps where the camera's ray passes such a light");
+                        "the gradient of lights that hide (hide_emitters) within a participating medium, and of cameras that look "
+                        "past them, does not exist yet: what the medium scatters jumps where the camera's ray passes such a light");
     }
     if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,

@@ -1,5 +1,5 @@
-// edge_pieces.h: open edges of meshes in pieces, so that what shares them shares whole pieces (shared.h): of two walls on the long side
-// of a floor each has a piece of it. Private to src/shape.
+// edge_pieces.h: open edges of meshes in pieces, so that what shares them shares whole pieces (shared.h): of two walls on the long
+// side of a floor each has a piece of it. Private to src/shape.
 #pragma once
 
 #include "shape/edges.h"

@@ -14,7 +14,7 @@ typedef struct SharedSide {
 } SharedSide;
 
 // Sets `sides` and `side_count` of EdgeRecords that run along each other from end to end, and appends to `sides`, an Array of
-// SharedSide. Straight edges that run along each other for a part of their length are cut into pieces first, which appends to `edges`
+// SharedSide. Straight edges that run along each other for a part of their length are cut into pieces first, appended to `edges`
 // (edge_pieces.h). stands: which shapes count. Not found are those at which no surface ends, and arcs.
 rey_result rey_edges_share(rey_scene *scene, bool (*stands)(const SceneView *view, const ShapeRecord *shape), Array *edges,
                            Array *sides);

@@ -8,7 +8,7 @@
 #include "integrator/boundary/segments.h"
 #include "integrator/film.h"
 
-// Distance of the two paths from the edge [pixels]: rounding of directions is some hundred times smaller.
+// Distance of the two paths from the edge, at most [pixels]: rounding of directions is some ten times smaller.
 #define PRIMARY_STEP 2e-3f
 
 // How far from their edges vertices in narrow triangles look up textures [of the way to the middle].
@@ -34,7 +34,8 @@ typedef struct PrimarySample {
 // cuts surfaces, they start on that. scale: pixels per length across the edge.
 static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
-    Float step = f_select(smooth & m_set(b->chains), f_set(2 * film_resolution(t->sensor)), f_set(PRIMARY_STEP));
+    const real finest = 2 * film_resolution(t->sensor);
+    Float step = f_select(smooth & m_set(b->chains), f_set(finest), f_min(f_set(finest), f_set(PRIMARY_STEP)));
     Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
     return f_select((e->meeting & m_set(b->chains)) | edge_clips(e), behind, step);
 }
@@ -76,11 +77,12 @@ KFN SensorRay primary_ray(const Tracer *t, const PrimarySample *s, real side) {
     return sensor_ray(t->scene, t->sensor, s->seen.x + step * s->nx, s->seen.y + step * s->ny, s->view.lens);
 }
 
-// Lanes of edges of meshes with vertex normals.
-static Mask primary_is_smooth(const Tracer *t, const PrimarySample *s) {
+// Lanes of edges of meshes, but for those at which other surfaces end, too.
+static Mask primary_is_mesh(const Tracer *t, const PrimarySample *s) {
     const EdgePoint *e = &s->edge;
-    Int smooth = SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS;
-    return mi_lt(i_set(0), smooth) & ~(e->round | e->mark | e->meeting | m_gt(v3_dot(e->normal, e->normal), f_set(0)));
+    Mask mesh = mi_eq(SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), kind), i_set(SHAPE_MESH));
+    mesh = mesh & mi_eq(e->side_count, i_set(0));
+    return mesh & ~(e->round | e->mark | e->meeting | m_gt(v3_dot(e->normal, e->normal), f_set(0)));
 }
 
 // Lanes of m whose edge the camera sees, between the surfaces that meet or end there.
@@ -89,10 +91,10 @@ static Mask primary_visible(Tracer *t, const BoundaryJob *b, const PrimarySample
     if (t->scene->hide_emitters) { // the sensor sees nothing of lights
         m = m & mi_lt(SHAPE_FIELD(t->scene, i_select(m, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
     }
-    // Paths beside marks, where normals turn away and between triangles with vertex normals start on their surfaces (primary_look),
-    // also where these are narrower than the paths' step.
+    // Paths beside marks, where normals turn away and between the triangles of a mesh start on their surfaces (primary_look), also
+    // where these are narrower than the paths' step.
     Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
-    Mask inner = primary_is_smooth(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
+    Mask inner = primary_is_mesh(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
     Mask clips = edge_clips(&s->edge), own = m & (s->edge.mark | turns | inner | clips);
     Mask visible = edge_between(t, b, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
@@ -147,7 +149,7 @@ static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32
     t->job->rays += m_count(m);
     Float clear = f_select(mi_lt(i_set(-1), before.shape), f_min(v3_length(v3_sub(before.p, from)), reach), reach);
     Mask blocked;
-    Fog fog = {i_set(t->sensor->medium), stream_key(t, i_iota() + k, 0, STREAM_SHADOW)};
+    Fog fog = {i_set(t->sensor->medium), stream_key(t, i_iota() + k, 0, STREAM_SHADOW), t->scene->hide_emitters};
     Ray to = {ray.o, v3_normalize(v3_sub(from, ray.o)), v3_length(v3_sub(from, ray.o))};
     Spec arrives = walk_transmittance(t, to, m, &fog, &blocked, NULL);
     Int medium = medium_around(t, from, back.d, m);
@@ -212,23 +214,12 @@ static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t h
     }
 }
 
-// Shading normals at hits times their rays' directions: negative where they face the viewer.
-static Float hits_facing(const SceneView *scene, const Hit *hit, Vec3 d, Mask m) {
-    Float facing = f_set(0);
-    for (Mask left = m; m_any(left);) {
-        int32_t id;
-        Hit h;
-        Mask mine = take_group(scene, hit, &left, &id, &h);
-        const Group *group = scene->groups + id;
-        facing = f_select(mine, v3_dot(shape_interaction(scene, group->shape_kind, group->shape_flags, &h).sh.n, d), facing);
-    }
-    return facing;
-}
-
-// Of meshes with vertex normals, the first vertices of paths k... on one side of their edges (-1, 1: that of n) lie on the edge, in
-// the triangle that is seen there, along the view of it, where the paths' step went beyond that triangle or beyond the band that is
-// dark because its normals turn away; what lies on the band's other side is for the curve that ends it (facet.h). What textures are
-// there is looked up a little inside: exactly on the edge, one that jumps along it has the same value for both sides.
+// Of meshes, the first vertices of paths k... on one side of their edges (-1, 1: that of n) lie on the edge, in the triangle that
+// is seen there, along the view of it: the paths' step may go beyond that triangle, or beyond the band that is dark because its
+// normals turn away, whose other side is for the curve that ends it (facet.h); and where shading runs on over many narrow
+// triangles, what it changes by over that step at each of their edges adds up. Faces without vertex normals are left where the step
+// stays in the triangle: rays that begin on an inner edge begin on both of its faces. What textures are there is looked up a little
+// inside: exactly on the edge, one that jumps along it has the same value for both sides.
 static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k, real side, Mask m) {
     const SceneView *scene = t->scene;
     const EdgePoint *e = &s->edge;
@@ -254,9 +245,8 @@ static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k,
     hit.u = f_lerp(f_clamp(hit.u, f_set(0), f_set(1)), f_set(1.0f / 3), f_set(PRIMARY_INSET));
     hit.v = f_lerp(f_clamp(hit.v, f_set(0), f_set(1)), f_set(1.0f / 3), f_set(PRIMARY_INSET));
     Mask inside = m & mi_eq(met.shape, hit.shape) & mi_eq(met.prim, hit.prim) & mi_eq(met.instance, hit.instance);
-    if (m_any(inside)) {
-        m = m & ~(inside & m_gt(hits_facing(scene, &met, d, inside) * hits_facing(scene, &hit, s->seen.d, inside), f_set(0)));
-    }
+    Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
+    m = m & (smooth | ~inside);
     met = hit_select(m, &hit, &met);
     d = v3_select(m, s->seen.d, d);
     hit_store(t, k, &met);
@@ -274,7 +264,7 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         primary_sample(t, b, pinhole, i_iota() + k, m_first_n(count - k), &s);
         Mask above = m_gt(edge_first_rise(&s.edge, s.n), f_set(0)), m = m_first_n(count - k), round = s.edge.round & m;
         Mask turns = m & m_gt(v3_dot(s.edge.normal, s.edge.normal), f_set(0));
-        Mask own = m & primary_is_smooth(t, &s);
+        Mask own = m & primary_is_mesh(t, &s);
         for (int side = 0; side < 2 && m_any(own); side++) {
             primary_touch(t, &s, side * half + k, side ? 1 : -1, own);
         }

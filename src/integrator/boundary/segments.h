@@ -309,6 +309,16 @@ static Vec3 segment_stand(Tracer *t, const Segment *s, Vec3 o) {
     return v3_select(m, v3_madd(met.p, -2.0f * step, s->d), o);
 }
 
+// The ray from o, beside the edge, to the light's point that the segment ends on: a step to the side in the same direction would
+// lead into a light that is seen at a grazing angle.
+static Ray segment_ahead(const Segment *s, Vec3 o) {
+    Mask ends = m_lt(s->distance, f_set(INFINITY));
+    Vec3 to = v3_sub(v3_madd(s->edge.p, f_select(ends, s->distance, f_set(1)), s->d), o);
+    Float length = v3_length(to);
+    return (Ray){o, v3_select(ends, v3_scale(to, f_safe_rcp(length)), s->d),
+                 f_select(ends, length * (1.0f - SHADOW_SHORT), f_set(INFINITY))};
+}
+
 // Lanes of m in which what was found against d is seen along d, too: tubes stop rays from outside alone.
 static Mask segment_forwards(Tracer *t, Vec3 o, Vec3 near, Vec3 d, Mask m) {
     Float step = interaction_step(near);
@@ -318,13 +328,29 @@ static Mask segment_forwards(Tracer *t, Vec3 o, Vec3 near, Vec3 d, Mask m) {
     return (m & ~far) | (far & m_gt(spec_max(trace_transmittance(t->scene, &ray, far)), f_set(0)));
 }
 
+// Lanes of m in which rays from the near point pass the edge: they start a step above their surface, behind what hangs closer
+// before it, as a poster does before a wall. What stands on the surface is left to segment_stand.
+static Mask segment_clears(const Tracer *t, const Segment *s, const Hit *near, Mask m) {
+    Float step = interaction_step(near->p);
+    Vec3 n, to = v3_sub(s->edge.p, near->p);
+    Mask close = m & m_lt(v3_dot(to, to), (64.0f * step) * (64.0f * step));
+    Int shape = i_select(close, near->shape, i_set(-1));
+    if (!m_any(close)) {
+        return m;
+    }
+    point_hit(t->scene, shape, i_select(close, near->prim, i_set(0)), near->instance, near->p, &n);
+    Float height = f_abs(v3_dot(to, n));
+    return m & ~(close & m_lt(height, step) & m_gt(height, 0.02f * step));
+}
+
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
-    Ray ahead = {o, s->d, s->distance * (1.0f - 9e-4f)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
+    Ray ahead = {o, s->d, f_set(INFINITY)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
     Mask m = s->m;
     t->job->rays += m_count(m);
     if (lit) {
+        ahead = segment_ahead(s, o);
         m = m & m_gt(spec_max(trace_transmittance(t->scene, &ahead, m)), f_set(0));
     } else {
         s->far = trace_closest(t->scene, &ahead, m, false);
@@ -340,13 +366,14 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     if (t->scene->segments_count && m_any(m)) {
         m = segment_forwards(t, o, near.p, s->d, m);
     }
+    m = segment_clears(t, s, &near, m);
     segment_keep(s, o, &near, lit, number, q, m);
 }
 
 // In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through.
 static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Int number, Mask m) {
-    Ray ahead = {o, s->d, s->distance * (1.0f - SHADOW_SHORT)};
-    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW)};
+    Ray ahead = segment_ahead(s, o);
+    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false};
     Mask blocked;
     Spec through = walk_transmittance(t, ahead, m, &fog, &blocked, NULL);
     s->light = spec_mul(s->light, through);
