@@ -55,17 +55,30 @@ static bool may_meet(const Box *a, const Box *b) {
     return !left_out && !rey_boxes_apart(a, b);
 }
 
-static void sort_boxes(const Box *boxes, int32_t count, Ordered *order) {
-    Box all = boxes[0];
-    for (int32_t i = 1; i < count; i++) {
-        all = box_union(all, boxes[i]);
-    }
+typedef struct Place {
+    float at;
+    int32_t box;
+} Place;
+
+static int compare_places(const void *a, const void *b) {
+    const Place *x = a, *y = b;
+    return (x->at > y->at) - (x->at < y->at);
+}
+
+// By how many boxes lie on either side along each axis, and not by where they do: beside a plane that is a thousand times as large
+// all others would be in one place.
+static void sort_boxes(const Box *boxes, int32_t count, Ordered *order, Place *places) {
     for (int32_t i = 0; i < count; i++) {
         order[i] = (Ordered){0, i};
-        for (int k = 0; k < 3; k++) {
-            float size = all.high[k] - all.low[k], middle = 0.5f * (boxes[i].low[k] + boxes[i].high[k]) - all.low[k];
-            float at = size > 0 ? middle / size * ((1 << BITS) - 1) : 0;
-            order[i].code |= spread((uint32_t)at) << k;
+    }
+    for (int k = 0; k < 3; k++) {
+        for (int32_t i = 0; i < count; i++) {
+            places[i] = (Place){0.5f * (boxes[i].low[k] + boxes[i].high[k]), i};
+        }
+        qsort(places, (size_t)count, sizeof *places, compare_places);
+        for (int32_t i = 0, rank = 0; i < count; i++) {
+            rank = i > 0 && places[i].at > places[i - 1].at ? i : rank;
+            order[places[i].box].code |= spread((uint32_t)((int64_t)rank * ((1 << BITS) - 1) / count)) << k;
         }
     }
     qsort(order, (size_t)count, sizeof *order, compare_codes);
@@ -128,14 +141,16 @@ rey_result rey_overlaps_find(rey_context *ctx, const Box *boxes, int32_t count, 
         nodes = 2 * nodes + 1;
     }
     Search s = {boxes, rey_alloc_array(ctx, (size_t)count + 1, sizeof *s.order), NULL, found, user};
+    Place *places = rey_alloc_array(ctx, (size_t)count + 1, sizeof *places);
     s.nodes = s.order ? rey_alloc_array(ctx, nodes, sizeof *s.nodes) : NULL;
-    rey_result result = s.nodes ? REY_OK : REY_ERROR_MEMORY;
+    rey_result result = s.nodes && places ? REY_OK : REY_ERROR_MEMORY;
     if (result == REY_OK && count > 1) {
-        sort_boxes(boxes, count, s.order);
+        sort_boxes(boxes, count, s.order, places);
         Part all = {0, 0, count};
         build(&s, all);
         result = meet(&s, all, all);
     }
+    rey_free(ctx, places);
     rey_free(ctx, s.nodes);
     rey_free(ctx, s.order);
     return result;
