@@ -94,7 +94,9 @@ static Mask primary_visible(Tracer *t, const BoundaryJob *b, const PrimarySample
     // Paths beside marks, where normals turn away and between the triangles of a mesh start on their surfaces (primary_look), also
     // where these are narrower than the paths' step.
     Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
-    Mask inner = primary_is_mesh(t, s) & ~s->silhouette & mi_lt(i_set(-1), s->edge.other);
+    const EdgePoint *e = &s->edge;
+    Mask parts = m_lt(edge_rise(e, e->side[0], s->n) * edge_rise(e, e->side[1], s->n), f_set(0)); // neither is seen edge-on
+    Mask inner = primary_is_mesh(t, s) & ~s->silhouette & mi_lt(i_set(-1), e->other) & parts;
     Mask clips = edge_clips(&s->edge), own = m & (s->edge.mark | turns | inner | clips);
     Mask visible = edge_between(t, b, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
@@ -227,11 +229,14 @@ static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k,
     Paths *p = &ws->paths[0];
     Hit met = {i_load(ws->hit_shape + k), i_load(ws->hit_prim + k), f_load(ws->hit_u + k), f_load(ws->hit_v + k),
                record_v3(ws->hit_x, ws->hit_y, ws->hit_z, k), i_load(ws->hit_instance + k)};
-    // Of the triangles on this side, the one that rises nearer to the viewer.
+    // Of the triangles on this side, the one that rises nearer to the viewer, seen along the edge.
+    Vec3 seen = s->seen.d;
+    Float run = v3_dot(seen, e->tangent) * f_safe_rcp(v3_dot(e->tangent, e->tangent));
+    Vec3 across = v3_madd(seen, -run, e->tangent);
     Float rise[2], slope[2];
     for (int i = 0; i < 2; i++) {
         rise[i] = side * edge_rise(e, e->side[i], s->n);
-        slope[i] = v3_dot(e->side[i], s->seen.d) * f_safe_rcp(rise[i]);
+        slope[i] = v3_dot(e->side[i], across) * f_safe_rcp(rise[i]);
     }
     Mask second = m_gt(rise[1], f_set(0)) & mi_lt(i_set(-1), e->other), first = m_gt(rise[0], f_set(0));
     second = second & (~first | m_lt(slope[1], slope[0]));
