@@ -30,12 +30,14 @@ typedef struct PrimarySample {
 } PrimarySample;
 
 // Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
-// Where surfaces pass through each other, rays that one lets pass start a step behind it and must meet the other one; where a plane
+// Where surfaces pass through each other, shadow rays start above the one and may miss the other, if the paths pass nearer than at
+// most; there, rays that one lets pass start a step behind it and must meet the other one; where a plane
 // cuts surfaces, they start on that. scale: pixels per length across the edge.
 static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     const real finest = 2 * film_resolution(t->sensor);
-    Float step = f_select(smooth & m_set(b->chains), f_set(finest), f_min(f_set(finest), f_set(PRIMARY_STEP)));
+    Float step = f_select(e->meeting, f_set(PRIMARY_STEP), f_min(f_set(finest), f_set(PRIMARY_STEP)));
+    step = f_select(smooth & m_set(b->chains), f_set(finest), step);
     Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
     return f_select((e->meeting & m_set(b->chains)) | edge_clips(e), behind, step);
 }
