@@ -92,17 +92,21 @@ static bool has_projector(const SceneView *view) {
     return false;
 }
 
-// What is not known of cameras that move among media and their borders alone, null where all is.
-static const char *gap_of_glides(const SceneView *view) {
-    if (has_projector(view)) {
-        return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
-    }
+static const char *gap_of_voxels(const SceneView *view) {
     for (int64_t i = 0; i < view->volumes_count; i++) {
         if (jumps(view->volumes + i)) {
             return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
         }
     }
     return NULL;
+}
+
+// What is not known of cameras that move among media and their borders alone, null where all is.
+static const char *gap_of_glides(const SceneView *view) {
+    if (has_projector(view)) {
+        return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
+    }
+    return gap_of_voxels(view);
 }
 
 // What is not known of surfaces that move in scenes with media, and of cameras among them, null where all is.
@@ -121,12 +125,7 @@ static const char *gap_of_rides(const SceneView *view) {
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";
     }
-    for (int64_t i = 0; i < view->volumes_count; i++) {
-        if (jumps(view->volumes + i)) {
-            return "in participating media with filter_type=\"nearest\", rays that move pass jumps from voxel to voxel";
-        }
-    }
-    return NULL;
+    return gap_of_voxels(view);
 }
 
 // Whether one of the volumes that stand where a parameter says does.

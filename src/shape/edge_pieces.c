@@ -11,6 +11,7 @@ typedef struct Line {
     double key, second, slack; // slack: by how much the keys of edges on the same line may differ
     double p[3], d[3];   // where it begins, and to its end
     double length, apart; // apart: how far corners may be from each other that are the same
+    double least;         // the shortest piece, over the length
     int32_t edge;
 } Line;
 
@@ -50,6 +51,7 @@ static bool line_of(const SceneView *view, const EdgeRecord *e, int32_t number, 
     if (line->length <= 8 * line->apart) {
         return false;
     }
+    line->least = 8 * line->apart / line->length;
     for (int k = 0; k < 3; k++) {
         unit[k] = line->d[k] / line->length;
     }
@@ -91,15 +93,14 @@ static bool place_on(const Line *line, const double p[3], double *at) {
 }
 
 static rey_result push_cut(rey_scene *scene, const Line *line, double at, Array *cuts) {
-    double least = 8 * line->apart / line->length;
-    if (at < least || at > 1 - least) {
+    if (at < line->least || at > 1 - line->least) {
         return REY_OK;
     }
     Cut *cut = rey_array_push(scene->ctx, cuts, sizeof *cut, 1);
     if (!cut) {
         return REY_ERROR_MEMORY;
     }
-    *cut = (Cut){line->edge, (float)at, (float)least};
+    *cut = (Cut){line->edge, (float)at, (float)line->least};
     return REY_OK;
 }
 
@@ -112,8 +113,7 @@ static rey_result cut_by(rey_scene *scene, const Line *line, const Line *by, Arr
     if (!place_on(line, by->p, at) || !place_on(line, end, at + 1)) {
         return REY_OK;
     }
-    double least = 8 * line->apart / line->length;
-    if (fmax(at[0], at[1]) < least || fmin(at[0], at[1]) > 1 - least) {
+    if (fmax(at[0], at[1]) < line->least || fmin(at[0], at[1]) > 1 - line->least) {
         return REY_OK;
     }
     rey_result result = push_cut(scene, line, at[0], cuts);
