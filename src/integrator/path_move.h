@@ -42,9 +42,9 @@ KFN void vertex_adj_clear(VertexAdj *d, bool motion) {
     d->light.distance = d->light.uv.x = d->light.uv.y = f_set(0);
 }
 
-// Texture coordinates of attached points stay; those of spheres do as long as their pose remains a similarity.
+// Texture coordinates of attached points stay.
 KFN bool vertex_uv_moves(const SurfaceSweep *s, const Sink *sink) {
-    return sink->any_motion && (m_any(s->slides | s->chained) || s->group->shape_kind == SHAPE_SPHERE);
+    return sink->any_motion && m_any(s->slides | s->chained);
 }
 KFN Vec2 *vertex_uv_adj(const SurfaceSweep *s, VertexAdj *d, const Sink *sink) {
     return vertex_uv_moves(s, sink) ? &d->uv : NULL;

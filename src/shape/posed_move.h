@@ -73,32 +73,27 @@ KFN void sphere_slide(const SceneView *scene, int32_t flags, const Hit *hit, con
     out[1].dp_dv = v3_scale(away, f_set(-PI * PI));
 }
 
-// The table of a sphere: centre t, radius r = |A e_x|, and local coordinates r A^-1 n. Attached points go along
-// n = A q / |A q|; their distances from the centre are r also where A does not stay a similarity. (Then the axes are
-// taken to turn with A, which matters to anisotropic functions alone.)
+// Attached points keep their place on the sphere, p = t + r (x e_1 + y e_2 + z e_3): they, their normals and tangents turn with the
+// axes, which are the columns a_1, a_2, a_3 of the pose made orthonormal one after the other, and grow with r = |a_1|. With w the
+// turn,
+//   w . (e_1 x e_2) = e_2 . da_1 / r,   w . (e_1 x e_3) = e_3 . da_1 / r,
+//   w . (e_2 x e_3) = e_3 . (da_2 - da_1 (e_1 . a_2) / r) / s,   s = e_2 . a_2.
 KFN void sphere_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
                          const SurfaceAdj *d, Sink *sink, Mask m) {
     Int at = SHAPE_FIELD(scene, hit->shape, table), pose = SHAPE_FIELD(scene, hit->shape, to_world);
     Float radius = table_at(scene, at + 3), rcp = f_safe_rcp(radius), sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);
-    Vec3 n = v3_scale(si->ng, sign), zero = v3_zero();
-    Vec3 q = v3(v3_dot(table_v3(scene, at + 4), n), v3_dot(table_v3(scene, at + 7), n), v3_dot(table_v3(scene, at + 10), n));
-    Matrix3 b = {{zero, zero, zero}}, a = b, inverse = pose_theta_inverse(scene, pose);
-    // p = t + r n; ng and the area vector are along n
+    Vec3 n = v3_scale(si->ng, sign), e1 = table_v3(scene, at + 4), e2 = table_v3(scene, at + 7), e3 = table_v3(scene, at + 10);
+    Vec3 second = pose_theta_column(scene, pose, 1);
+    // area ~ r^2
+    Float dr = v3_dot(d->p, n) + (v3_dot(d->dp_du, si->dp_du) + v3_dot(d->dp_dv, si->dp_dv) + 2.0f * v3_dot(d->area, si->ng)) * rcp;
     Vec3 dn = v3_madd(v3_scale(v3_add(v3_add(d->n, d->ng), d->area), sign), radius, d->p);
-    Float dr = v3_dot(d->p, n);
-    // area ~ r^2 det A / |A q|^3
-    Float grows = v3_dot(d->area, si->ng);
-    dr = dr + 2.0f * grows * rcp;
-    b.row[0].x = b.row[1].y = b.row[2].z = grows;
-    // v = acos(q.z r / |A q|) / pi
-    Float dratio = -d->uv.y * INV_PI * q.z * f_safe_rcp(f_safe_sqrt(1.0f - q.z * q.z));
-    dr = dr + dratio * rcp;
-    // n = A q / |A q|, |A q| = r now
-    Vec3 along = v3_scale(n, -(3.0f * grows + dratio));
-    Vec3 dq = v3_scale(v3_add(v3_madd(dn, -v3_dot(n, dn), n), along), rcp);
-    matrix_add_outer(&a, dq, q);
-    matrix_add_outer(&a, v3_scale(pose_theta_column(scene, pose, 0), dr * rcp), v3(f_set(1), f_set(0), f_set(0)));
-    matrix_add_outer(&b, d->dp_du, si->dp_du);
-    matrix_add_outer(&b, d->dp_dv, si->dp_dv);
-    pose_sink_add(&b, &inverse, &a, d->p, i_gather(sink->pose_at, hit->shape), sink, m);
+    Vec3 torque = v3_add(v3_cross(n, dn), v3_add(v3_cross(si->dp_du, d->dp_du), v3_cross(si->dp_dv, d->dp_dv)));
+    Float about_third = v3_dot(torque, v3_cross(e1, e2)) * rcp, about_second = v3_dot(torque, v3_cross(e1, e3)) * rcp;
+    Float about_first = v3_dot(torque, v3_cross(e2, e3)) * f_safe_rcp(v3_dot(e2, second));
+    about_second = about_second - about_first * v3_dot(e1, second) * rcp;
+    Vec3 first = v3_madd(v3_madd(v3_scale(e1, dr), about_third, e2), about_second, e3), zero = v3_zero();
+    Matrix3 none = {{zero, zero, zero}}, a = none;
+    matrix_add_outer(&a, first, v3(f_set(1), f_set(0), f_set(0)));
+    matrix_add_outer(&a, v3_scale(e3, about_first), v3(f_set(0), f_set(1), f_set(0)));
+    pose_sink_add(&none, &none, &a, d->p, i_gather(sink->pose_at, hit->shape), sink, m);
 }

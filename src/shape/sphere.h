@@ -1,4 +1,6 @@
-// sphere.h: spheres. Table: centre, radius, then the inverse rotation (rows). uv = (phi / 2 pi, theta / pi).
+// sphere.h: spheres. Table: centre, radius, then the axes of the inverse rotation (rows). uv = (phi / 2 pi, theta / pi). They stay
+// round where to_world stretches or shears: the radius is that of its first column, along which their first axis lies, and the
+// second one lies in the plane of the first two.
 #pragma once
 
 #include "math/warp.h"
@@ -17,16 +19,33 @@ static inline bool sphere_fold(const double *v, double m[16]) {
 }
 
 static inline bool sphere_follow(const float m[16], float *t, float *area) {
-    double inverse[12];
+    double inverse[12], axis[3][3], radius = 0, along = 0, width = 0, side = 0;
     if (!rey_affine_inverse(m, inverse)) {
         return false;
     }
-    double radius = sqrt((double)m[0] * m[0] + (double)m[4] * m[4] + (double)m[8] * m[8]);
     for (int k = 0; k < 3; k++) {
         t[k] = m[4 * k + 3];
-        for (int c = 0; c < 3; c++) {
-            t[4 + 3 * k + c] = (float)(inverse[4 * k + c] * radius);
-        }
+        radius += (double)m[4 * k] * m[4 * k];
+        along += (double)m[4 * k] * m[4 * k + 1];
+    }
+    for (int k = 0; k < 3; k++) {
+        axis[1][k] = m[4 * k + 1] - along / radius * m[4 * k];
+        width += axis[1][k] * axis[1][k];
+    }
+    radius = sqrt(radius);
+    for (int k = 0; k < 3; k++) {
+        axis[0][k] = m[4 * k] / radius;
+        axis[1][k] /= sqrt(width);
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        axis[2][k] = axis[0][i] * axis[1][j] - axis[0][j] * axis[1][i];
+        side += axis[2][k] * m[4 * k + 2];
+    }
+    for (int k = 0; k < 3; k++) {
+        t[4 + k] = (float)axis[0][k];
+        t[7 + k] = (float)axis[1][k];
+        t[10 + k] = (float)(side < 0 ? -axis[2][k] : axis[2][k]);
     }
     t[3] = (float)radius;
     *area = (float)(4 * 3.14159265358979323846 * radius * radius);

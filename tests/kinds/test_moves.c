@@ -90,16 +90,20 @@ static void follow(World *w) {
     const double *m = w->theta + POSE;
     memcpy(t, m, 12 * sizeof *t);
     inverse_rows(m, t + 12);
-    if (w->c->kind == SHAPE_SPHERE) {
-        double inverse[12], radius = sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]);
-        memcpy(inverse, t + 12, sizeof inverse);
+    if (w->c->kind == SHAPE_SPHERE) { // columns made orthonormal, the third one of A that of a frame or of its mirror image
+        Vec3 a[3];
+        for (int k = 0; k < 3; k++) {
+            a[k] = v3(m[k], m[4 + k], m[8 + k]);
+        }
+        t[3] = v3_length(a[0]);
         for (int k = 0; k < 3; k++) {
             t[k] = m[4 * k + 3];
-            for (int i = 0; i < 3; i++) {
-                t[4 + 3 * k + i] = inverse[4 * k + i] * radius;
+            for (int i = 0; i < k; i++) {
+                a[k] = v3_madd(a[k], -v3_dot(a[k], a[i]), a[i]);
             }
+            a[k] = v3_normalize(a[k]);
+            memcpy(t + 4 + 3 * k, (double[3]){a[k].x, a[k].y, a[k].z}, 3 * sizeof *t);
         }
-        t[3] = radius;
     }
     memcpy(t + INSTANCE_AT, w->theta + INSTANCE, 12 * sizeof *t);
     inverse_rows(w->theta + INSTANCE, t + INSTANCE_AT + 12);
@@ -162,18 +166,6 @@ static void world_make(World *w, const Case *c, uint64_t *random) {
         w->theta[NORMALS + 3 * k + 2] += 2;
         w->theta[POSE + 5 * k] += 3;
         w->theta[INSTANCE + 5 * k] += 3;
-    }
-    if (c->kind == SHAPE_SPHERE) { // a rotation times a scale
-        double angle = uniform(random) * 3, size = 1.5 + 0.5 * uniform(random);
-        Vec3 axis = v3_normalize(v3(uniform(random), uniform(random), uniform(random)));
-        for (int column = 0; column < 3; column++) {
-            Vec3 e = v3(column == 0, column == 1, column == 2);
-            Vec3 r = v3_madd(v3_scale(e, cos(angle)), sin(angle), v3_cross(axis, e));
-            r = v3_scale(v3_madd(r, (1 - cos(angle)) * v3_dot(axis, e), axis), size);
-            w->theta[POSE + column] = r.x;
-            w->theta[POSE + 4 + column] = r.y;
-            w->theta[POSE + 8 + column] = r.z;
-        }
     }
     for (int k = 0; k < 4; k++) { // a tube along z
         w->theta[CONTROL_POINTS + 4 * k + 2] += 3 * k;
@@ -246,9 +238,17 @@ static Vec3 cone_point(const World *w, double v, double x, double y) {
     return v3_madd(v3_madd(v3(a[0], a[1], a[2]), v, c1), a[3] + v * r1, n);
 }
 
+// Spheres stay round.
+static Vec3 round_point(const double *t, Vec3 q) {
+    Vec3 n = v3_add(v3_scale(v3(t[4], t[5], t[6]), q.x), v3_scale(v3(t[7], t[8], t[9]), q.y));
+    n = v3_madd(n, q.z, v3(t[10], t[11], t[12]));
+    return v3_madd(v3(t[0], t[1], t[2]), t[3], n);
+}
+
 static Hit attached(const World *w, const double a[2], Vec3 q) {
     Vec3 p = w->c->kind == SHAPE_BSPLINE  ? curve_point(w, a[0], q.x, q.y)
              : w->c->kind == SHAPE_LINEAR ? cone_point(w, a[0], q.x, q.y)
+             : w->c->kind == SHAPE_SPHERE ? round_point(w->tables, q)
                                           : apply(w->theta + POSE, q);
     Hit hit = {0, 0, a[0], a[1], p, 0};
     if (w->c->flags & SHAPE_INSTANCED) {
@@ -284,7 +284,7 @@ static Vec3 patch(World *w) {
     return v3_scale(v3_cross(v3_sub(p[1], p[0]), v3_sub(p[2], p[0])), 1 / (e * e));
 }
 
-static SurfaceAdj random_adj(uint64_t *random, bool axes) {
+static SurfaceAdj random_adj(uint64_t *random) {
     double v[22];
     for (int i = 0; i < 22; i++) {
         v[i] = uniform(random);
@@ -293,10 +293,8 @@ static SurfaceAdj random_adj(uint64_t *random, bool axes) {
     d.p = v3(v[0], v[1], v[2]);
     d.ng = v3(v[3], v[4], v[5]);
     d.n = v3(v[6], v[7], v[8]);
-    if (axes) {
-        d.dp_du = v3(v[9], v[10], v[11]);
-        d.dp_dv = v3(v[12], v[13], v[14]);
-    }
+    d.dp_du = v3(v[9], v[10], v[11]);
+    d.dp_dv = v3(v[12], v[13], v[14]);
     d.area = v3(v[15], v[16], v[17]);
     d.uv = (Vec2){v[18], v[19]};
     d.at = (Vec2){v[20], v[21]};
@@ -326,7 +324,7 @@ static void test_adjoint(void **state) {
     double size = 0;
     for (int round = 0; round < 20; round++) {
         world_make(&w, c, &random);
-        SurfaceAdj d = random_adj(&random, c->kind != SHAPE_SPHERE);
+        SurfaceAdj d = random_adj(&random);
         double gradient[NUMBERS] = {0};
         Sink sink = {.gradient = gradient, .points_at = &points, .pose_at = &pose, .normals_at = &normals,
                      .instance_at = &instance};
@@ -392,7 +390,7 @@ static void test_slide(void **state) {
     uint64_t random = (uint64_t)(c - cases) + 100;
     for (int round = 0; round < 20; round++) {
         world_make(&w, c, &random);
-        SurfaceAdj adjoint = random_adj(&random, true);
+        SurfaceAdj adjoint = random_adj(&random);
         if (c->kind != SHAPE_MESH) {
             adjoint.at = (Vec2){0, 0};
         }
