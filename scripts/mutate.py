@@ -135,9 +135,9 @@ def instrument(files):
 
 def narrow(files):
     """One width, quickly compiled."""
-    text = files["CMakeLists.txt"].replace("foreach(lanes 1 8 16)", "foreach(lanes 8)").replace("kernel_options -O3", "kernel_options -O1 -w")
-    files["CMakeLists.txt"] = re.sub(r"\$<TARGET_OBJECTS:kernel_w(1|16)>", "", text)
-    files["src/backend/cpu.c"] = re.sub(r"(\w+)_w(?:1|16)\b", r"\1_w8", files["src/backend/cpu.c"])
+    text = files["CMakeLists.txt"].replace("foreach(lanes 1 8 16)", "foreach(lanes 8)")
+    files["CMakeLists.txt"] = text.replace("kernel_options -O3", "kernel_options -O1 -w")
+    files["src/backend/cpu.c"] = re.sub(r"\(w(?:1|16)\)", "(w8)", files["src/backend/cpu.c"])
     for name in ("tests/CMakeLists.txt", "tests/kinds/CMakeLists.txt"):
         files[name] = "add_compile_options(-w)\n" + files[name].replace("if(REYNOLDS_SANITIZE OR REYNOLDS_TSAN)", "if(TRUE)")
 

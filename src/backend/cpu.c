@@ -1,12 +1,19 @@
 // cpu.c: picks the kernels of a SIMD width at run time.
 #include "backend/backend.h"
 
+#define KERNELS(width)                                                                                                 \
+    {rey_kernel_workspace_bytes_##width, rey_kernel_run_##width, rey_kernel_particles_##width,                         \
+     rey_kernel_boundary_bytes_##width, rey_kernel_boundary_##width}
+
 const Backend *rey_backend_cpu(int lanes) {
-    static const Backend w1 = {rey_kernel_workspace_bytes_w1, rey_kernel_run_w1, rey_kernel_particles_w1,
-                               rey_kernel_boundary_bytes_w1, rey_kernel_boundary_w1};
-    static const Backend w8 = {rey_kernel_workspace_bytes_w8, rey_kernel_run_w8, rey_kernel_particles_w8,
-                               rey_kernel_boundary_bytes_w8, rey_kernel_boundary_w8};
-    static const Backend w16 = {rey_kernel_workspace_bytes_w16, rey_kernel_run_w16, rey_kernel_particles_w16,
-                                rey_kernel_boundary_bytes_w16, rey_kernel_boundary_w16};
-    return lanes == 16 ? &w16 : lanes == 8 ? &w8 : &w1;
+    static const Backend widths[] = {
+        KERNELS(w1),
+#if REYNOLDS_WIDEST >= 8
+        KERNELS(w8),
+#endif
+#if REYNOLDS_WIDEST >= 16
+        KERNELS(w16),
+#endif
+    };
+    return &widths[lanes / 8];
 }

@@ -86,11 +86,11 @@ int rey_useful_threads(int asked) {
 }
 
 int rey_widest_lanes(void) {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+    if (REYNOLDS_WIDEST >= 16 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {
         return 16;
     }
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? 8 : 1;
+    return REYNOLDS_WIDEST >= 8 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? 8 : 1;
 }
 
 static double clock_seconds(clockid_t clock) {

@@ -11,7 +11,7 @@ void rey_parallel_for(int threads, int64_t count, void (*fn)(void *argument, int
 int rey_available_threads(void); // affinity mask and cgroup quota, at least 1
 // How many workers make sense where `asked` are asked for; 0 asks for as many as are available.
 int rey_useful_threads(int asked);
-int rey_widest_lanes(void);      // 16 with AVX-512, 8 with AVX2 and FMA, else 1
+int rey_widest_lanes(void);      // 16 with AVX-512, 8 with AVX2 and FMA, else 1, as far as there are kernels
 double rey_seconds(void);        // monotonic wall clock [s]
 double rey_thread_seconds(void); // CPU time of the calling thread [s]
 int64_t rey_peak_rss(void);      // peak resident memory of the process [bytes]
