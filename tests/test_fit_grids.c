@@ -29,7 +29,7 @@ static const char *const SENSOR =
     "target=\"0, 0, 0\" up=\"0, 0, 1\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer "
     "name=\"height\" value=\"8\"/><rfilter type=\"box\"/></film></sensor>";
 static const char *const JOB =
-    "scene: scene.xml\nseed: 3\niterations: 60\nspp: 32\n"
+    "scene: scene.xml\nseed: 3\niterations: 60\nspp: 128\n"
     "views:\n  - {target: target_0.exr}\n  - {target: target_1.exr}\n  - {target: target_2.exr, held_out: true}\n"
     "loss: l2\noptimizer: {type: adam, learning_rate: 0.3, beta2: 0.9, schedule: cosine}\n"
     "levels:\n  - {from: 0, reduce: 2}\n  - {from: 20, resolution: 6}\n"

@@ -32,7 +32,7 @@ static void judge_half_space(int from, bool sun, int spp, int slope_spp) {
     const rey_define defines[MOST_DEFINES] = {{"albedo", albedos},
                                               {sun ? "sun" : "sky", "1"},
                                               {"g", "0"},
-                                              {"roulette", "24"},
+                                              {"roulette", "200"},
                                               {"kind", sun ? "homogeneous" : "heterogeneous"},
                                               {"wide", sun ? "1" : "2"},
                                               {"sigma_t", "200, 200, 200"}};

@@ -83,7 +83,7 @@ static void look(const char *phase, double sigma_s, double *seen) {
         float image[3 * 16];
         Room room;
         rey_render_def def = rey_default_render_def();
-        def.spp = 8192;
+        def.spp = 32768;
         assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
         ok(room, rey_scene_load(room.ctx, RENDER_DIR "/similarity.xml", defines, COUNT_OF(defines), &room.scene));
         ok(room, rey_render(room.scene, &def, image, NULL));
