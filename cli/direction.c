@@ -184,8 +184,8 @@ static rey_result add_motion(rey_context *ctx, const char *spec, const Op *op, c
     bool local = op->id == OP_LOCAL_TRANSLATE;
     if (geometry == GEOMETRY_NONE) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT,
-                        "%s: %s moves positions (N x 3) or transforms (4 x 4), and %s is neither", spec,
-                        op_names[op->id], info->name);
+                        "%s: %s moves positions (N x 3) or transforms (4 x 4), and %s is neither; file=TANGENT.npy gives any "
+                        "direction", spec, op_names[op->id], info->name);
     }
     if (local && geometry != GEOMETRY_TRANSFORM) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: local_translate needs a transform (to_world)", spec);

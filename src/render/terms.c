@@ -33,12 +33,12 @@ static void term_reason(const rey_scene *scene, const SensorRecord *sensor, int 
         snprintf(reason, REASON, "'%.190s' is a smooth mirror or glass, has a smooth coat or lets a part of the light pass, and "
                                  "the edges that are seen in or through it are not found because of %s", object, obstacle);
     } else if (p->to_uv >= 0 && bit != REY_TERM_TERMINATOR && gap_of_lines(scene)) {
-        snprintf(reason, REASON, "%s, and %s", p->why, gap_of_lines(scene));
+        snprintf(reason, REASON, "%s; %s", gap_of_lines(scene), p->why);
     } else if (bit == REY_TERM_TERMINATOR) {
         snprintf(reason, REASON, "the picture jumps where the normals of maps turn away from the viewer");
     } else if ((p->geometry >= 0 || p->instance >= 0 || p->camera >= 0) && !rey_motion_known(scene, sensor, p)) {
         rey_motion_obstacle(scene, sensor, p, obstacle);
-        snprintf(reason, REASON, "%s, and %s", p->why, obstacle);
+        snprintf(reason, REASON, "%s; %s", obstacle, p->why);
     } else {
         snprintf(reason, REASON, "%s", p->why);
     }
