@@ -70,6 +70,7 @@ typedef struct Builder {
     Array texture_params; // of TextureParams, per texture
     Array named;          // of rey_xml_node *: objects whose path has been noted, in that order
     bool lenient;         // what cannot be read is left out
+    bool small;           // a surface was said to be too small for its place
     int32_t collection;   // shapegroup that shapes go to, -1 = the scene itself
     int32_t shape_flags;  // of all shapes that are built now
     int32_t beside;       // number + 1 of the volume in whose place those that are built now must stand, 0 = anywhere

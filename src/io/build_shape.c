@@ -297,6 +297,38 @@ rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, in
     return build_group(b, shape);
 }
 
+// Widens [low, high] by a number.
+static void widen(double *low, double *high, double x) {
+    *low = fmin(*low, x);
+    *high = fmax(*high, x);
+}
+
+// Tells of the first surface that is hardly larger than the step off surfaces with which rays begin (interaction_step).
+static rey_result note_small(Builder *b, const rey_xml_node *node, const ShapeRecord *shape) {
+    const double share = 0.02;
+    const float *theta = (const float *)b->scene->build.theta.data;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0, far = 0;
+    for (int k = 0; k < 3; k++) {
+        for (int32_t i = 0; shape->kind == SHAPE_MESH && shape->to_world < 0 && i < shape->vertex_count; i++) {
+            widen(low + k, high + k, (double)theta[shape->positions + 3 * i + k]);
+        }
+        for (int side = -1; shape->to_world >= 0 && side <= 1; side += 2) {
+            const float *row = theta + shape->to_world + 4 * k;
+            widen(low + k, high + k, (double)row[3] + side * (fabs((double)row[0]) + fabs((double)row[1]) + fabs((double)row[2])));
+        }
+        size = fmax(size, high[k] - low[k]);
+        far = fmax(far, fmax(fabs(low[k]), fabs(high[k])));
+    }
+    const double step = 9e-5 * (1 + far);
+    if (b->small || b->collection >= 0 || !(size > 0) || !isfinite(far) || step <= share * size) {
+        return REY_OK;
+    }
+    b->small = true;
+    return rey_scene_add_note(b->scene, "derivatives: %s:%d: this %s is %.3g wide, and rays begin %.3g off its surface (9e-5 of "
+                              "1 + the largest coordinate): what moves near it will have wrong derivatives; bring the scene nearer "
+                              "to the origin, or make it larger", node->at.file, node->at.line, node->type, size, step);
+}
+
 rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
     if (strcmp(node->type, "shapegroup") == 0) {
         return build_shapegroup(b, node, path);
@@ -334,6 +366,7 @@ rey_result build_shape(Builder *b, rey_xml_node *node, const char *path) {
         return build_unknown(b, node, shape_word, NULL);
     }
     TRY(build_surface(b, node, rey_xml_child_of(node, REY_XML_BIT(REY_XML_BSDF), 0), id, path, &shape));
+    TRY(note_small(b, node, &shape));
     ARRAY_AT(b->scene->build.shapes, ShapeRecord, id) = shape;
     ShapeSource *source = rey_array_push(b->ctx, &b->source->shapes, sizeof *source, 1);
     if (!source) {

@@ -47,6 +47,26 @@ static void other_cameras_are_told(void **state) {
                                      "which belong to another sensor: their derivatives are 0"));
 }
 
+// Derivatives beside surfaces that are hardly larger than the step with which rays leave them are doubtful: that is told, once.
+static void small_surfaces_are_told(void **state) {
+    Fixture *f = *state;
+    static const char *const balls[] = {"<point name='center' x='1000'/><float name='radius' value='%s'/>",
+                                        "<transform name='to_world'><scale value='%s'/><translate z='-1000'/></transform>"};
+    for (int i = 0; i < 4; i++) {
+        char ball[160], text[1024];
+        const char *radius = i % 2 ? "1.5" : "3";
+        snprintf(ball, sizeof ball, balls[i / 2], radius);
+        snprintf(text, sizeof text, "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective' id='eye'>\n"
+                 "<film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>\n"
+                 "<emitter type='constant'/><shape type='%s' id='far'>%s</shape><shape type='%s'>%s</shape></scene>\n",
+                 i < 2 ? "sphere" : "cube", ball, "sphere", "<point name='center' z='3'/>");
+        write_words("far.xml", text);
+        expect_note(f, "render far.xml --spp 1 -o far.npy --json", NULL);
+        expect_note(f, "grad far.xml --param far.to_world:translate=0,1,0 --spp 1 --json",
+                    i % 2 ? "3 wide, and rays begin 0.09" : NULL);
+    }
+}
+
 // Where all that is asked for is refused, nothing has passed.
 static void refusals_are_no_success(void **state) {
     Fixture *f = *state;
@@ -331,6 +351,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(other_cameras_are_told), cmocka_unit_test(refusals_are_no_success),
         cmocka_unit_test(unknowns_out_of_sight_are_told),
+        cmocka_unit_test(small_surfaces_are_told),
         cmocka_unit_test(steps_are_told),
         cmocka_unit_test(shared_noise_is_told),
         cmocka_unit_test(gradients_have_rows),
