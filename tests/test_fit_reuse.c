@@ -1,5 +1,6 @@
 // test_fit_reuse.c: paths that serve several values of the parameters: what they estimate there has the mean of fresh ones, the
 // gradient is that of the very estimate, and fits that reuse them keep the range of weights and resume with the same bits.
+#include "base/parallel.h"
 #include "fit_folder.h"
 #include "io/vol.h"
 #include "render/replay.h"
@@ -243,13 +244,13 @@ static void expect_unbiased(const Fixture *f, const char *integrator, int lanes)
 
 static void test_unbiased(void **state) { expect_unbiased(*state, "volpath", 0); }
 
-static void test_unbiased_without_media(void **state) { expect_unbiased(*state, "path", 8); }
+static void test_unbiased_without_media(void **state) { expect_unbiased(*state, "path", rey_widest_lanes() < 8 ? 1 : 8); }
 
 // Of what is homogeneous, the gradient is the derivative of the estimate with the same samples, not only in the mean.
 static void test_gradient_is_of_the_estimate(void **state) {
     const double step = 4e-3;
     const int lanes[] = {1, 8, 16};
-    for (int w = 0; w < COUNT_OF(lanes); w++) {
+    for (int w = 0; w < COUNT_OF(lanes) && lanes[w] <= rey_widest_lanes(); w++) {
         Pair p = pair_open(*state, lanes[w], 2, "volpath");
         double x[ESTIMATES], gradient[UNKNOWN_COUNT * MOST_VALUES];
         rey_render_def def = def_of(7, 32);
@@ -282,7 +283,7 @@ static void test_gradient_is_of_the_estimate(void **state) {
 static void test_widths_and_threads(void **state) {
     double first[ESTIMATES], other[ESTIMATES];
     ReplayWeights weights[4] = {{0}};
-    const int lanes[] = {1, 8, 16, 16}, threads[] = {1, 1, 1, 3};
+    const int widest = rey_widest_lanes(), lanes[] = {1, widest < 8 ? 1 : 8, widest, widest}, threads[] = {1, 1, 1, 3};
     for (int w = 0; w < COUNT_OF(lanes); w++) {
         Pair p = pair_open(*state, lanes[w], threads[w], "volpath");
         float image[NUMBERS];

@@ -1,5 +1,6 @@
 // Several integrators inside of `aov` and `moment`: each renders as if it stood alone, and channels have the names and the order
 // that Mitsuba 3.9.1 gives them.
+#include "base/parallel.h"
 #include "reynolds/reynolds.h"
 
 #include <math.h>
@@ -141,14 +142,12 @@ static void test_alone(void **state) {
         "value='26'/><integer name='height' value='11'/><string name='pixel_format' value='rgba'/><rfilter type='box'/>"
         "<integer name='crop_width' value='13'/><integer name='crop_offset_x' value='7'/></film></sensor>";
     char rest[4096];
-    for (size_t i = 0; i < sizeof lanes / sizeof *lanes; i++) {
+    for (size_t i = 0; i < sizeof lanes / sizeof *lanes && lanes[i] <= rey_widest_lanes(); i++) {
         rey_context *ctx = context(lanes[i], 2);
-        if (rey_lanes(ctx) == lanes[i]) {
-            snprintf(rest, sizeof rest, "%s%s", sensor, room);
-            check_alone(ctx, rest, nested, NESTED);
-            snprintf(rest, sizeof rest, "%s%s", pair, room);
-            check_alone(ctx, rest, nested, NESTED);
-        }
+        snprintf(rest, sizeof rest, "%s%s", sensor, room);
+        check_alone(ctx, rest, nested, NESTED);
+        snprintf(rest, sizeof rest, "%s%s", pair, room);
+        check_alone(ctx, rest, nested, NESTED);
         rey_context_destroy(ctx);
     }
 }

@@ -1,5 +1,6 @@
 // Borders of media that lie in other surfaces: boxes side by side, a pile of layers, fog that stands on a lamp, all in closed form
 // with their derivatives; lights beside a border, which rays slip through now and then; and faces that rays run along.
+#include "base/parallel.h"
 #include "rooms.h"
 
 enum { ACROSS = 16, SETS = 8, MOST_PATHS = 1 << 14 };
@@ -77,10 +78,12 @@ static void judge(const Pile *pile, int lanes) {
 static void test_piles(void **state) {
     UNUSED(state);
     for (size_t i = 0; i < COUNT_OF(piles); i++) {
-        judge(piles + i, 16);
+        judge(piles + i, 0);
     }
-    judge(piles, 8);
     judge(piles, 1);
+    if (rey_widest_lanes() > 8) {
+        judge(piles, 8);
+    }
 }
 
 // A lamp above a box of fog: were it in the fog, its gradient would lack a part and be refused.
@@ -121,7 +124,7 @@ static void sun_over_box(const char *sun, const char *place, const char *refusal
              "<translate z='-1.1'/></transform></shape><emitter type='directional' id='sun'><vector name='direction' value='%s'/>"
              "</emitter>",
              place, sun);
-    Room room = pile_open(text, 8);
+    Room room = pile_open(text, 0);
     float tangent[16] = {[3] = 1}, image[3 * ACROSS * ACROSS];
     static const char *const names[] = {"box.to_world", "sun.to_world"};
     for (size_t i = 0; i < COUNT_OF(names); i++) {
