@@ -234,7 +234,7 @@ static void test_update(void **state) {
 
 static void picture_of(rey_scene *scene, float image[4 * 4 * 3]) {
     rey_render_def def = rey_default_render_def();
-    def.spp = 4;
+    def.spp = 64;
     if (rey_render(scene, &def, image, NULL) != REY_OK) {
         fail_msg("%s", rey_error(scene->ctx));
     }
