@@ -90,7 +90,7 @@ static void follow(World *w) {
     const double *m = w->theta + POSE;
     memcpy(t, m, 12 * sizeof *t);
     inverse_rows(m, t + 12);
-    if (w->c->kind == SHAPE_SPHERE) { // columns made orthonormal, the third one of A that of a frame or of its mirror image
+    if (w->c->kind == SHAPE_SPHERE) { // the columns made orthonormal, one after the other
         Vec3 a[3];
         for (int k = 0; k < 3; k++) {
             a[k] = v3(m[k], m[4 + k], m[8 + k]);
