@@ -297,30 +297,30 @@ rey_result build_surface(Builder *b, rey_xml_node *node, rey_xml_child *bsdf, in
     return build_group(b, shape);
 }
 
-// Widens [low, high] by a number.
-static void widen(double *low, double *high, double x) {
-    *low = fmin(*low, x);
-    *high = fmax(*high, x);
-}
-
 // Tells of the first surface that is hardly larger than the step off surfaces with which rays begin (interaction_step).
 static rey_result note_small(Builder *b, const rey_xml_node *node, const ShapeRecord *shape) {
     const double share = 0.02;
     const float *theta = (const float *)b->scene->build.theta.data;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0, far = 0;
-    for (int k = 0; k < 3; k++) {
-        for (int32_t i = 0; shape->kind == SHAPE_MESH && shape->to_world < 0 && i < shape->vertex_count; i++) {
-            widen(low + k, high + k, (double)theta[shape->positions + 3 * i + k]);
+    const bool posed = shape->to_world >= 0; // two opposite corners of what it lies in
+    const int64_t count = b->small || b->collection >= 0 ? 0 : posed ? 2 : shape->kind == SHAPE_MESH ? shape->vertex_count : 0;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0, step = 0;
+    for (int64_t i = 0; i < count; i++) {
+        double far = 0;
+        for (int k = 0; k < 3; k++) {
+            const float *row = posed ? theta + shape->to_world + 4 * k : NULL;
+            double half = posed ? fabs((double)row[0]) + fabs((double)row[1]) + fabs((double)row[2]) : 0;
+            double x = posed ? (double)row[3] + (i ? half : -half) : (double)theta[shape->positions + 3 * i + k];
+            low[k] = fmin(low[k], x);
+            high[k] = fmax(high[k], x);
+            size = fmax(size, high[k] - low[k]);
+            far = fmax(far, fmax(fabs(low[k]), fabs(high[k])));
         }
-        for (int side = -1; shape->to_world >= 0 && side <= 1; side += 2) {
-            const float *row = theta + shape->to_world + 4 * k;
-            widen(low + k, high + k, (double)row[3] + side * (fabs((double)row[0]) + fabs((double)row[1]) + fabs((double)row[2])));
+        step = 9e-5 * (1 + far);
+        if (step <= share * size) { // farther points widen it by more than they lengthen the step
+            return REY_OK;
         }
-        size = fmax(size, high[k] - low[k]);
-        far = fmax(far, fmax(fabs(low[k]), fabs(high[k])));
     }
-    const double step = 9e-5 * (1 + far);
-    if (b->small || b->collection >= 0 || !(size > 0) || !isfinite(far) || step <= share * size) {
+    if (!(size > 0) || !isfinite(step)) {
         return REY_OK;
     }
     b->small = true;
