@@ -56,7 +56,7 @@ fuzz:
 	@sh scripts/setup.sh $(PACKAGES) clang libclang-rt-14-dev
 	@CC=clang cmake -S . -B build-fuzz -DREYNOLDS_FUZZ=ON -DREYNOLDS_SANITIZE=ON -DREYNOLDS_WIDEST=1 > /dev/null
 	@$(MAKE) --no-print-directory -C build-fuzz -j$(JOBS) fuzz
-	@sh scripts/fuzz.sh build-fuzz $(FUZZ_SECONDS)
+	@sh scripts/fuzz.sh build-fuzz $(FUZZ_SECONDS) $(JOBS)
 
 # Sanitizers see in a quarter of the samples what they see in all, and at 8 lanes what they see at 16, which take minutes to build.
 sanitize: setup
@@ -64,8 +64,9 @@ sanitize: setup
 	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
 	@cd build-asan && REYNOLDS_TEST_EFFORT=0.25 ctest -j$(JOBS) --output-on-failure -LE 'slow|heavy'
 
+# Threads meet in the same places at every width.
 tsan: setup
-	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON -DREYNOLDS_WIDEST=8 > /dev/null
+	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON -DREYNOLDS_WIDEST=1 > /dev/null
 	@$(MAKE) --no-print-directory -C build-tsan -j$(JOBS) threads
 	@cd build-tsan && TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" ctest --output-on-failure -L threads
 
