@@ -89,20 +89,25 @@ KFN Hit packet_closest(const SceneView *scene, const Ray *ray, const Hit *otherw
     return hit;
 }
 
-// Closest hits. Lanes without one have shape -1.
-KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coherent) {
+// Closest hits on surfaces of these kinds (MEET_); on solid ones only, where Embree knows no others (open_apart).
+KFN Hit trace_kinds(const SceneView *scene, const Ray *ray, int which, Mask m, bool coherent) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     Ray range = *ray;
     Hit hit = HIT_NONE;
     if (scene->own_spheres_count) {
-        range.tmax = spheres_meet(scene, ray, MEET_ALL, m, &hit.shape);
+        range.tmax = spheres_meet(scene, ray, which, m, &hit.shape);
     }
-    if (scene->open_triangles_count) {
+    if (scene->open_triangles_count && (which & MEET_OPEN)) {
         triangles_meet(scene, ray, i_set(-1), m, &range.tmax, &hit);
     }
     return packet_closest(scene, &range, &hit, m, &context);
+}
+
+// Closest hits. Lanes without one have shape -1.
+KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coherent) {
+    return trace_kinds(scene, ray, MEET_ALL, m, coherent);
 }
 
 // Closest hits on surfaces that let light pass, where Embree does not know them (open_apart).

@@ -6,47 +6,71 @@
 #include "scene/ray.h"
 #include "scene/scene.h"
 
-// Corners relative to where rays begin: two triangles see the same of an edge that they share, so that no ray passes between them.
-KFN Float edge_volume(Vec3 a, Vec3 b, Vec3 d) { return v3_dot(v3_cross(v3_add(a, b), v3_sub(a, b)), d); }
-
-KFN Vec3 open_corner(const OpenTriangle *triangle, int k, Vec3 o) {
-    const float *p = triangle->corner[k];
+KFN Vec3 open_corner(const SceneView *scene, int32_t i, Vec3 o) {
+    const float *p = scene->open_corners[i];
     return v3_sub(v3(f_set((real)p[0]), f_set((real)p[1]), f_set((real)p[2])), o);
 }
 
-// The lanes that one of them may be met in.
-KFN Mask triangles_may_meet(const SceneView *scene, const Ray *ray, Float t, Mask m) {
+// The lanes that one of them may be met in; *low: how far from where they begin.
+KFN Mask triangles_may_meet(const SceneView *scene, const Ray *ray, Float t, Mask m, Float *low) {
     const Float o[3] = {ray->o.x, ray->o.y, ray->o.z}, d[3] = {ray->d.x, ray->d.y, ray->d.z};
-    Float low = f_set(0), high = t;
+    Float high = t;
+    *low = f_set(0);
     for (int k = 0; k < 3; k++) {
         Mask crosses = ~m_eq(d[k], f_set(0));
         Float rcp = f_safe_rcp(d[k]);
         Float a = (f_set((real)scene->open_low[k]) - o[k]) * rcp, b = (f_set((real)scene->open_high[k]) - o[k]) * rcp;
-        low = f_select(crosses, f_max(low, f_min(a, b)), low);
+        *low = f_select(crosses, f_max(*low, f_min(a, b)), *low);
         high = f_select(crosses, f_min(high, f_max(a, b)), high);
     }
-    return m & m_le(low, high);
+    return m & m_le(*low, high);
+}
+
+// What rays see of the corners and edges of these triangles.
+typedef struct OpenView {
+    Vec3 corner[MOST_OPEN_CORNERS];        // from the ray's origin
+    Float volume[2 * MOST_OPEN_CORNERS];   // that direction and edge span, by the way along the edge
+} OpenView;
+
+// o: points of the rays that are no farther from the triangles than these are wide. Two triangles see the same of an edge that they
+// share, so that no ray passes between them.
+KFN void open_view(const SceneView *scene, Vec3 o, Vec3 d, OpenView *view) {
+    Vec3 moment[MOST_OPEN_CORNERS];
+    for (int32_t i = 0; i < scene->open_corners_count; i++) {
+        view->corner[i] = open_corner(scene, i, o);
+        moment[i] = v3_cross(d, view->corner[i]);
+    }
+    for (int32_t i = 0; i < scene->open_edges_count; i++) {
+        const int32_t *edge = scene->open_edges[i];
+        Float volume = v3_dot(moment[edge[0]], view->corner[edge[1]]);
+        view->volume[2 * i] = volume;
+        view->volume[2 * i + 1] = -volume;
+    }
 }
 
 // Puts closer hits of the lanes of m on such triangles into *hit and their distances into *t. aside: a shape that is left aside.
 static NOINLINE void triangles_meet(const SceneView *scene, const Ray *ray, Int aside, Mask m, Float *t, Hit *hit) {
-    m = triangles_may_meet(scene, ray, *t, m);
+    Float low;
+    OpenView view;
+    m = triangles_may_meet(scene, ray, *t, m, &low);
     if (!m_any(m)) {
         return;
     }
+    low = f_zero_unless(m, low);
+    open_view(scene, v3_madd(ray->o, low, ray->d), ray->d, &view);
     for (int32_t i = 0; i < scene->open_triangles_count; i++) {
         const OpenTriangle *triangle = scene->open_triangles + i;
-        Vec3 a = open_corner(triangle, 0, ray->o), b = open_corner(triangle, 1, ray->o), c = open_corner(triangle, 2, ray->o);
-        Float u = edge_volume(a, c, ray->d), v = edge_volume(b, a, ray->d), w = edge_volume(c, b, ray->d);
-        Mask inside = (m_ge(u, f_set(0)) & m_ge(v, f_set(0)) & m_ge(w, f_set(0))) |
-                      (m_le(u, f_set(0)) & m_le(v, f_set(0)) & m_le(w, f_set(0)));
-        inside = m & inside & ~mi_eq(aside, i_set(triangle->shape));
+        // The edge across from a corner makes the corner's barycentric; the three together are normal . direction.
+        Float w = view.volume[triangle->way[1]], u = view.volume[triangle->way[2]], v = view.volume[triangle->way[0]];
+        Mask inside = m_ge(f_min(f_min(u, v), w), f_set(0)) | m_le(f_max(f_max(u, v), w), f_set(0));
+        inside = m & inside;
         if (!m_any(inside)) {
             continue;
         }
-        Vec3 n = v3_cross(v3_sub(b, a), v3_sub(c, a));
-        Float at = v3_dot(n, a) * f_safe_rcp(v3_dot(n, ray->d)), sum = u + v + w, rcp = f_safe_rcp(sum);
-        Mask closer = inside & m_gt(at, f_set(0)) & m_lt(at, *t) & ~m_eq(sum, f_set(0));
+        const float *g = triangle->normal;
+        Vec3 n = v3(f_set((real)g[0]), f_set((real)g[1]), f_set((real)g[2]));
+        Float sum = u + v + w, rcp = f_safe_rcp(sum), at = v3_dot(n, view.corner[triangle->corner]) * rcp + low;
+        Mask closer = inside & m_gt(at, f_set(0)) & m_lt(at, *t) & ~m_eq(sum, f_set(0)) & ~mi_eq(aside, i_set(triangle->shape));
         *t = f_select(closer, at, *t);
         hit->shape = i_select(closer, i_set(triangle->shape), hit->shape);
         hit->prim = i_select(closer, i_set(triangle->prim), hit->prim);

@@ -1,5 +1,6 @@
 // leg.h: ways through scenes with media that nobody records: up to where a ray collides or meets a surface that scatters. Surfaces
-// of the kind null are passed on the way and are no vertices, so that the number of vertices is that of the way's depth.
+// of the kind null are passed on the way and are no vertices, so that the number of vertices is that of the way's depth; and paths
+// need not be sorted, shaded and traced anew for each of them.
 #pragma once
 
 #include "integrator/flight.h"
@@ -8,7 +9,7 @@
 typedef struct Leg {
     Hit near;        // shape -1: a collision
     Int air, around; // the medium that it is in, -1 = a surface; the medium that the ray came through
-    Spec weight, emission; // emission: of the media on the way, where paths bring light, times weights
+    Spec weight, emission; // emission: of the media on the way, where it counts, times weights
     Mask m;
 } Leg;
 
@@ -32,16 +33,37 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
     return passed;
 }
 
+// What a leg is asked for.
+typedef struct LegDef {
+    int most;      // surfaces that it may pass; where there are more, it ends at the next one
+    bool emission, coherent;
+} LegDef;
+
+// What the ray meets first, `solid` the first surface that lets no light pass.
+KFN Hit leg_meet(const SceneView *scene, const Ray *ray, const Hit *solid, Mask m) {
+    Ray before = *ray;
+    before.tmax = f_select(mi_lt(i_set(-1), solid->shape), v3_dot(v3_sub(solid->p, ray->o), ray->d), ray->tmax);
+    Hit open = trace_open(scene, &before, m);
+    return hit_select(mi_lt(i_set(-1), open.shape), &open, solid);
+}
+
 // The ray's media begin at `from`, a point of its line; what it passes before that is nothing. weight: of the paths that go so.
-static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
+static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
     Leg leg = {.near = {i_set(-1), i_set(0), f_set(0), f_set(0), ray.o, i_set(0)}, .air = i_set(-1), .around = medium};
     leg.weight = weight;
     leg.emission = spec_zero();
     leg.m = m_set(false);
     Mask left = m;
-    for (int i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(left); i++) {
-        Hit hit = trace_media(t, &ray, left, false);
-        t->job->rays += m_count(left);
+    // What lets no light pass need not be met again behind each surface that does.
+    const bool apart = t->scene->open_apart && !t->scene->borders_touch;
+    Hit solid = HIT_NONE;
+    if (apart && m_any(m)) {
+        solid = trace_kinds(t->scene, &ray, MEET_SOLID, m, def.coherent);
+        t->job->rays += m_count(m);
+    }
+    for (int i = 0; i <= def.most && m_any(left); i++) {
+        Hit hit = apart ? leg_meet(t->scene, &ray, &solid, left) : trace_media(t, &ray, left, def.coherent && i == 0);
+        t->job->rays += apart ? 0 : m_count(left);
         Mask found = left & mi_lt(i_set(-1), hit.shape), collides = m_set(false);
         Float far = f_select(found, v3_dot(v3_sub(hit.p, from), ray.d), f_set(INFINITY));
         Mask begun = m_gt(far, f_set(0));
@@ -53,7 +75,7 @@ static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec we
             Spec shares = channel_shares(t, leg.weight);
             Flight f = track_flight(&track, from, ray.d, far, shares, mine, key, dimension);
             Mask collided = mine & f.real;
-            if (t->rungs && t->scene->media[id].emission >= 0) {
+            if (def.emission && t->scene->media[id].emission >= 0) {
                 Float u = rng_1d(key, MOST_SURFACES_IN_A_ROW * MOST_COLLISIONS + (uint32_t)i), probe;
                 Spec count, sent = emission_flown(&track, from, ray.d, f.t, shares, key, dimension, u, mine, &probe, &count);
                 leg.emission = spec_add(leg.emission, spec_zero_unless(mine, spec_mul(leg.weight, sent)));
@@ -65,7 +87,8 @@ static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec we
         }
         leg.around = i_select(left, medium, leg.around);
         Int behind = medium;
-        Mask passed = leg_pass(t, &hit, ray.d, found & ~collides, &ray.o, &behind), met = found & ~collides & ~passed;
+        Mask passes = found & ~collides & m_set(i < def.most), passed = leg_pass(t, &hit, ray.d, passes, &ray.o, &behind);
+        Mask met = found & ~collides & ~passed;
         medium = i_select(begun, behind, medium);
         from = v3_select(passed & begun, hit.p, from);
         leg.near = hit_select(met, &hit, &leg.near);
@@ -76,8 +99,12 @@ static NOINLINE Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec we
     return leg;
 }
 
+KFN Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
+    return leg_follow(t, (LegDef){.most = MOST_SURFACES_IN_A_ROW}, ray, from, medium, weight, key, m);
+}
+
 // What trace_stage and flight_stage do, for such ways of paths.
-static void legs_stage(Tracer *t, int32_t bounce) {
+static void legs_stage(Tracer *t, LegDef def, int32_t bounce) {
     Paths *p = &t->ws.paths[t->current];
     for (int32_t k = 0; k < t->active; k += LANES) {
         Mask m = m_first_n(t->active - k);
@@ -86,10 +113,10 @@ static void legs_stage(Tracer *t, int32_t bounce) {
         Int medium = i_select(m, i_load(p->medium + k), i_set(-1));
         SampleKey key = stream_key(t, i_select(m, i_load(p->slot + k), i_set(0)), bounce, STREAM_FLIGHT);
         m = m & m_gt(ray.tmax, f_set(0)); // some rays end at once
-        Leg leg = leg_trace(t, ray, from, medium, spec_load(p->beta, k), &key, m);
+        Leg leg = leg_follow(t, def, ray, from, medium, spec_load(p->beta, k), &key, m);
         leg.near.shape = i_select(leg.m, leg.near.shape, i_set(-1));
         hit_store(t, k, &leg.near);
-        if (t->rungs) {
+        if (def.emission) {
             slot_add(t, i_select(m, i_load(p->slot + k), i_set(0)), leg.emission, m & m_finite(spec_sum(leg.emission)));
         }
         Mask collides = leg.m & mi_lt(i_set(-1), leg.air);

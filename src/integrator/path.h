@@ -317,6 +317,16 @@ static void fork_air(Tracer *t) {
     }
 }
 
+// Whether paths pass surfaces of the kind null without a stage of their own. Those behind which lights hide from the sensor, and
+// those that a picture's alpha shows, are looked at one by one.
+static bool path_takes_legs(const Tracer *t) {
+    const SceneView *scene = t->scene;
+    return scene->has_media && scene->open_apart && !t->derivative && !t->fork && !scene->hide_emitters && !scene->solid;
+}
+
+// Of those as many as a packet's lanes usually meet in a row.
+enum { PASSED_AT_ONCE = 2 };
+
 // Runs the chunk's paths to their ends. begin: scratch of the number of groups and media, and 2 entries.
 static void path_forward(Tracer *t, int32_t *begin) {
     const SceneView *scene = t->scene;
@@ -329,15 +339,17 @@ static void path_forward(Tracer *t, int32_t *begin) {
         if (scene->max_depth >= 0 && bounce >= scene->max_depth && (!scene->through || scene->max_depth == 0)) {
             return;
         }
-        const bool legs = scene->has_media && t->rungs; // the number of vertices counts
-        const bool there = t->placed && bounce == t->first_bounce;
-        if (legs && !there) {
-            legs_stage(t, bounce);
+        const bool counts = scene->has_media && t->rungs; // the number of vertices
+        const bool there = t->placed && bounce == t->first_bounce; // those that count have flown there, too
+        const bool legs = !there && (counts || path_takes_legs(t));
+        if (legs) {
+            const int32_t most = counts ? MOST_SURFACES_IN_A_ROW : PASSED_AT_ONCE;
+            legs_stage(t, (LegDef){.most = most, .emission = true, .coherent = bounce == 0}, bounce);
         } else if (!there) {
             trace_stage(t, bounce);
         }
         if (scene->has_media) {
-            if (!legs) {
+            if (!legs && !counts) {
                 flight_stage(t, begin, bounce);
             }
             if (t->fork && bounce == t->first_bounce) {

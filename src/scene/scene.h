@@ -214,12 +214,13 @@ typedef struct Group {
     int32_t interior, exterior;
 } Group;
 
-enum { MOST_OWN_SPHERES = 32, MOST_OPEN_TRIANGLES = 36, MOST_BEACONS = 8 };
+enum { MOST_OWN_SPHERES = 32, MOST_OPEN_TRIANGLES = 36, MOST_OPEN_CORNERS = 3 * MOST_OPEN_TRIANGLES, MOST_BEACONS = 8 };
 
-// A triangle of a surface that lets light pass, in the world.
+// A triangle of a surface that lets light pass: the number of its first corner; from each corner to the next, twice the number of
+// the edge that leads there, and one more where that leads back; twice its area times its normal in the world.
 typedef struct OpenTriangle {
-    float corner[3][3];
-    int32_t shape, prim;
+    int32_t shape, prim, corner, way[3];
+    float normal[3];
 } OpenTriangle;
 
 // What a kernel sees: the arrays, and uniform facts.
@@ -241,7 +242,9 @@ typedef struct SceneView {
     // Where shadow rays pass surfaces (through) and few of these stand in the scene: Embree knows them not (accel/triangles.h).
     bool open_apart;
     OpenTriangle open_triangles[MOST_OPEN_TRIANGLES];
-    int32_t open_triangles_count;
+    float open_corners[MOST_OPEN_CORNERS][3]; // in the world
+    int32_t open_edges[MOST_OPEN_CORNERS][2];
+    int32_t open_triangles_count, open_corners_count, open_edges_count;
     float open_low[3], open_high[3]; // what they lie in
     int32_t beacons_count;    // of the next: points of surfaces that part media, or within them
     float beacons[MOST_BEACONS][3];

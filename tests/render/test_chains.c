@@ -20,7 +20,7 @@ static const Step steps[] = {
     {"chains_lens.xml", "wall.to_world", {1, 0.4f, 0.5f}, {0}, 0, 0.01, 1},
     {"chains_lens.xml", "camera.to_world", {0.6f, 1, 0}, {0.2f, 0.1f, 0}, 0, 0.01, 1},
     {"chains_coat.xml", "floor.to_world", {0, 1, 0}, {0.2f, 0, 0.1f}, 0, 0.01, 2},
-    {"chains_coat.xml", "ceiling.to_world", {1, 0, 0.4f}, {0.01f, 0, 0}, 0, 0.01, 4},
+    {"chains_coat.xml", "ceiling.to_world", {1, 0, 0.4f}, {0.01f, 0, 0}, 0, 0.01, 6},
     {"chains_coat.xml", "camera.to_world", {0, 1, 0.5f}, {0}, 0, 0.01, 4},
     {"chains_bowl.xml", "glass.eta", {0}, {0}, 1, 0.01, 1},
     {"chains_bowl.xml", "bowl.to_world", {1, 0, 0.5f}, {0}, 0, 0.02, 3},

@@ -183,7 +183,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {
         if (!t->placed) {
             if (media) {
-                legs_stage(t, bounce);
+                legs_stage(t, (LegDef){.most = MOST_SURFACES_IN_A_ROW, .emission = t->rungs != NULL}, bounce);
             } else {
                 trace_stage(t, 1);
             }
