@@ -1,5 +1,6 @@
 // Scattering functions as scenes write them: what is refused and in which words, and which terms parameters ask for.
 #include "reynolds/reynolds.h"
+#include "scene/absent.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -127,8 +128,31 @@ static void test_terms(void **state) {
     rey_context_destroy(ctx);
 }
 
+// Where a texture has no transform of its coordinates, the way to make one a parameter is named; it changes nothing.
+static void test_to_uv(void **state) {
+    (void)state;
+    rey_context *ctx = NULL;
+    rey_scene *scene = NULL;
+    char text[ABSENT_BYTES];
+    static const char *const textures[] = {"<texture type='checkerboard' id='tiles'/>",
+                                           "<texture type='checkerboard' id='tiles'><transform name='to_uv'/></texture>"};
+    assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
+    for (int i = 0; i < 2; i++) {
+        char scene_text[512];
+        snprintf(scene_text, sizeof scene_text, "%s<bsdf type='diffuse'><ref name='reflectance' id='tiles'/></bsdf>", textures[i]);
+        assert_int_equal(load(ctx, scene_text, &scene), REY_OK);
+        assert_int_equal(rey_param_find(scene, "tiles.to_uv") >= 0, i);
+        if (i == 0) {
+            rey_param_absent(scene, "tiles.to_uv", text);
+            assert_non_null(strstr(text, "<transform name=\"to_uv\"/>"));
+        }
+        rey_scene_destroy(scene);
+    }
+    rey_context_destroy(ctx);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals), cmocka_unit_test(test_ranges),
-                                       cmocka_unit_test(test_terms)};
+                                       cmocka_unit_test(test_terms), cmocka_unit_test(test_to_uv)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -72,12 +72,19 @@ static const char *first_below(const rey_scene *scene, const char *object) {
     return NULL;
 }
 
+// Of a texture that is written without one, which would be the same as one that moves nothing.
+static const char *unwritten(const rey_scene *scene, const char *object, const char *leaf) {
+    bool texture = leaf && strcmp(leaf, "to_uv") == 0 && first_below(scene, object);
+    return texture ? "it is one where the texture has a transform of this name, such as <transform name=\"to_uv\"/>" : NULL;
+}
+
 void rey_param_absent(const rey_scene *scene, const char *name, char text[ABSENT_BYTES]) {
     char object[1024];
     const char *dot = strrchr(name, '.');
     snprintf(object, sizeof object, "%.*s", dot ? (int)(dot - name) : 0, name);
     const ShapeRecord *shape = dot ? shape_named(scene, object) : NULL;
     const char *why = shape ? reason(shape, dot + 1) : other_coefficients(scene, name);
+    why = why ? why : unwritten(scene, object, dot ? dot + 1 : NULL);
     const char *nearest = why ? NULL : rey_param_nearest(scene, name);
     const char *below = why || nearest ? NULL : first_below(scene, name);
     text[0] = 0;
