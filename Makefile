@@ -56,7 +56,7 @@ fuzz:
 	@sh scripts/setup.sh $(PACKAGES) clang libclang-rt-14-dev
 	@CC=clang cmake -S . -B build-fuzz -DREYNOLDS_FUZZ=ON -DREYNOLDS_SANITIZE=ON -DREYNOLDS_WIDEST=1 > /dev/null
 	@$(MAKE) --no-print-directory -C build-fuzz -j$(JOBS) fuzz
-	@sh scripts/fuzz.sh build-fuzz $(FUZZ_SECONDS) $(JOBS)
+	@ls build-fuzz/bin/fuzz_* | xargs -P $(JOBS) -I{} sh scripts/fuzz.sh {} $(FUZZ_SECONDS)
 
 # Sanitizers see in a quarter of the samples what they see in all, and at 8 lanes what they see at 16, which take minutes to build.
 sanitize: setup

@@ -139,12 +139,15 @@ static void test_to_uv(void **state) {
     assert_int_equal(rey_context_create(NULL, &ctx), REY_OK);
     for (int i = 0; i < 2; i++) {
         char scene_text[512];
-        snprintf(scene_text, sizeof scene_text, "%s<bsdf type='diffuse'><ref name='reflectance' id='tiles'/></bsdf>", textures[i]);
+        snprintf(scene_text, sizeof scene_text, "%s<bsdf type='diffuse' id='paint'><ref name='reflectance' id='tiles'/></bsdf>"
+                 "<bsdf type='diffuse' id='plain'/>", textures[i]);
         assert_int_equal(load(ctx, scene_text, &scene), REY_OK);
         assert_int_equal(rey_param_find(scene, "tiles.to_uv") >= 0, i);
         if (i == 0) {
             rey_param_absent(scene, "tiles.to_uv", text);
             assert_non_null(strstr(text, "<transform name=\"to_uv\"/>"));
+            rey_param_absent(scene, "plain.to_uv", text); // a function has none
+            assert_null(strstr(text, "<transform"));
         }
         rey_scene_destroy(scene);
     }

@@ -28,7 +28,7 @@ KFN Mask triangles_may_meet(const SceneView *scene, const Ray *ray, Float t, Mas
 
 // What rays see of the corners and edges of these triangles.
 typedef struct OpenView {
-    Vec3 corner[MOST_OPEN_CORNERS];        // from the ray's origin
+    Vec3 corner[MOST_OPEN_CORNERS];        // from o
     Float volume[2 * MOST_OPEN_CORNERS];   // that direction and edge span, by the way along the edge
 } OpenView;
 

@@ -72,9 +72,12 @@ static const char *first_below(const rey_scene *scene, const char *object) {
     return NULL;
 }
 
-// Of a texture that is written without one, which would be the same as one that moves nothing.
+// Of a bitmap or checkerboard that is written without one, which would be the same as one that moves nothing.
 static const char *unwritten(const rey_scene *scene, const char *object, const char *leaf) {
-    bool texture = leaf && strcmp(leaf, "to_uv") == 0 && first_below(scene, object);
+    const char *below = leaf && strcmp(leaf, "to_uv") == 0 ? first_below(scene, object) : NULL;
+    const char *rest = below ? below + strlen(object) + 1 : "";
+    int data = strcmp(rest, "data") == 0 ? rey_param_find(scene, below) : -1;
+    bool texture = strncmp(rest, "color0.", 7) == 0 || (data >= 0 && ARRAY_AT(scene->params, Param, data).texture >= 0);
     return texture ? "it is one where the texture has a transform of this name, such as <transform name=\"to_uv\"/>" : NULL;
 }
 
