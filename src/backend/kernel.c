@@ -1,6 +1,7 @@
 // kernel.c: all kernels of one SIMD width, compiled once per width. Runs one unit of work: the samples of a tile.
 #include "integrator/aov.h"
 #include "integrator/film.h"
+#include "integrator/lamps.h"
 #include "integrator/path_adj.h"
 #include "integrator/path_replay.h"
 #include "math/colour.h"
@@ -206,6 +207,7 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     t.local = plain && materials_stand(job);
     int64_t total = (int64_t)job->width * job->height * job->spp;
     t.most = t.ws.chunk;
+    lamps_find(&t);
     for (int64_t first = 0, count; first < total && (!job->go_on || job->go_on(job->user)); first += count) {
         count = total - first < t.most ? total - first : t.most;
         run_chunk(&t, &filter, first, (int32_t)count, begin);

@@ -4,6 +4,7 @@
 #include "integrator/boundary/primary.h"
 #include "integrator/boundary/rim_view.h"
 #include "integrator/boundary/facing_view.h"
+#include "integrator/lamps.h"
 
 // Behind the workspace proper: the groups' offsets, and which samples of a chunk are kept.
 size_t KNAME(rey_kernel_boundary_bytes)(void) {
@@ -125,6 +126,7 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     in.filter = &filter;
     in.glimpses = (in.upstream || b->kind == BOUNDARY_LINES || b->kind == BOUNDARY_RIM) && b->mirrored;
     in.sink = &sink;
+    lamps_find(&t);
     double unused = 0;
     PathJob still = b->job;
     still.texture_at = still.to_uv_at = still.normals_at = still.attribute_at = still.place_at = b->none;

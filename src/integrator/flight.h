@@ -58,7 +58,7 @@ KFN Flights flights_load(const Tracer *t, int32_t medium, const int32_t *order, 
 // Emission along flights that got to distances `flown`: the expectation of such a distance, at a uniform point of it, is the
 // integral of the transmittance, also where nothing collides. u: which point; key, dimension: as of the flights.
 // probe: where that is; weight: what emission counts there.
-static NOINLINE Spec emission_flown(const Track *track, Vec3 o, Vec3 d, Float flown, Spec shares, const SampleKey *key,
+static NOINLINE Spec emission_flown(const Track *track, Vec3 o, Vec3 d, Float flown, Float tmax, Spec shares, const SampleKey *key,
                                     uint32_t dimension, Float u, Mask m, Float *probe, Spec *weight) {
     const SceneView *scene = track->values;
     const VolumeNode *emission = scene->volumes + track->medium->emission;
@@ -66,7 +66,7 @@ static NOINLINE Spec emission_flown(const Track *track, Vec3 o, Vec3 d, Float fl
     medium_span(scene, track->medium, track->sigma_t, o, d, &low, &high);
     m = m & m_gt(high, low) & m_finite(high);
     *probe = f_select(m, f_lerp(low, high, u), f_set(0));
-    *weight = spec_zero_unless(m, spec_scale(track_weight(track, o, d, *probe, shares, m, key, dimension), high - low));
+    *weight = spec_zero_unless(m, spec_scale(track_weight(track, o, d, *probe, tmax, shares, m, key, dimension), high - low));
     Vec3 p = volume_to_local(scene, emission, v3_madd(o, *probe, d), 1);
     return spec_mul(volume_eval(scene, emission, p), *weight);
 }
@@ -74,7 +74,7 @@ static NOINLINE Spec emission_flown(const Track *track, Vec3 o, Vec3 d, Float fl
 static Spec flight_emission(const Tracer *t, Flights *f, int32_t bounce) {
     Track track = track_of(t, f->medium);
     SampleKey key = stream_key(t, f->slot, bounce, STREAM_EMISSION);
-    return emission_flown(&track, f->o, f->d, f->flight.t, f->shares, &f->key, 0, rng_1d(&key, 0), f->m, &f->probe,
+    return emission_flown(&track, f->o, f->d, f->flight.t, f->tmax, f->shares, &f->key, 0, rng_1d(&key, 0), f->m, &f->probe,
                           &f->probe_weight);
 }
 

@@ -114,7 +114,8 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
     if (m_any(a.probed)) {
         Track track = track_of(t, batch->group);
         SampleKey own = stream_key(t, a.f.slot, batch->bounce, STREAM_FLIGHT);
-        Spec weight = track_weight(&track, a.f.o, a.f.d, a.f.probe, channel_shares(t, a.f.beta), a.probed, &own, 0);
+        Float tmax = f_load(ws->records.sw + at);
+        Spec weight = track_weight(&track, a.f.o, a.f.d, a.f.probe, tmax, channel_shares(t, a.f.beta), a.probed, &own, 0);
         // The flight was chosen with the probability worth / total.
         Float one_over = real_gather(ws->probe_total, a.f.slot) * f_safe_rcp(real_gather(ws->probe_worth, a.f.slot));
         Spec share = spec_scale(probe_share(t, batch->group, &a.f, a.f.probe), one_over * (a.f.high - a.f.low));

@@ -58,8 +58,15 @@ KFN Int medium_passed(const Tracer *t, const Group *group, const Interaction *si
 
 KFN Track track_of(const Tracer *t, int32_t medium) {
     const MediumNode *node = t->scene->media + medium;
-    return (Track){t->deciding, t->scene, node, t->scene->volumes + node->sigma_t, t->job->moved != NULL, !t->job->moved,
-                   t->focus};
+    Track track = {t->deciding, t->scene, node, t->scene->volumes + node->sigma_t, t->job->moved != NULL, !t->job->moved,
+                   t->focus, t->focus != NULL};
+    for (int32_t i = t->lamp_count; i > 0 && !t->focus; i--) { // they are in the order of their media
+        if (t->lamp_medium[i - 1] == medium) {
+            track.focus = t->lamps + i - 1;
+            track.foci++;
+        }
+    }
+    return track;
 }
 
 // What a shadow ray needs to know of media.

@@ -77,7 +77,7 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
             Mask collided = mine & f.real;
             if (def.emission && t->scene->media[id].emission >= 0) {
                 Float u = rng_1d(key, MOST_SURFACES_IN_A_ROW * MOST_COLLISIONS + (uint32_t)i), probe;
-                Spec count, sent = emission_flown(&track, from, ray.d, f.t, shares, key, dimension, u, mine, &probe, &count);
+                Spec count, sent = emission_flown(&track, from, ray.d, f.t, far, shares, key, dimension, u, mine, &probe, &count);
                 leg.emission = spec_add(leg.emission, spec_zero_unless(mine, spec_mul(leg.weight, sent)));
             }
             leg.weight = spec_select(mine, spec_mul(leg.weight, f.weight), leg.weight);

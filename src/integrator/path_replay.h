@@ -70,9 +70,10 @@ static Leaving replay_flight(Tracer *t, const RecordBatch *batch, Int slot) {
     Flights f = {.medium = batch->group, .m = m_first_n(batch->count), .slot = slot};
     f.o = record_v3(r->px, r->py, r->pz, at);
     f.d = record_v3(r->dx, r->dy, r->dz, at);
+    f.tmax = f_load(r->sw + at);
     f.shares = channel_shares(t, spec_load(r->beta, at));
     f.key = stream_key(t, slot, batch->bounce, STREAM_FLIGHT);
-    f.flight = track_flight(&track, f.o, f.d, f_load(r->sw + at), f.shares, f.m, &f.key, 0);
+    f.flight = track_flight(&track, f.o, f.d, f.tmax, f.shares, f.m, &f.key, 0);
     Leaving v = {spec_zero(), f.flight.weight};
     if (t->scene->media[batch->group].emission >= 0) {
         v.local = flight_emission(t, &f, batch->bounce);

@@ -11,6 +11,7 @@
 
 // Tentative collisions of one walk; what is left is taken to be blocked.
 enum { MOST_COLLISIONS = 1 << 16 };
+enum { MOST_FOCI = 4 };
 
 // Who is tracked through: `scene` decides where collisions happen, and `values` says what extinctions are there. They are the
 // same, but for pictures of one scene along the paths of another one; those are `padded`: there collisions happen where the
@@ -21,7 +22,8 @@ typedef struct Track {
     const VolumeNode *sigma_t;
     bool padded;
     bool roulette; // walks whose transmittance is small end by chance, and those that go on count more
-    const Vec3 *focus; // half of the collisions in homogeneous media are looked for near this point of the world; or null
+    const Vec3 *focus; // half of the collisions in homogeneous media are looked for near these points of the world; or null
+    int32_t foci;
 } Track;
 
 // Transmittances below this play roulette.
@@ -190,22 +192,68 @@ KFN Float focus_density(const Focus *f, Float t) {
     return f->across * f_safe_rcp(f->angle * (f->across * f->across + beside * beside));
 }
 
-// As uniform_flight; half as many collisions as there are anyway are looked for near the focus, and weighed by both densities.
+// The points of a track as a ray sees them, one as likely as another.
+typedef struct Foci {
+    Focus each[MOST_FOCI];
+    int32_t count;
+} Foci;
+
+static NOINLINE Foci foci_look(const Track *track, Vec3 o, Vec3 d, Float tmax) {
+    Foci f = {.count = track->foci};
+    for (int32_t i = 0; i < f.count; i++) {
+        f.each[i] = focus_look(track->focus[i], o, d, tmax);
+    }
+    return f;
+}
+
+KFN Float foci_distance(const Foci *f, Float u) {
+    Float part = u * (real)f->count, distance = focus_distance(&f->each[0], f->count > 1 ? part : u);
+    for (int32_t i = 1; i < f->count; i++) {
+        Float rest = part - (real)i;
+        distance = f_select(m_ge(rest, f_set(0)), focus_distance(&f->each[i], rest), distance);
+    }
+    return f_max(distance, f_set(0));
+}
+
+KFN Float foci_density(const Foci *f, Float t) {
+    Float density = focus_density(&f->each[0], t);
+    for (int32_t i = 1; i < f->count; i++) {
+        density = density + focus_density(&f->each[i], t);
+    }
+    return density * ((real)1 / (real)f->count);
+}
+
+// Probability of distances beyond t.
+KFN Float foci_beyond(const Foci *f, Float t) {
+    Float beyond = f_set(0);
+    for (int32_t i = 0; i < f->count; i++) {
+        const Focus *one = &f->each[i];
+        beyond = beyond + 1.0f - (f_atan2(t - one->along, one->across) - one->first) * f_safe_rcp(one->angle);
+    }
+    return f_max(beyond, f_set(0)) * ((real)1 / (real)f->count);
+}
+
+// The share of flights that look for collisions near the foci: half of those that collide anyway.
+KFN Float foci_share(Spec sigma, Spec importance, Float tmax) {
+    return 0.5f - 0.5f * spec_dot(importance, uniform_transmittance(sigma, tmax));
+}
+
+// As uniform_flight; such flights are weighed by both densities.
 static NOINLINE Flight focused_flight(const Track *track, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m,
                                       const SampleKey *key, uint32_t dimension) {
     Vec2 u = rng_2d(key, dimension);
     Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
     Float chosen = uniform_choice(sigma, importance, u.y);
-    Focus focus = focus_look(*track->focus, o, d, tmax);
-    Float share = 0.5f - 0.5f * spec_dot(importance, uniform_transmittance(sigma, tmax)), rest = 1.0f - share;
+    Foci foci = foci_look(track, o, d, tmax);
+    Float share = foci_share(sigma, importance, tmax), rest = 1.0f - share;
     Mask near = m_lt(u.x, share);
     Float t = uniform_distance((u.x - share) * f_safe_rcp(rest), chosen);
     Flight flight;
     flight.real = m & (near | (m_gt(chosen, f_set(0)) & m_lt(t, tmax)));
-    t = f_select(near, f_max(focus_distance(&focus, u.x * f_safe_rcp(share)), f_set(0)), t);
+    t = f_select(near, foci_distance(&foci, u.x * f_safe_rcp(share)), t);
     flight.t = f_select(flight.real, f_min(t, tmax), tmax);
     Spec passed = uniform_transmittance(sigma, flight.t);
-    Float collided = rest * spec_dot(importance, spec_mul(sigma, passed)) + share * focus_density(&focus, flight.t);
+    Float collided = rest * spec_dot(importance, spec_mul(sigma, passed)) + share * foci_density(&foci, flight.t);
     Float density = f_select(flight.real, collided, rest * spec_dot(importance, passed));
     passed = uniform_transmittance(value, flight.t);
     flight.weight = spec_scale(spec_select(flight.real, spec_mul(value, passed), passed), f_safe_rcp(density));
@@ -241,7 +289,7 @@ static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, M
 static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                     uint32_t dimension) {
     if (track_is_uniform(t)) {
-        return t->focus ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
+        return t->foci > 0 ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
                         : uniform_flight(t, d, tmax, importance, m, key, dimension);
     }
     SampleKey random = *key;
@@ -275,13 +323,18 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
     return flight;
 }
 
-// What a flight that gets as far as `far` weighs there. It is the same flight: its random numbers are those of track_flight.
-static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Spec importance, Mask m, const SampleKey *key,
-                                  uint32_t dimension) {
+// What a flight towards tmax that gets as far as `far` weighs there. It is the same flight: its random numbers are those of
+// track_flight.
+static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Float tmax, Spec importance, Mask m,
+                                  const SampleKey *key, uint32_t dimension) {
     if (track_is_uniform(t)) {
-        Spec density = uniform_transmittance(uniform_extinction(t->scene, t, d), far);
-        Spec passed = uniform_transmittance(uniform_extinction(t->values, t, d), far);
-        return spec_scale(passed, f_safe_rcp(spec_dot(importance, density)));
+        Spec sigma = uniform_extinction(t->scene, t, d), passed = uniform_transmittance(uniform_extinction(t->values, t, d), far);
+        Float density = spec_dot(importance, uniform_transmittance(sigma, far));
+        if (t->foci > 0) {
+            Foci foci = foci_look(t, o, d, tmax);
+            density = f_lerp(density, foci_beyond(&foci, far), foci_share(sigma, importance, tmax));
+        }
+        return spec_scale(passed, f_safe_rcp(density));
     }
     if (track_is_grey(t)) {
         return spec_set(f_set(1));

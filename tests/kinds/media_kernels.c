@@ -106,7 +106,7 @@ static void run_flakes(const MediaCase *c, int n, MediaFlakes *q, double *gradie
 // Where the extinction is the largest share of its bound, along the rays of the first lanes.
 static void follow_bounds(const View *view, const MediaCase *c, Vec3 o, Vec3 d, Float tmax, Mask m, MediaRay *r) {
     enum { STOPS = 400 };
-    Track track = {&view->scene, &view->scene, &c->medium, &c->sigma_t, false, true, NULL};
+    Track track = {&view->scene, &view->scene, &c->medium, &c->sigma_t, false, true, NULL, 0};
     MajorantWalk w = track_start(&track, o, d, tmax, m);
     Float bound = f_set(1), sigma = f_set(0);
     Mask left = w.m;
@@ -143,7 +143,7 @@ static void run_track(const MediaCase *c, int n, MediaRay *r) {
         if (first == 0 && c->medium.bounded) {
             follow_bounds(&view, c, o, d, tmax, m, r);
         }
-        Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false, true, NULL};
+        Track track = {&view.scene, &view.scene, &c->medium, &c->sigma_t, false, true, NULL, 0};
         Spec transmittance = track_transmittance(&track, o, d, tmax, m, &key, 0);
         Spec even = spec_set(f_set((real)1 / SPEC_N));
         Flight flight = track_flight(&track, o, d, tmax, even, m, &key, 1u << 20);

@@ -219,6 +219,8 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     Segments *q = &in->q;
     // Collisions near the camera count one over the square of their distance.
     const Vec3 *focus = in->pinhole->parallel ? NULL : &in->pinhole->origin;
+    const int32_t lamps = t->lamp_count; // which paths from the far sides look for
+    t->lamp_count = 0;
     t->focus = t->job->rides && !boundary_is_chained(in->b->kind) ? NULL : focus; // their near points are surfaces'
     if (in->b->kind == BOUNDARY_INDIRECT) {
         segments_find(t, in->b, first, count, q);
@@ -235,6 +237,7 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     } else {
         turnings_find(t, in->b, first, count, q);
     }
+    t->lamp_count = lamps;
     if (q->count == 0) {
         return;
     }
@@ -248,8 +251,10 @@ static void indirect_chunk(Indirect *in, int64_t first, int32_t count, Sink *sin
     t->focus = NULL;
     far_paths(in, begin);
     t->focus = focus;
+    t->lamp_count = 0;
     near_particles(in, begin, sink);
     t->focus = NULL;
+    t->lamp_count = lamps;
     for (int32_t k = 0; k < q->count && in->b->job.mode == MODE_REVERSE; k += LANES) {
         moves_adj(in, k, sink);
     }
