@@ -66,7 +66,9 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
         if (t->job->rides) {
             Connection to = {s->hit.p, s->light_d, s->light_distance, s->light, s->light_prim, s->connected};
             glide_add(g, s->hit.p, connection_end_adj(t, &to, &move, at, light_slope, true, sink), s->connected);
-            move.uv = (Vec2){f_set(0), f_set(0)};
+            // Those of surfaces have been used; of lights at a point they say in which direction the light leaves.
+            Mask points = mi_lt(EMITTER_FIELD(scene, i_select(s->connected, s->light, i_set(0)), shape), i_set(0));
+            move.uv = (Vec2){f_zero_unless(points, move.uv.x), f_zero_unless(points, move.uv.y)};
         }
     }
     sink->point = g ? &slope : NULL;
