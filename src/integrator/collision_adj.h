@@ -1,6 +1,7 @@
 // collision_adj.h: the adjoint of vertices in media. What leaves a collision is
 //   albedo (sum_lights p Le T w_l + p w_s L_next),
-// p the phase function; the extinction is in the flight's weight.
+// p the phase function; the extinction is in the flight's weight. Where surfaces move, it rides (ride.h) or stands still in part
+// (beacon.h).
 #pragma once
 
 #include "integrator/walk_adj.h"
@@ -17,7 +18,27 @@ typedef struct CollisionSweep {
     Vec3 light_d, wo;
     Hit hit;
     Collision at;
+    BeaconShare still;                   // of the light sample
+    Float before;                        // distance to the vertex before it
+    Spec extinction;                     // where that counts: of lanes that stand still in part
+    Mask ahead;                          // lanes whose next vertex does; and what that leaves
+    Spec attached;
 } CollisionSweep;
+
+// What of the light sample stands still, and of what was found onwards (beacon.h).
+static NOINLINE void collision_still(Tracer *t, const RecordBatch *batch, Int slot, CollisionSweep *s) {
+    const Records *r = &t->ws.records;
+    s->ahead = s->scattered & mi_eq(i_gather(t->ws.next, slot), i_set(NEXT_STILL));
+    s->attached = spec_zero_unless(s->ahead, spec_scale(spec_gather(t->ws.attached, slot), f_load(r->sw + batch->first)));
+    s->before = f_load(r->u + batch->first);
+    Mask m = s->connected & ~records_first(t, batch, s->m) & m_set(medium_is_even(t->scene, batch->group));
+    Float radius = beacon_radius(t, s->light, m);
+    s->still = beacon_share(radius, s->light_distance, s->before, m & m_gt(radius, f_set(0)));
+    if (m_any(m_gt(s->still.chi, f_set(0)))) {
+        Track track = track_of(t, batch->group);
+        s->extinction = medium_extinction(t->scene, &track, s->hit.p, v3_neg(s->at.wi));
+    }
+}
 
 static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Passage *p) {
     const Records *r = &t->ws.records;
@@ -43,7 +64,38 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     s.light_value = p->light_value;
     s.transmittance = p->transmittance;
     s.lit = spec_mul(s.light_value, spec_mul(s.unshadowed, s.transmittance));
+    if (t->job->rides && t->job->beacons) {
+        collision_still(t, batch, slot, &s);
+    }
     return s;
+}
+
+// What the light sample's contribution asks of the positions of the collision and of the vertex before it where a part of it stands
+// still, beside what that would ask of a collision that rides, which is left with its share in *ride. dwi: the adjoint of the
+// direction back. As the still part's segment r = s w changes, its solid angle, transmittance and the values at its ends do
+// (path_move.h), and so does chi with either distance.
+static Vec3 still_adj(const CollisionSweep *s, Spec lit, Vec3 dwi, Vec3 *ride) {
+    const BeaconShare *still = &s->still;
+    Mask m = s->connected & m_gt(still->chi, f_set(0));
+    Vec3 w = v3_neg(s->at.wi);
+    Spec worth = spec_scale(spec_mul(lit, s->at.albedo), s->light_phase);
+    Float c = spec_dot(worth, spec_set(f_set(1))), rcp = f_safe_rcp(s->before);
+    Float along = still->chi * (2.0f * c * rcp + spec_dot(worth, s->extinction)) - c * still->by_vertex;
+    Vec3 across = v3_madd(dwi, -v3_dot(w, dwi), w);
+    *ride = v3_select(m, v3_scale(*ride, 1.0f - still->chi), *ride);
+    Vec3 d = v3_madd(v3_scale(w, along), still->chi * rcp, across);
+    return v3_select(m, v3_madd(d, c * still->by_light, s->light_d), v3_zero());
+}
+
+// What the part of the radiance onwards that stands still asks of the collision's position.
+static Vec3 still_onward_adj(const Tracer *t, const CollisionSweep *s, Spec delta, Int slot, int channel, const Sink *sink) {
+    Sink quiet = *sink; // parameters have had their share
+    quiet.texture_at = t->job->none;
+    quiet.point = NULL;
+    Vec3 dwi = v3_zero(), dwo = v3_zero();
+    Spec onward = spec_mul(spec_mul(delta, s->beta), s->attached);
+    phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), &quiet, s->ahead, &dwi, &dwo);
+    return still_move_adj(t, slot, channel, s->hit.p, s->wo, dwo, s->ahead);
 }
 
 // g: the ray that the collision ended; null unless it glides.
@@ -75,6 +127,10 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
     if (moves && m_any(s->connected)) {
         phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
         lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
+        if (t->job->rides && t->job->beacons) {
+            Vec3 still = still_adj(s, lit, dwi, &move.ref);
+            glide_add(g, s->hit.p, still, s->connected);
+        }
     }
     if (live & LIVE_ALBEDO) {
         const VolumeNode *albedo = scene->volumes + s->at.medium->albedo;
@@ -124,7 +180,10 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
             dt = spec_scale(dt, s.light_phase);
             Connection to = {s.hit.p, s.light_d, s.light_distance, s.light, s.light_prim, s.connected};
             Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, &to, true, sink);
-            g.position = v3_add(g.position, dp);
+            g.position = v3_madd(g.position, 1.0f - s.still.chi, dp);
+        }
+        if (m_any(s.ahead)) {
+            v3_acc(&g.position, still_onward_adj(t, &s, delta, slot, c, sink));
         }
         if (t->job->rides) {
             const Carried first = {g.position, g.turn};
@@ -132,11 +191,16 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         }
         forward_flush(t, sink, slot, c, s.m);
         if (glides) {
+            g.turn = v3_select(m_gt(s.still.chi, f_set(0)), v3_zero(), g.turn); // is in what it asks for already
             glide_store(t, &g, c, slot, finite);
+        }
+        if (t->job->rides && t->job->beacons) {
+            rows_scatter(&t->ws.pull, c, slot, v3_zero(), s.m);
         }
     }
     if (t->job->rides) {
-        ride_collision(t, slot, s.hit.p, s.m);
+        Spec lit = spec_mul(spec_scale(s.lit, s.light_phase * s.still.chi), s.at.albedo);
+        ride_collision(t, slot, s.hit.p, spec_zero_unless(s.connected, lit), s.m);
     } else if (glides) {
         glide_refer(t, slot, s.hit.p, finite);
     }

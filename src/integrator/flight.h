@@ -280,6 +280,7 @@ static int32_t collision_batch(Tracer *t, int32_t medium, const int32_t *order, 
             return next_count;
         }
         record_vertex(t, record, &v, f_set(0), spec_zero());
+        f_store(t->ws.records.u + record, v3_length(v3_sub(v.hit.p, v.origin))); // the vertex before it (beacon.h)
     }
     if (keeps_coverage(t)) {
         cover(t, v.slot, v.m);

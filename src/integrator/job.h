@@ -21,6 +21,12 @@ static inline bool mode_records(int32_t mode) {
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
 enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8, LIVE_BORDER = 16 };
 
+// A ball around a light at a point (beacon.h).
+typedef struct Beacon {
+    float x, y, z, radius;
+    int32_t light;
+} Beacon;
+
 typedef struct PathJob {
     const SceneView *scene;
     const SceneView *moved;       // MODE_REPLAY, MODE_REVERSE: the scene with other parameters, along the paths of `scene`; or null
@@ -51,6 +57,9 @@ typedef struct PathJob {
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
     bool rides;                   // surfaces move in media, and collisions with them (ride.h)
+    const Beacon *beacons;        // null: lights at a point within media are not known beside what moves
+    int32_t beacon_count;
+    const int32_t *beacon_of;     // by emitter: its beacon, -1 = none
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none

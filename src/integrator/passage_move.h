@@ -6,14 +6,16 @@
 // NOT differentiated: jumps between nearest voxels, and surfaces that dim what passes them, under rays that turn.
 #pragma once
 
+#include "integrator/beacon.h"
 #include "integrator/flight_adj.h"
 
-// Adjoint of a shadow ray's direction and length; from: where its vertex lies; points: lanes whose light lies at a point and moves.
+// Adjoint of a shadow ray's direction and length; from: where its vertex lies; points: lanes whose light lies at a point and moves;
+// beacons: whose light has a beacon.
 typedef struct Turn {
     Vec3 from, d;
     Vec3 shift;    // of all points alike
     Float distance;
-    Mask points;
+    Mask points, beacons;
 } Turn;
 
 // Surfaces on the way of a walk: the medium in front of number i is that of its piece i, behind it of the next one.
@@ -87,8 +89,8 @@ static NOINLINE void passed_boxes_adj(const Tracer *t, const Walk *walk, int32_t
     }
 }
 
-// Notes lights at a point that lie within medium `id`, as it seems at the ends of rays along d. Some rays slip through the edges of
-// borders: a second one, from the light to the side, says whether it is so.
+// Notes lights at a point that lie within medium `id` and are not known there, as it seems at the ends of rays along d. Some rays
+// slip through the edges of borders: a second one, from the light to the side, says whether it is so.
 static NOINLINE void watch_light(const Tracer *t, Vec3 end, int32_t id, Vec3 d, Mask seems, Sink *sink) {
     if (!m_any(seems) || (sink->faces & LIGHT_WITHIN)) {
         return;
@@ -112,7 +114,8 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
                 Vec3 end = v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d);
                 Filling f = medium_filling(t, id, end, walk->d);
                 turn->distance = turn->distance - f_zero_unless(ends, spec_dot(dt, f.extinction));
-                watch_light(t, end, id, walk->d, ends & turn->points & m_gt(spec_max(f.extinction), f_set(0)), sink);
+                Mask unknown = medium_is_even(scene, id) ? turn->points & ~turn->beacons : turn->points;
+                watch_light(t, end, id, walk->d, ends & unknown & m_gt(spec_max(f.extinction), f_set(0)), sink);
             }
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);

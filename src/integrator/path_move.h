@@ -180,6 +180,18 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
     return dp;
 }
 
+// The segment along w to a collision that stands still in part (beacon.h), of the lanes of m: returns the adjoint of where it
+// begins by its direction there, whose adjoint is dw, and by points of the way, which move with that end. What else it asks for,
+// collisions know.
+static NOINLINE Vec3 still_move_adj(const Tracer *t, Int slot, int channel, Vec3 from, Vec3 w, Vec3 dw, Mask m) {
+    const Workspace *ws = &t->ws;
+    Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, slot);
+    Float rcp = f_safe_rcp(v3_length(v3_sub(q, from)));
+    Vec3 pull = rows_gather(&ws->pull, channel, slot), turn = rows_gather(&ws->turn, channel, slot);
+    Vec3 dr = v3_madd(pull, rcp, v3_add(turn, dw));
+    return v3_select(m, v3_neg(v3_madd(dr, -v3_dot(w, dr), w)), v3_zero());
+}
+
 // The segment to the next vertex, which the sweep has just left: returns the adjoint of this vertex's position.
 static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const VertexAdj *v, int channel, Sink *sink) {
     const Workspace *ws = &t->ws;
@@ -188,6 +200,10 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     Mask spread = s->scattered & lobe_spreads(s->lobe), attached = spread & mi_lt(i_set(-1), next);
     // A chain that begins here, or a ray to a collision, moves with this vertex, in its fixed direction.
     Vec3 drag = v3_select(spread, rows_gather(&ws->drag, channel, s->slot), v3_zero());
+    Mask still = spread & mi_eq(next, i_set(NEXT_STILL));
+    if (m_any(still)) {
+        v3_acc(&drag, still_move_adj(t, s->slot, channel, s->si.p, s->wo_d, v->wo, still));
+    }
     if (!m_any(attached)) {
         return drag;
     }

@@ -48,10 +48,12 @@ static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, co
     return v3_select(attached, v3_neg(dr), v3_zero());
 }
 
-// A collision has no point of a surface to which the vertex before it could be attached: it rides with that one.
-KFN void ride_collision(Tracer *t, Int slot, Vec3 p, Mask m) {
+// A collision has no point of a surface to which the vertex before it could be attached: it rides with that one. But for the part
+// `still` of what leaves it (beacon.h).
+KFN void ride_collision(Tracer *t, Int slot, Vec3 p, Spec still, Mask m) {
     next_point(t, slot, p, m);
-    spec_scatter(t->ws.attached, slot, spec_zero(), m);
+    i_scatter(t->ws.next, slot, i_set(NEXT_STILL), m & m_gt(spec_max(still), f_set(0)));
+    spec_scatter(t->ws.attached, slot, spec_zero_unless(m, still), m);
 }
 
 // What leaves the end of a flight reaches its beginning with the flight's weight.

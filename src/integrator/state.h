@@ -75,8 +75,9 @@ typedef struct ChannelRows {
     real *x[SPEC_N], *y[SPEC_N], *z[SPEC_N];
 } ChannelRows;
 
-// What stands for the record of the next vertex where rays meet no surface: nothing, or a point of the ray, such as a collision.
-enum { NEXT_NONE = -1, NEXT_POINT = -2 };
+// What stands for the record of the next vertex where rays meet no surface: nothing, a point of the ray, such as a collision, or a
+// collision a part of which stands still (beacon.h).
+enum { NEXT_NONE = -1, NEXT_POINT = -2, NEXT_STILL = -3 };
 
 typedef struct Workspace {
     Paths paths[2];

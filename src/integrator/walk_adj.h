@@ -141,7 +141,9 @@ KFN Mask points_that_move(const Tracer *t, Int light) {
 static Vec3 connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
                                    const Connection *c, bool slides, Sink *sink) {
     bool turns = lights_turn(t);
-    Turn turn = {c->from, v3_zero(), v3_zero(), f_set(0), turns ? c->m & points_that_move(t, c->light) : m_set(false)};
+    Mask points = turns ? c->m & points_that_move(t, c->light) : m_set(false);
+    Mask beacons = points & m_gt(beacon_radius(t, c->light, points), f_set(0));
+    Turn turn = {c->from, v3_zero(), v3_zero(), f_set(0), points, beacons};
     passage_adj(t, walk, transmittance, spec_zero_unless(c->m, dt), slot, bounce, turns ? &turn : NULL, sink);
     if (!turns || !m_any(c->m)) {
         return v3_zero();

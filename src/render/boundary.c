@@ -5,6 +5,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "emitter/table.h"
+#include "render/beacons.h"
 #include "render/blame.h"
 #include "render/boundary_edges.h"
 #include "render/corners.h"
@@ -364,6 +365,7 @@ rey_result rey_boundaries_begin(Render *r) {
     r->lines = rey_lines_selected(&r->scene->view, r->job.to_uv_at);
     bool moves = r->job.any_motion || r->job.any_places || r->lines;
     rey_result result = rey_check_clipped_media(r);
+    result = result == REY_OK ? rey_beacons_begin(r) : result;
     bool look_out = !moves && !r->def.terms && !rey_turning_known(&r->scene->view, r->plan.sensor); // paths do, instead
     if (look_out && !r->rims) {
         r->terms &= REY_TERM_INTERIOR | REY_TERM_TERMINATOR;

@@ -55,14 +55,13 @@ static bool phase_live(const SceneView *view, const PathJob *job, int32_t id) {
     return live;
 }
 
-// Whether a phase function differs from place to place.
-static bool phase_varies(const SceneView *view, int32_t id) {
+bool rey_phase_varies(const SceneView *view, int32_t id) {
     bool varies = false;
     for (int k = 0; id >= 0 && k < MAX_PHASE_SLOTS; k++) {
         varies |= rey_texture_holds(view, view->phases[id].slot[k], rey_is_volume);
     }
     for (int k = 0; id >= 0 && k < MAX_PHASE_CHILDREN; k++) {
-        varies |= phase_varies(view, view->phases[id].child[k]);
+        varies |= rey_phase_varies(view, view->phases[id].child[k]);
     }
     return varies;
 }
@@ -86,7 +85,7 @@ static int32_t medium_live(const SceneView *view, const PathJob *job, const Medi
         emission |= volume_varies(view, medium->emission);
         borders = true;
         // Mirrors and cameras show collisions from another side.
-        phase |= job->any_camera || rey_bsdfs_used(view, rey_bsdf_mirrors) || phase_varies(view, medium->phase);
+        phase |= job->any_camera || rey_bsdfs_used(view, rey_bsdf_mirrors) || rey_phase_varies(view, medium->phase);
     }
     return (extinction ? LIVE_EXTINCTION : 0) | (albedo ? LIVE_ALBEDO : 0) | (phase ? LIVE_PHASE : 0) |
            (emission ? LIVE_GLOW : 0) | (medium->bounded && borders ? LIVE_BORDER : 0);

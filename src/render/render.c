@@ -39,6 +39,8 @@ static void render_free(Render *r) {
     rey_free(ctx, r->columns);
     rey_free(ctx, r->rows);
     rey_free(ctx, r->offsets);
+    rey_free(ctx, r->beacons);
+    rey_free(ctx, r->beacon_of);
     rey_free(ctx, r->adjoint);
     rey_free(ctx, r->tangent);
     pthread_mutex_destroy(&r->lock);

@@ -364,8 +364,9 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
     if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
-                        "that move beside them, does not exist yet: points next to a light, from which its light is scattered, "
-                        "must move as it does");
+                        "that move beside them, does not exist yet here: points next to a light, from which its light is "
+                        "scattered, must move as it does. Known is what surfaces do that move beside lights that hang free in a "
+                        "homogeneous medium, where light, sensor and normals stand still (docs/media.md)");
     }
     int missing = r->stats.missing_terms & REY_TERM_TERMINATOR, bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {

@@ -295,6 +295,7 @@ static const Motion motions[] = {
     {"ride_phase.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.6f}, 0.04, 2},
     {"ride_phase.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 2},
     {"ride_hidden.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.03, 1},
+    {"ride_bulb.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.05, 6},
     {"ride_mirror.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.05, 1},
     {"ride_tank.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 2},
     {"ride_tank.xml", "tank.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.04, 1},

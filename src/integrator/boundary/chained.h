@@ -12,8 +12,8 @@
 #include "integrator/boundary/upstream.h"
 
 // What a segment says of its light in `lit`, beside "no" and "from a light": it meets surfaces on both sides of the edge, and
-// no segments to lights pass there.
-enum { SEGMENT_CREASE = 4 };
+// no segments to lights pass there; or its light is scattered beside a light at a point (beside.h).
+enum { SEGMENT_CREASE = 4, SEGMENT_BESIDE = 5 };
 
 // Distance of the two rays from the edge. Where surfaces pass through each other the rays to lights start a step above them, and
 // must start on their own side of the other one.
@@ -114,7 +114,8 @@ static void chained_start(Tracer *t, const Segments *q, int32_t half) {
         Int at = i_min(i_iota() + k, i_set(q->count - 1));
         Vec3 p = LOAD_V3(*q, edge_x, edge_y, edge_z, at), d = LOAD_V3(*q, dx, dy, dz, at);
         Vec3 n = v3_normalize(v3_neg(LOAD_V3(*q, nx, ny, nz, at)));
-        Mask m = m_first_n(q->count - k) & ~mi_eq(i_gather(q->lit, at), i_set(1));
+        Int lit = i_gather(q->lit, at);
+        Mask m = m_first_n(q->count - k) & ~(mi_eq(lit, i_set(1)) | mi_eq(lit, i_set(SEGMENT_BESIDE)));
         Vec3 met = LOAD_V3(*q, mx, my, mz, at);
         Float step = chained_step(p, m_gt(v3_dot(met, met), f_set(0)));
         for (int side = 0; side < 2; side++) { // first the side that n points to

@@ -140,6 +140,10 @@ KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
         chain = spec_sub(chain, far_chain(in, other, bounce));
     }
     Spec jump = spec_mul(l, spec_select(full, all, chain));
+    // Collisions beside lights are a segment more.
+    const int32_t depth = in->t->scene->max_depth;
+    Mask beside = mi_eq(kind, i_set(SEGMENT_BESIDE));
+    jump = spec_select(beside, spec_zero_unless(m_set(depth < 0 || depth > bounce + 2), l), jump);
     return spec_select(lit, spec_zero_unless(full, l), jump);
 }
 

@@ -8,7 +8,7 @@
 // chained.h, with the flights of media between the vertices.
 #pragma once
 
-#include "integrator/boundary/chained.h"
+#include "integrator/boundary/beside.h"
 
 // Segments that end on lights and whose near points are collisions or, where there are chains, pieces of these: no chain ends on a
 // light at a point or of one direction.
@@ -125,6 +125,11 @@ static void ridings_find(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
             break;
         }
         batch_numbers(t, i, first);
+        if (turn.beside) {
+            t->focus = NULL;
+            beside_find(t, b, i_iota() + i, turn.share, m_first_n(count - i), q);
+            continue;
+        }
         Segment s;
         if (turn.sighted) {
             Vec3 near = riding_sight(t, b, pinhole, i_iota() + i, turn.share, m_first_n(count - i), &s);

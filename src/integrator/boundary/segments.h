@@ -105,6 +105,7 @@ typedef struct Segment {
 typedef struct SegmentTurn {
     bool direct, indirect; // what there is
     bool lit, sighted;     // sighted: near points are chosen along rays of the sensor's (riding.h)
+    bool beside;           // they end beside lights at a point (beside.h)
     Float share;
 } SegmentTurn;
 
@@ -113,10 +114,12 @@ static SegmentTurn segment_turn(const Tracer *t, int32_t kind, int64_t number) {
     const int32_t shown = kind == BOUNDARY_RIDING ? 1 : 2; // collisions see what a light's own edge shows, too
     SegmentTurn r = {.direct = scene->emitters_count > 0, .indirect = scene->max_depth < 0 || scene->max_depth > shown};
     r.indirect = r.indirect && (!scene->has_media || t->job->rides); // else only lights move there
-    const int32_t ways = kind == BOUNDARY_RIDING && r.indirect ? 2 : r.indirect, all = r.direct + ways;
+    const int32_t riding = t->job->beacons ? 3 : 2, ways = kind == BOUNDARY_RIDING && r.indirect ? riding : r.indirect;
+    const int32_t all = r.direct + ways;
     const int32_t way = all > 0 ? (int32_t)(number / SEGMENT_BLOCK % all) : 0;
     r.lit = r.direct && way == 0;
-    r.sighted = ways == 2 && way == all - 1;
+    r.sighted = ways >= 2 && way == r.direct + 1;
+    r.beside = ways == 3 && way == r.direct + 2;
     r.share = f_set((real)all);
     return r;
 }
@@ -228,7 +231,7 @@ KFN void hit_compress(real *u, real *v, real *x, real *y, real *z, int32_t *shap
            i_load((q)->name##_instance + (k))})
 
 // Stores the segments of m that begin at near points and go on from o.
-static void segment_keep(const Segment *s, Vec3 o, const Hit *near, bool lit, Int number, Segments *q, Mask m) {
+static void segment_keep(const Segment *s, Vec3 o, const Hit *near, int32_t lit, Int number, Segments *q, Mask m) {
     Vec3 p = s->edge.p;
     Float behind = v3_length(v3_sub(near->p, p)), before = v3_length(v3_sub(s->far.p, p));
     Float along = f_select(s->attached | m_lt(s->distance, f_set(INFINITY)), behind * f_safe_rcp(behind + before), f_set(0));

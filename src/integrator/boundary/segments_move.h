@@ -127,10 +127,12 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
         return (Carried){v3_zero(), v3_zero()};
     }
     Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
+    Mask beside = mi_eq(i_load(q->lit + k), i_set(SEGMENT_BESIDE)); // of which the near point alone counts
     if (!still) {
-        segments_ahead_adj(in, k, n, worth, sink, m);
+        segments_ahead_adj(in, k, n, worth, sink, m & ~beside);
     }
-    return (Carried){v3_scale(n, (f_load(q->along + k) - 1.0f) * worth), v3_zero()};
+    Float drag = f_select(beside, f_set(1), f_load(q->along + k) - 1.0f);
+    return (Carried){v3_scale(n, drag * worth), v3_zero()};
 }
 
 KFN void carried_store(const Segments *q, int32_t k, const Carried *c) {
@@ -153,6 +155,7 @@ static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
             c = ways_begin_adj(in, k, f_set(1), false, sink, m);
             rate = sink_taken(sink);
         } else {
+            beside_rest(in->t, q, bounce - 1, k, &c, m);
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, sink, m);
             rate = rate + sink_taken(sink);
         }
@@ -183,6 +186,7 @@ static void ways_carry(Indirect *in, int32_t bounce) {
             c = ways_begin_adj(in, k, f_set(1), true, &still, m);
         } else {
             c = (Carried){record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
+            beside_rest(in->t, q, bounce - 1, k, &c, m);
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, &still, m);
         }
         upstream_ride_adj(in->t, q, bounce, k, &c, &still, m);
@@ -219,6 +223,7 @@ static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
         }
         Float share = worth[j + 1] / some;
         c = (Carried){v3_scale(c.drag, share), v3_scale(c.turn, share)};
+        beside_rest(in->t, q, j, k, &c, m);
         upstream_turn_adj(in->t, q, j, k, &c, sink, m);
     }
 }

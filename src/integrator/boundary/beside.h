@@ -1,0 +1,107 @@
+// beside.h: what edges hide of collisions beside lights at a point. From a vertex y past an edge e such a collision x is seen as a
+// point that stands still, with the share chi of the light that it scatters (beacon.h): the edge leaves the line of the two by
+//   n . (e' - (1 - a) y'),   a = |e - y| / |x - y|.
+// riding.h knows n . (e' - y') of all that is scattered, so that n . y' times a chi of this light is missing: these are segments
+// that end there, of which nothing moves but the vertices they come from.
+#pragma once
+
+#include "integrator/beacon.h"
+#include "integrator/boundary/chained.h"
+
+// What points x of the balls scatter along -d of their lights' light, per unit of volume. away: any direction.
+static NOINLINE Spec beside_light(Tracer *t, Int light, Vec3 x, Vec3 away, Vec3 d, Int number, Mask m) {
+    const SceneView *scene = t->scene;
+    Spec arriving, worth = spec_zero();
+    LightSample l = lights_sample(scene, light, m, x, (Vec2){f_set(0.5f), f_set(0.5f)}, &arriving);
+    Int medium = medium_around(t, x, away, m);
+    Mask blocked;
+    Fog fog = {medium, stream_key(t, number, 0, STREAM_FLIGHT), false};
+    Ray ray;
+    collision_shadow_ray(x, l.d, l.distance, &ray);
+    m = m & l.valid;
+    arriving = spec_mul(arriving, walk_transmittance(t, ray, m, &fog, &blocked, NULL));
+    for (Mask left = m & mi_lt(i_set(-1), medium), mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(medium, m_first(left));
+        mine = left & mi_eq(medium, i_set(id));
+        if (!medium_is_even(scene, id)) {
+            continue;
+        }
+        Hit hit = {i_set(0), i_set(0), f_set(0), f_set(0), x, i_set(0)};
+        Collision c = collision_look(t, id, &hit, d);
+        Track track = track_of(t, id);
+        Spec scattered = spec_scale(spec_mul(c.albedo, medium_extinction(scene, &track, x, d)), phase_eval(&c.call, c.wi, l.d));
+        worth = spec_select(mine, spec_mul(scattered, arriving), worth);
+    }
+    return worth;
+}
+
+// A point of a ball, at a distance from its light that is uniform, as the edge sees it. Returns the distance.
+static Float beside_sample(Tracer *t, const BoundaryJob *b, Int slot, Float share, Mask m, Segment *s, Float *radius) {
+    const PathJob *job = t->job;
+    SampleKey key = slot_key(t, slot);
+    Vec2 u = rng_2d(&key, DIMENSION_EDGE_SEGMENT);
+    Float choice = rng_1d(&key, DIMENSION_SEGMENT_LIGHT) * (real)job->beacon_count;
+    Int which = i_min(i_from_f(choice), i_set(job->beacon_count - 1));
+    Float part = choice - f_from_i(which);
+    Int row = which * (int32_t)(sizeof(Beacon) / sizeof(float));
+    Vec3 centre = v3(f_gather(&job->beacons->x, row), f_gather(&job->beacons->y, row), f_gather(&job->beacons->z, row));
+    *radius = f_gather(&job->beacons->radius, row);
+    Vec3 away = warp_uniform_sphere(rng_2d(&key, DIMENSION_SEGMENT_END));
+    Vec3 x = v3_madd(centre, f_max(part, f_set(1e-6f)) * *radius, away);
+    Float r = v3_length(v3_sub(x, centre)); // after rounding
+    s->edge = edge_sample(t->scene, b, u, x, false);
+    Vec3 across = v3_sub(x, s->edge.p);
+    s->distance = v3_length(across);
+    s->d = v3_scale(across, f_safe_rcp(s->distance));
+    s->far = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), x, i_set(0)};
+    s->source = i_set(-1);
+    s->attached = m_set(false);
+    s->m = m;
+    segment_measure(t, b, true, share, s);
+    if (m_any(s->m)) {
+        Int light = i_gather(&job->beacons->light, row);
+        // Volume over its density, and solid angle from the edge over volume.
+        Float weight = 4 * PI * r * r * *radius * (real)job->beacon_count * f_safe_rcp(s->distance * s->distance);
+        s->light = spec_scale(beside_light(t, light, x, away, s->d, slot, s->m), weight);
+        s->m = s->m & m_gt(spec_max(s->light), f_set(0));
+    }
+    return r;
+}
+
+static void beside_find(Tracer *t, const BoundaryJob *b, Int number, Float share, Mask m, Segments *q) {
+    Segment s;
+    Float radius, r = beside_sample(t, b, number, share, m, &s, &radius);
+    if (!m_any(s.m)) {
+        return;
+    }
+    Vec3 o = segment_stand(t, &s, segment_offset(&s));
+    Int around = medium_around(t, o, s.d, s.m);
+    m = segment_shine(t, &s, o, around, number, s.m);
+    if (!m_any(m)) {
+        return;
+    }
+    SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s.d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
+    Float behind = v3_length(v3_sub(leg.near.p, s.edge.p)), whole = behind + s.distance;
+    BeaconShare still = beacon_share(radius, r, whole, leg.m);
+    s.light = spec_scale(s.light, still.chi * behind * f_safe_rcp(whole));
+    m = leg.m & m_gt(spec_max(s.light), f_set(0));
+    segment_keep_leg(around, &leg, q, m);
+    i_compress(q->sighted + q->count, i_set(0), m);
+    segment_keep(&s, o, &leg.near, SEGMENT_BESIDE, number, q, m);
+}
+
+// Of segments that end on a light at a point and begin at a collision beside it, the part that stands still (beacon.h) does not
+// move with the vertex before that, the level behind the first: c is what the near point's motion is worth.
+KFN void beside_rest(const Tracer *t, const Segments *q, int32_t level, int32_t k, Carried *c, Mask m) {
+    if (!t->job->beacons || level > 0) {
+        return;
+    }
+    UpstreamVertex near = upstream_load(q, 0, k), before = upstream_load(q, 1, k);
+    Int light = i_load(q->source + k);
+    m = m & mi_eq(i_load(q->lit + k), i_set(1)) & mi_lt(i_set(-1), light) & mi_lt(near.hit.shape, i_set(0));
+    m = m & mi_lt(i_set(UPSTREAM_NONE), near.met) & mi_lt(i_set(UPSTREAM_NONE), before.met);
+    Float r = v3_length(v3_sub(record_v3(q->far_x, q->far_y, q->far_z, k), near.hit.p));
+    BeaconShare still = beacon_share(beacon_radius(t, light, m), r, v3_length(v3_sub(before.hit.p, near.hit.p)), m);
+    c->drag = v3_scale(c->drag, 1.0f - still.chi);
+}

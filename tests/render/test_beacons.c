@@ -1,0 +1,166 @@
+// Lights at a point within a medium, beside which surfaces move: what a floor shows of the fog around a torch, and how that changes
+// as the floor or a coin before it rises, against a quadrature over the fog.
+#include "rooms.h"
+
+enum { SEEDS = 8, SPP = 1024 };
+enum { ACROSS_R = 100, ACROSS_POLAR = 70, ACROSS_AZIMUTH = 48, POINTS = 4 };
+
+// beacon_floor.xml: heights, and the radius of the coin.
+typedef struct Place {
+    double floor, coin, radius;
+} Place;
+static const double light = 0.6, border = -0.3, eye = -0.8, half_view = 0.36397023426620234; // tan 20 degrees
+static const double beam = 25, cutoff = 75, g = 0.4, reach = 40, step = 0.01;
+static const double sigma[3] = {0.5, 0.7, 0.9}, albedo[3] = {0.9, 0.8, 0.7}, intensity[3] = {8, 9, 12};
+static const double reflectance[3] = {0.5, 0.6, 0.4}, pi = 3.14159265358979323846;
+static const Place shaded = {-1.5, -0.5, 0.22}, bare = {-1.5, -0.5, 0};
+
+// How far outside of the coin a point of the fog is seen from a point of the floor; polar: the angle from the light's axis.
+static double outside(const Place *at, double from, double r, double polar, double azimuth) {
+    double rise = light + r * cos(polar) - at->floor, k = (at->coin - at->floor) / rise;
+    double x = from + (r * sin(polar) * cos(azimuth) - from) * k, z = r * sin(polar) * sin(azimuth) * k;
+    return hypot(x, z) - at->radius;
+}
+
+// Adds what one cell of the fog brings to a point of the floor.
+static void add_cell(const Place *at, double from, double u, double polar, double azimuth, double out[3]) {
+    const double du = 0.5 / ACROSS_R, dp = 0.5 * cutoff / 180 * pi / ACROSS_POLAR, da = 0.5 * pi / ACROSS_AZIMUTH;
+    double r = reach * u * u, edge = outside(at, from, r, polar, azimuth);
+    double width = fabs(outside(at, from, reach * (u + du) * (u + du), polar, azimuth) - edge) +
+                   fabs(outside(at, from, r, polar + dp, azimuth) - edge) + fabs(outside(at, from, r, polar, azimuth + da) - edge);
+    double seen = at->radius > 0 ? fmin(fmax(0.5 * edge / width + 0.5, 0), 1) : 1;
+    double rise = light + r * cos(polar) - at->floor, x = r * sin(polar) * cos(azimuth) - from, z = r * sin(polar) * sin(azimuth);
+    double s = sqrt(x * x + z * z + rise * rise), degrees = polar * 180 / pi;
+    double scattered = -(sin(polar) * cos(azimuth) * x + sin(polar) * sin(azimuth) * z + cos(polar) * rise) / s;
+    double bend = 1 + g * g - 2 * g * scattered, phase = (1 - g * g) / (4 * pi * bend * sqrt(bend));
+    double falloff = fmin((cutoff - degrees) / (cutoff - beam), 1), within = s * (light + r * cos(polar) - border) / rise;
+    // Both halves of the azimuth.
+    double volume = 2 * sin(polar) * (2 * reach * u * 2 * du) * 2 * dp * 2 * da;
+    double all = volume * seen * falloff * phase * rise / (s * s * s);
+    for (int c = 0; c < 3; c++) {
+        out[c] += all * reflectance[c] / pi * intensity[c] * albedo[c] * sigma[c] * exp(-sigma[c] * (r + within));
+    }
+}
+
+static void floor_at(const Place *at, double from, double out[3]) {
+    memset(out, 0, 3 * sizeof *out);
+    for (int i = 0; i < ACROSS_R; i++) {
+        for (int k = 0; k < ACROSS_POLAR; k++) {
+            for (int j = 0; j < ACROSS_AZIMUTH; j++) {
+                double polar = (k + 0.5) / ACROSS_POLAR * cutoff / 180 * pi;
+                add_cell(at, from, (i + 0.5) / ACROSS_R, polar, (j + 0.5) / ACROSS_AZIMUTH * pi, out);
+            }
+        }
+    }
+}
+
+// Mean over the picture: Gauss-Legendre over one quadrant of the square that it shows.
+static void picture_of(Place at, double mean[3]) {
+    static const double node[POINTS] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263};
+    static const double weight[POINTS] = {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693};
+    const double half = (eye - at.floor) * half_view;
+    memset(mean, 0, 3 * sizeof *mean);
+    for (int i = 0; i < POINTS; i++) {
+        for (int k = 0; k <= i; k++) {
+            double one[3];
+            floor_at(&at, half * hypot(node[i], node[k]), one);
+            for (int c = 0; c < 3; c++) {
+                mean[c] += weight[i] * weight[k] * (i == k ? 1 : 2) * one[c];
+            }
+        }
+    }
+}
+
+static void slope_of(Place at, double floor_rises, double coin_rises, double slope[3]) {
+    double high[3], low[3];
+    Place up = at, down = at;
+    up.floor += step * floor_rises, down.floor -= step * floor_rises;
+    up.coin += step * coin_rises, down.coin -= step * coin_rises;
+    picture_of(up, high);
+    picture_of(down, low);
+    for (int c = 0; c < 3; c++) {
+        slope[c] = (high[c] - low[c]) / (2 * step);
+    }
+}
+
+// Means over the picture, of seeds; param null: of the picture itself.
+static void measure(const char *aside, const char *name, int spp, double mean[3], double error[3]) {
+    static float image[NUMBERS];
+    const rey_define defines[] = {{"aside", aside}};
+    const float rise[16] = {[7] = 1};
+    double square[3] = {0};
+    Room room;
+    assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
+    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_floor.xml", defines, 1, &room.scene));
+    int param = name ? rey_param_find(room.scene, name) : -1;
+    memset(mean, 0, 3 * sizeof *mean);
+    for (uint32_t seed = 1; seed <= SEEDS; seed++) {
+        double one[3] = {0};
+        rey_render_def def = def_make(spp, seed, 1);
+        def.terms = 0;
+        ok(room, name ? rey_jvp(room.scene, &def, (rey_selection){&param, 1}, rise, image, NULL, NULL)
+                      : rey_render(room.scene, &def, image, NULL));
+        for (int i = 0; i < NUMBERS; i++) {
+            one[i % 3] += (double)image[i] * 3 / NUMBERS;
+        }
+        for (int c = 0; c < 3; c++) {
+            mean[c] += one[c] / SEEDS;
+            square[c] += one[c] * one[c] / SEEDS;
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        error[c] = sqrt(fmax(square[c] - mean[c] * mean[c], 0) / (SEEDS - 1));
+    }
+    room_close(room);
+}
+
+// Colours agree within so many errors, and those are small.
+static void agree(const char *what, const double found[3], const double error[3], const double exact[3], double most) {
+    for (int c = 0; c < 3; c++) {
+        double z = (found[c] - exact[c]) / hypot(error[c], 2e-3 * exact[c]);
+        printf("%s %d: %.4g +- %.2g, exact %.4g, z %.1f\n", what, c, found[c], error[c], exact[c], z);
+        assert_true(fabs(z) < 5);
+        assert_true(error[c] < most / sqrt(sample_share()) * fabs(exact[c]));
+    }
+}
+
+static void test_picture(void **state) {
+    UNUSED(state);
+    double found[3], error[3], exact[3];
+    measure("0", NULL, SPP, found, error);
+    picture_of(shaded, exact);
+    agree("picture", found, error, exact, 0.02);
+}
+
+// Nothing before the floor: what is scattered right beside the torch is most of how it changes.
+static void test_open(void **state) {
+    UNUSED(state);
+    double found[3], error[3], exact[3];
+    measure("50", "floor.to_world", SPP, found, error);
+    slope_of(bare, 1, 0, exact);
+    agree("open floor", found, error, exact, 0.06);
+}
+
+static void test_coin(void **state) {
+    UNUSED(state);
+    double found[3], error[3], exact[3];
+    measure("0", "coin.to_world", SPP, found, error);
+    slope_of(shaded, 0, 1, exact);
+    agree("coin", found, error, exact, 0.1);
+}
+
+// The coin's edge hides what stands still beside the torch, and what rides.
+static void test_shadow(void **state) {
+    UNUSED(state);
+    double found[3], error[3], exact[3];
+    measure("0", "floor.to_world", 12 * SPP, found, error);
+    slope_of(shaded, 1, 0, exact);
+    agree("shaded floor", found, error, exact, 0.15);
+}
+
+int main(int argc, char **argv) {
+    struct CMUnitTest tests[] = {cmocka_unit_test(test_picture), cmocka_unit_test(test_open), cmocka_unit_test(test_coin),
+                                 cmocka_unit_test(test_shadow)};
+    size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
+    return _cmocka_run_group_tests("beacons", tests, count, NULL, NULL);
+}
