@@ -10,8 +10,9 @@
 
 #include <math.h>
 
-// Rounding of what lies just outside of a ball.
-static const double within = 0.99;
+// Rounding of what lies just outside of a ball; and the least radius over that of the scene: within smaller balls collisions are
+// too seldom to say what stands still.
+static const double within = 0.99, least_radius = 1e-3;
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -203,7 +204,7 @@ rey_result rey_beacons_begin(Render *r) {
     int32_t count = 0;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
         double p[3] = {0}, radius = place_of(view, view->emitters + i, p) ? free_radius(view, p) : 0;
-        of[i] = radius > 0 && isfinite(radius) ? count : -1;
+        of[i] = radius > least_radius * (double)view->bounds_radius && isfinite(radius) ? count : -1;
         if (of[i] >= 0) {
             beacons[count++] = (Beacon){(float)p[0], (float)p[1], (float)p[2], (float)radius, i};
         }

@@ -2,7 +2,8 @@
 // point that stands still, with the share chi of the light that it scatters (beacon.h): the edge leaves the line of the two by
 //   n . (e' - (1 - a) y'),   a = |e - y| / |x - y|.
 // riding.h knows n . (e' - y') of all that is scattered, so that n . y' times a chi of this light is missing: these are segments
-// that end there, of which nothing moves but the vertices they come from.
+// that end there, of which nothing moves but the vertices they come from. Edges between x and its light lie outside of the ball,
+// and so would x, behind them.
 #pragma once
 
 #include "integrator/beacon.h"
@@ -89,19 +90,4 @@ static void beside_find(Tracer *t, const BoundaryJob *b, Int number, Float share
     segment_keep_leg(around, &leg, q, m);
     i_compress(q->sighted + q->count, i_set(0), m);
     segment_keep(&s, o, &leg.near, SEGMENT_BESIDE, number, q, m);
-}
-
-// Of segments that end on a light at a point and begin at a collision beside it, the part that stands still (beacon.h) does not
-// move with the vertex before that, the level behind the first: c is what the near point's motion is worth.
-KFN void beside_rest(const Tracer *t, const Segments *q, int32_t level, int32_t k, Carried *c, Mask m) {
-    if (!t->job->beacons || level > 0) {
-        return;
-    }
-    UpstreamVertex near = upstream_load(q, 0, k), before = upstream_load(q, 1, k);
-    Int light = i_load(q->source + k);
-    m = m & mi_eq(i_load(q->lit + k), i_set(1)) & mi_lt(i_set(-1), light) & mi_lt(near.hit.shape, i_set(0));
-    m = m & mi_lt(i_set(UPSTREAM_NONE), near.met) & mi_lt(i_set(UPSTREAM_NONE), before.met);
-    Float r = v3_length(v3_sub(record_v3(q->far_x, q->far_y, q->far_z, k), near.hit.p));
-    BeaconShare still = beacon_share(beacon_radius(t, light, m), r, v3_length(v3_sub(before.hit.p, near.hit.p)), m);
-    c->drag = v3_scale(c->drag, 1.0f - still.chi);
 }

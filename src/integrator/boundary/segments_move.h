@@ -155,7 +155,6 @@ static void ways_advance(Indirect *in, int32_t bounce, Sink *sink) {
             c = ways_begin_adj(in, k, f_set(1), false, sink, m);
             rate = sink_taken(sink);
         } else {
-            beside_rest(in->t, q, bounce - 1, k, &c, m);
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, sink, m);
             rate = rate + sink_taken(sink);
         }
@@ -186,7 +185,6 @@ static void ways_carry(Indirect *in, int32_t bounce) {
             c = ways_begin_adj(in, k, f_set(1), true, &still, m);
         } else {
             c = (Carried){record_v3(q->dragx, q->dragy, q->dragz, k), record_v3(q->turnx, q->turny, q->turnz, k)};
-            beside_rest(in->t, q, bounce - 1, k, &c, m);
             upstream_turn_adj(in->t, q, bounce - 1, k, &c, &still, m);
         }
         upstream_ride_adj(in->t, q, bounce, k, &c, &still, m);
@@ -223,7 +221,6 @@ static void ways_move_adj(Indirect *in, int32_t k, Sink *sink) {
         }
         Float share = worth[j + 1] / some;
         c = (Carried){v3_scale(c.drag, share), v3_scale(c.turn, share)};
-        beside_rest(in->t, q, j, k, &c, m);
         upstream_turn_adj(in->t, q, j, k, &c, sink, m);
     }
 }
