@@ -31,6 +31,12 @@ static inline double uniform(uint64_t *state) {
     return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
+// [wallace1959]
+static inline double normal_of_t(double t, double degrees) {
+    double z = sqrt(degrees * log1p(t * t / degrees)) * (8 * degrees + 1) / (8 * degrees + 3);
+    return t < 0 ? -z : z;
+}
+
 // The pictures that scenes ask for by name: random values in a range, only its ends, or the more the nearer the middle.
 typedef enum PictureSort { ANY_VALUES, ONLY_ENDS, BRIGHT_MIDDLE } PictureSort;
 

@@ -108,12 +108,6 @@ static double mean_of(double rows[SEEDS][BLOCKS], int block, double *error2) {
     return mean;
 }
 
-// [wallace1959]
-static double normal_of_t(double t, double degrees) {
-    double z = sqrt(degrees * log1p(t * t / degrees)) * (8 * degrees + 1) / (8 * degrees + 3);
-    return t < 0 ? -z : z;
-}
-
 static void test_motion(void **state) {
     const Motion *m = *state;
     Room room = room_open(m->room, 1, 0);
