@@ -1,7 +1,7 @@
 // beacons.c: how far around lights at a point nothing lies: no surface, and no border of a medium.
 #include "render/beacons.h"
 
-#include "bsdf/table.h"
+#include "bsdf/ends.h"
 #include "emitter/emitter.h"
 #include "render/blame.h"
 #include "render/light_borders.h"
@@ -171,7 +171,7 @@ static bool turns(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         found |= (shape->flags & SHAPE_HAS_NORMALS) && !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
-        found |= rey_bsdf_ends(view, view->bsdfs + shape->bsdf);
+        found |= rey_bsdf_ends_within(view, shape->bsdf);
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         found |= rey_phase_varies(view, view->media[i].phase);
@@ -192,7 +192,7 @@ static bool place_of(const SceneView *view, const EmitterRecord *e, double p[3])
 
 rey_result rey_beacons_begin(Render *r) {
     const SceneView *view = &r->scene->view;
-    if (!r->job.rides || r->job.any_camera || r->job.any_places || turns(view)) {
+    if (r->request.asked || !r->job.rides || r->job.any_camera || r->job.any_places || turns(view)) {
         return REY_OK;
     }
     size_t n = (size_t)view->emitters_count + 1;

@@ -55,7 +55,7 @@ typedef struct Render {
     bool meetings_found;
     Array corners;         // where the interior term looks through lenses (shape/corners.h)
     int32_t *corner_at;    // by viewer
-    void *beacons;         // those of the job (beacons.h)
+    Beacon *beacons;       // those of the job (beacons.h)
     int32_t *beacon_of;
     Array marks;           // curves along which textures jump (shape/marks.h)
     BoundaryPlan boundary[BOUNDARY_KINDS];

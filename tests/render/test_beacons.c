@@ -83,15 +83,21 @@ static void slope_of(Place at, double floor_rises, double coin_rises, double slo
     }
 }
 
-// Means over the picture, of seeds; param null: of the picture itself.
-static void measure(const char *aside, const char *name, int spp, double mean[3], double error[3]) {
-    static float image[NUMBERS];
-    const rey_define defines[] = {{"aside", aside}};
-    const float rise[16] = {[7] = 1};
-    double square[3] = {0};
+static Room floor_open(const char *aside) {
+    const rey_define define = {"aside", aside};
     Room room;
     assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
-    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_floor.xml", defines, 1, &room.scene));
+    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_floor.xml", &define, 1, &room.scene));
+    return room;
+}
+
+static const float rise[16] = {[7] = 1};
+
+// Means over the picture, of seeds; name null: of the picture itself.
+static void measure(const char *aside, const char *name, int spp, double mean[3], double error[3]) {
+    static float image[NUMBERS];
+    double square[3] = {0};
+    Room room = floor_open(aside);
     int param = name ? rey_param_find(room.scene, name) : -1;
     memset(mean, 0, 3 * sizeof *mean);
     for (uint32_t seed = 1; seed <= SEEDS; seed++) {
@@ -132,30 +138,30 @@ static void test_picture(void **state) {
     agree("picture", found, error, exact, 0.02);
 }
 
+// How the picture changes as what `name` places rises.
+static void slope_agrees(const char *aside, const char *name, int spp, Place at, double most) {
+    const bool coin = strcmp(name, "coin.to_world") == 0;
+    double found[3], error[3], exact[3];
+    measure(aside, name, spp, found, error);
+    slope_of(at, !coin, coin, exact);
+    agree(name, found, error, exact, most);
+}
+
 // Nothing before the floor: what is scattered right beside the torch is most of how it changes.
 static void test_open(void **state) {
     UNUSED(state);
-    double found[3], error[3], exact[3];
-    measure("50", "floor.to_world", SPP, found, error);
-    slope_of(bare, 1, 0, exact);
-    agree("open floor", found, error, exact, 0.06);
+    slope_agrees("50", "floor.to_world", SPP, bare, 0.06);
 }
 
 static void test_coin(void **state) {
     UNUSED(state);
-    double found[3], error[3], exact[3];
-    measure("0", "coin.to_world", SPP, found, error);
-    slope_of(shaded, 0, 1, exact);
-    agree("coin", found, error, exact, 0.1);
+    slope_agrees("0", "coin.to_world", SPP, shaded, 0.1);
 }
 
 // The coin's edge hides what stands still beside the torch, and what rides.
 static void test_shadow(void **state) {
     UNUSED(state);
-    double found[3], error[3], exact[3];
-    measure("0", "floor.to_world", 16 * SPP, found, error);
-    slope_of(shaded, 1, 0, exact);
-    agree("shaded floor", found, error, exact, 0.15);
+    slope_agrees("0", "floor.to_world", 16 * SPP, shaded, 0.15);
 }
 
 // Sensors and such lights that move, and lights that all but touch a border, are not known.
@@ -163,11 +169,7 @@ static void test_refused(void **state) {
     UNUSED(state);
     static const char *const names[] = {"camera.to_world", "torch.to_world", "floor.to_world"};
     static float image[NUMBERS];
-    const rey_define aside = {"aside", "0"};
-    const float rise[16] = {[7] = 1};
-    Room room;
-    assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
-    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_floor.xml", &aside, 1, &room.scene));
+    Room room = floor_open("0");
     for (int i = 0; i < COUNT_OF(names); i++) {
         int param = rey_param_find(room.scene, names[i]), torch = rey_param_find(room.scene, "torch.to_world");
         rey_render_def def = def_make(16, 1, 1);
