@@ -34,6 +34,15 @@ enum {
 #undef EMITTER_DELTA
 };
 
+// Where in theta the coordinates of a light's position are, in the world; false of lights that are not at a point.
+KFN bool emitter_place(const EmitterRecord *e, int32_t at[3]) {
+    const bool point = e->kind == EMITTER_POINT;
+    for (int k = 0; k < 3; k++) {
+        at[k] = point ? e->slot[SLOT(Point, position)] + k : e->slot[SLOT(Spot, to_world)] + 4 * k + 3;
+    }
+    return point || e->kind == EMITTER_SPOT;
+}
+
 KFN bool emitter_is_delta(const EmitterRecord *e) { return EMITTER_DELTA_KINDS >> e->kind & 1; }
 
 #define EMITTER_SURFACE EMITTER_CASE

@@ -4,6 +4,7 @@
 // front of the vertices that they end at: what arrives at their beginning is local + weight x what leaves their end.
 #pragma once
 
+#include "integrator/aim.h"
 #include "integrator/vertex.h"
 #include "medium/phase.h"
 
@@ -213,7 +214,9 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
     Int light = light_choose(scene, key, bounce, &choice);
     Spec radiance;
     LightSample s = lights_sample(scene, light, v->m, v->hit.p, rng_2d(key, dimension(bounce, PURPOSE_LIGHT)), &radiance);
-    Float scatter_pdf = phase_pdf(&c->call, c->wi, s.d), value = phase_eval(&c->call, c->wi, s.d), pdf = s.pdf * choice;
+    const Aim aim = aim_of(t);
+    Float scatter_pdf = aim_density(&aim, v->hit.p, s.d, phase_pdf(&c->call, c->wi, s.d));
+    Float value = phase_eval(&c->call, c->wi, s.d), pdf = s.pdf * choice;
     Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(pdf, scatter_pdf));
     Float weight = mis * f_safe_rcp(pdf);
     Spec f = spec_scale(c->albedo, value), l = spec_scale(spec_mul(f, radiance), weight);
@@ -227,22 +230,6 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
     }
 }
 
-// Rays that pass the focus of flights at a distance bring one over that distance: half of them take angles to it that are uniform.
-// Returns the density of those.
-static NOINLINE Float collision_aim(const Tracer *t, const Vertex *v, const SampleKey *key, int32_t bounce, Onward *w) {
-    Vec3 axis = v3_normalize(v3_sub(*t->focus, v->hit.p));
-    Vec2 u = rng_2d(key, dimension(bounce, PURPOSE_LIGHT));
-    Float s, c, x, y;
-    f_sincos(0.5f * PI * u.x, &s, &c);
-    f_sincos(TWO_PI * u.y, &y, &x);
-    Frame frame = frame_from_normal(axis);
-    Vec3 aimed = frame_to_world(&frame, v3(s * x, s * y, c));
-    Mask aims = m_lt(rng_1d(key, dimension(bounce, PURPOSE_LIGHT_CHOICE)), f_set(0.5f));
-    w->d = v3_select(aims, aimed, w->d);
-    Float sine = f_max(v3_length(v3_cross(axis, w->d)), f_set(1e-6f));
-    return f_zero_unless(m_gt(v3_dot(axis, w->d), f_set(0)), INV_PI * INV_PI / sine);
-}
-
 // Samples how the paths of m go on; returns the number of the next bounce's paths.
 static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c, const SampleKey *key, int32_t bounce, Mask m,
                                  int32_t record, int32_t next_count) {
@@ -251,12 +238,11 @@ static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c,
     w.d = phase_sample(&c->call, c->wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                        rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
     w.sample.lobe = i_set(LOBE_SMOOTH);
-    if (t->focus) {
-        Float aimed = collision_aim(t, v, key, bounce, &w);
-        w.pdf = 0.5f * (phase_pdf(&c->call, c->wi, w.d) + aimed);
-    } else {
-        w.pdf = phase_pdf(&c->call, c->wi, w.d);
+    const Aim aim = aim_of(t);
+    if (aim.count > 0) {
+        aim_take(&aim, v->hit.p, key, bounce, m, &w.d);
     }
+    w.pdf = aim_density(&aim, v->hit.p, w.d, phase_pdf(&c->call, c->wi, w.d));
     w.rcp = f_safe_rcp(w.pdf);
     w.f = spec_scale(c->albedo, collision_phase(c, w.d));
     onward_weigh(t, v, &w);

@@ -7,18 +7,6 @@
 
 enum { MOST_LAMPS_TRIED = 64 }; // lights that it is asked of in which medium they lie
 
-// Where a light of the deciding scene lies; false of other kinds.
-KFN bool lamp_place(const SceneView *scene, const EmitterRecord *e, real p[3]) {
-    if (e->kind != EMITTER_POINT && e->kind != EMITTER_SPOT) {
-        return false;
-    }
-    for (int k = 0; k < 3; k++) {
-        const bool point = e->kind == EMITTER_POINT;
-        p[k] = (real)scene->theta[point ? e->slot[SLOT(Point, position)] + k : e->slot[SLOT(Spot, to_world)] + 4 * k + 3];
-    }
-    return true;
-}
-
 // Puts a light of a medium behind those of the same one and before those of others.
 static void lamp_keep(Tracer *t, const real p[3], int32_t medium) {
     int32_t at = t->lamp_count++;
@@ -37,9 +25,11 @@ static void lamps_find(Tracer *t) {
     int32_t n = 0;
     t->lamp_count = 0;
     for (int64_t i = 0; i < scene->emitters_count && n < MOST_LAMPS_TRIED && scene->has_media; i++) {
-        real p[3];
-        if (lamp_place(scene, scene->emitters + i, p)) {
-            places[0][n] = p[0], places[1][n] = p[1], places[2][n] = p[2];
+        int32_t at[3];
+        if (emitter_place(scene->emitters + i, at)) {
+            for (int k = 0; k < 3; k++) {
+                places[k][n] = (real)scene->theta[at[k]];
+            }
             n++;
         }
     }

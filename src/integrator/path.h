@@ -4,6 +4,7 @@
 // for path_adj.h. Sampling, densities, MIS weights and roulette are detached.
 #pragma once
 
+#include "integrator/aim.h"
 #include "integrator/leg.h"
 
 // ---- surfaces ----------------------------------------------------------------------------------------------------
@@ -49,6 +50,14 @@ KFN Float picture_pdf(const BsdfCall *call, Vec3 wi, Vec3 wo, Int lobe, Float pd
     return call->scene->drops && call->floor > 0 ? bsdf_pdf(&picture, wi, wo, lobe) : pdf;
 }
 
+// What directions from surfaces of a group aim at. Of functions with smooth lobes alone, which choose nothing but a direction.
+KFN Aim surface_aim(const Tracer *t, const Group *group) {
+    Aim aim = aim_of(t);
+    bool aims = t->scene->bsdfs[group->bsdf].aims && !t->scene->drops && !t->focus;
+    aim.count = aims ? aim.count : 0;
+    return aim;
+}
+
 // Light sampling at a batch of surface vertices: appends shadow rays with what they will bring.
 KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call,
                         Vec3 wi, const SampleKey *key, int32_t bounce, int32_t record) {
@@ -68,6 +77,8 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     Int smooth = i_set(LOBE_SMOOTH);
     Float scatter_pdf;
     Spec f = bsdf_eval_pdf(call, wi, wo, smooth, &scatter_pdf);
+    const Aim aim = surface_aim(t, group);
+    scatter_pdf = aim_density(&aim, si->p, s.d, scatter_pdf);
     Float pdf = s.pdf * choice;
     Float other_pdf = picture_pdf(call, wi, wo, smooth, scatter_pdf), own_pdf = pdf;
     Mask drawn = v->wanted;
@@ -99,6 +110,24 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     }
 }
 
+// Samples a direction, its value and density; a share of them aims.
+KFN void surface_sample(const Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call, Vec3 wi,
+                        const SampleKey *key, int32_t bounce, Onward *w) {
+    const Aim aim = surface_aim(t, group);
+    w->sample = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
+                            rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
+    if (aim.count > 0) {
+        Vec3 d = frame_to_world(&si->sh, w->sample.wo);
+        Mask aimed = aim_take(&aim, si->p, key, bounce, v->m, &d);
+        w->sample.wo = v3_select(aimed, frame_to_local(&si->sh, d), w->sample.wo);
+        w->sample.lobe = i_select(aimed, i_set(LOBE_SMOOTH), w->sample.lobe);
+    }
+    w->f = bsdf_eval_pdf(call, wi, w->sample.wo, w->sample.lobe, &w->pdf);
+    if (aim.count > 0) {
+        w->pdf = aim_density(&aim, si->p, frame_to_world(&si->sh, w->sample.wo), w->pdf);
+    }
+}
+
 // Samples how the paths go on and appends the survivors to the next bounce's paths; returns their number.
 KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const Interaction *si, const BsdfCall *call,
                           Vec3 wi, const SampleKey *key, int32_t bounce, int32_t record, int32_t next_count) {
@@ -118,9 +147,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         key = &scatter_key;
     }
     Onward w = {.collides = false};
-    w.sample = bsdf_sample(call, wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
-                           rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
-    w.f = bsdf_eval_pdf(call, wi, w.sample.wo, w.sample.lobe, &w.pdf);
+    surface_sample(t, group, v, si, call, wi, key, bounce, &w);
     w.rcp = f_safe_rcp(w.pdf);
     w.m = v->m;
     if (only_rims) {

@@ -257,6 +257,7 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         bsdf->turns |= nested->turns;
         bsdf->transmits |= nested->transmits;
         bsdf->spreads |= nested->spreads;
+        bsdf->aims &= nested->aims;
     }
     return REY_OK;
 }
@@ -266,6 +267,7 @@ static rey_result add_bsdf(Builder *b, int kind, BsdfNode bsdf, int32_t *out) {
     int32_t size = rey_bsdf_table_size(kind);
     bsdf.kind = kind;
     bsdf.spreads |= rey_bsdf_spreads(kind);
+    bsdf.aims &= !bsdf.transmits && !rey_bsdf_bends(kind);
     bsdf.table = -1;
     if (size > 0) {
         bsdf.table = rey_scene_append(scene, &scene->build.tables, sizeof(float), size);
@@ -282,7 +284,7 @@ static rey_result add_bsdf(Builder *b, int kind, BsdfNode bsdf, int32_t *out) {
 }
 
 static BsdfNode empty_bsdf(void) {
-    BsdfNode bsdf = {.child = {-1, -1}};
+    BsdfNode bsdf = {.child = {-1, -1}, .aims = true};
     for (int i = 0; i < MAX_SLOTS; i++) {
         bsdf.slot[i] = -1;
     }

@@ -179,15 +179,16 @@ static bool turns(const SceneView *view) {
     return found;
 }
 
+// Where a light at a point lies whose light does not jump; false of others.
 static bool place_of(const SceneView *view, const EmitterRecord *e, double p[3]) {
-    const bool point = e->kind == EMITTER_POINT;
-    if (!point && !(e->kind == EMITTER_SPOT && !rey_light_is_abrupt(view, e) && !rey_light_is_steep(view, e))) {
+    int32_t at[3];
+    if (!emitter_place(e, at)) {
         return false;
     }
     for (int k = 0; k < 3; k++) {
-        p[k] = (double)view->theta[point ? e->slot[SLOT(Point, position)] + k : e->slot[SLOT(Spot, to_world)] + 4 * k + 3];
+        p[k] = (double)view->theta[at[k]];
     }
-    return true;
+    return e->kind == EMITTER_POINT || !(rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
 }
 
 rey_result rey_beacons_begin(Render *r) {
