@@ -16,10 +16,10 @@
 enum { SEGMENT_CREASE = 4, SEGMENT_BESIDE = 5 };
 
 // Distance of the two rays from the edge. Where surfaces pass through each other the rays to lights start a step above them, and
-// must start on their own side of the other one.
-KFN Float chained_step(Vec3 p, Mask meeting) {
-    Float step = (1.0f + f_max(f_max(f_abs(p.x), f_abs(p.y)), f_abs(p.z))) * 1e-5f;
-    return f_select(meeting, MEETING_STEPS * interaction_step(p), step);
+// must start on their own side of the other one; so must those in an acute wedge.
+KFN Float chained_step(const EdgePoint *e) {
+    Float step = (1.0f + f_max(f_max(f_abs(e->p.x), f_abs(e->p.y)), f_abs(e->p.z))) * 1e-5f;
+    return f_select(e->meeting, MEETING_STEPS * interaction_step(e->p), f_max(step, edge_wedge(e)));
 }
 
 // The rays past both sides of an edge, from half-way to the near point on: n points to the second one.
@@ -39,7 +39,7 @@ KFN Vec3 chained_offset(const Segment *s) {
 static Mask chained_between(Tracer *t, const BoundaryJob *b, const Segment *s, Vec3 near, Mask m, Float *behind) {
     const EdgePoint *e = &s->edge;
     *behind = f_select(m, v3_length(v3_sub(near, e->p)), f_set(1));
-    Float step = chained_step(e->p, e->meeting);
+    Float step = chained_step(e);
     Ray rays[2] = {chained_ray(e->p, s->d, s->n, *behind, step, 0), chained_ray(e->p, s->d, s->n, *behind, step, 1)};
     return edge_between(t, b, e, false, s->silhouette, s->n, rays, m);
 }
@@ -57,6 +57,7 @@ static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind
     v3_compress(q->nx + at, q->ny + at, q->nz + at, v3_scale(s->n, -s->weight), m);
     v3_compress(q->mx + at, q->my + at, q->mz + at, other, m);
     f_compress(q->behind + at, behind, m);
+    f_compress(q->apart + at, chained_step(e), m);
     spec_compress(q->light, at, s->light, m);
     i_compress(q->lit + at, i_select(s->silhouette, i_set(0), i_set(SEGMENT_CREASE)), m);
     i_compress(q->source + at, i_set(-1), m);
@@ -116,8 +117,7 @@ static void chained_start(Tracer *t, const Segments *q, int32_t half) {
         Vec3 n = v3_normalize(v3_neg(LOAD_V3(*q, nx, ny, nz, at)));
         Int lit = i_gather(q->lit, at);
         Mask m = m_first_n(q->count - k) & ~(mi_eq(lit, i_set(1)) | mi_eq(lit, i_set(SEGMENT_BESIDE)));
-        Vec3 met = LOAD_V3(*q, mx, my, mz, at);
-        Float step = chained_step(p, m_gt(v3_dot(met, met), f_set(0)));
+        Float step = real_gather(q->apart, at);
         for (int side = 0; side < 2; side++) { // first the side that n points to
             Ray ray = chained_ray(p, d, n, real_gather(q->behind, at), step, 1 - side);
             ray.tmax = f_zero_unless(m, ray.tmax);

@@ -15,6 +15,7 @@ typedef struct Crossing {
     Vec3 p;              // on the line
     Vec3 n, n_other, across; // across: n - n'
     Mask m, meeting;
+    Float wedge;         // cotangent of the angle between the faces of one mesh that meet there, where it is acute, else 0
     Mask terminator, horizon; // n . view = 0 in the triangle of `hit`: where the line ends, or at the vertex before
     Vec3 view;
     Int step;            // of the texture that jumps there, else -1: how it rises over the surface, and uv
@@ -246,7 +247,16 @@ static void crossing_turns(const Tracer *t, const Sightline lines[2], const Ends
     c->n = v3_select(turns, v3_select(c->terminator, shading, ng), c->n);
     c->m = c->m | turns;
     c->meeting = c->meeting & ~turns;
+    c->wedge = f_zero_unless(~turns, c->wedge);
     c->step = i_select(turns, i_set(-1), c->step);
+}
+
+// The wedge between two faces that the lines of m meet.
+static Float crossing_wedge(const Ends *e, const Miss *miss, Mask m) {
+    const Hit *h = e->hit;
+    m = m & mi_eq(h[0].shape, h[1].shape) & mi_eq(h[0].instance, h[1].instance) & ~mi_eq(h[0].prim, h[1].prim);
+    Float cosine = -v3_dot(miss[0].normal, miss[1].normal), sine = v3_length(v3_cross(miss[0].normal, miss[1].normal));
+    return f_zero_unless(m & m_gt(cosine, f_set(0)), f_min(cosine * f_safe_rcp(sine), f_set(MOST_WEDGE)));
 }
 
 static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, const Sightline lines[2], Int level, Mask m) {
@@ -279,6 +289,7 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
     c.n = v3_select(second, miss[1].n, miss[0].n);
     c.p = c.hit.p;
     c.meeting = met[0] & met[1] & ~edge[0] & ~edge[1] & ~mark;
+    c.wedge = crossing_wedge(&e, miss, met[0] & met[1] & ~c.meeting & ~mark);
     Float slant[2] = {v3_dot(miss[0].normal, e.d[0]), v3_dot(miss[1].normal, e.d[1])};
     c.n = v3_select(c.meeting, v3_scale(miss[0].normal, f_safe_rcp(slant[0])), c.n);
     c.n_other = v3_select(c.meeting, v3_scale(miss[1].normal, f_safe_rcp(slant[1])), v3_zero());

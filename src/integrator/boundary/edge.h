@@ -10,6 +10,9 @@
 // those that one surface lets pass meet the other one behind it.
 #define MEETING_STEPS 8.0f
 
+// The cotangent of the narrowest wedges in which paths keep off the edge for that.
+#define MOST_WEDGE 20.0f
+
 #define MEETING_INT(job, i, field)                                                                                     \
     i_gather((const int32_t *)(job)->meetings,                                                                         \
              (i) * (int32_t)(sizeof(MeetingRecord) / 4) + (int32_t)(offsetof(MeetingRecord, field) / 4))
@@ -293,6 +296,19 @@ KFN Float edge_rise(const EdgePoint *e, Vec3 side, Vec3 n) {
 KFN Float edge_first_rise(const EdgePoint *e, Vec3 n) {
     Float rise = edge_rise(e, e->side[0], n);
     return f_select(m_gt(f_abs(rise), f_set(0)), rise, f_zero_unless(~e->open, edge_rise(e, e->side[1], n)));
+}
+
+// How far from an edge between two surfaces that meet at an acute angle, by which they part too slowly: rays that start a step
+// (interaction_step) off the one, into the wedge, must start on their own side of the other. 0 elsewhere.
+KFN Float edge_wedge(const EdgePoint *e) {
+    Vec3 across[2];
+    for (int i = 0; i < 2; i++) {
+        Float run = v3_dot(e->side[i], e->tangent) * f_safe_rcp(v3_dot(e->tangent, e->tangent));
+        across[i] = v3_madd(e->side[i], -run, e->tangent);
+    }
+    Float cosine = v3_dot(across[0], across[1]), sine = v3_length(v3_cross(across[0], across[1]));
+    Float steps = f_min(cosine * f_safe_rcp(sine), f_set(MOST_WEDGE)) * MEETING_STEPS;
+    return f_zero_unless(~(e->open | e->round | e->meeting) & m_gt(cosine, f_set(0)), steps * interaction_step(e->p));
 }
 
 // Whether a surface at an edge lies on the same side as `first`. What rays along d meet edge-on is an outline once, at the edge

@@ -328,10 +328,11 @@ KFN Mask strips_inside(const Strips *all, Float x, Float y) {
 // How far apart paths pass a curve [pixels], so that those whose directions are rounded in another order pass it there, too.
 KFN Float strip_apart(const Strips *all) { return f_set(4 * all->end); }
 
-// The same so far apart that rays that go on from a surface meet another one that it meets there.
+// The same so far apart that rays that go on from a surface meet another one that it meets there, or ends at in an acute wedge.
 KFN Float curve_apart(const Strips *all, const Curve *c) {
-    Float gap = 2.0f * MEETING_STEPS * interaction_step(c->crossing.p) * f_safe_rcp(c->slope), least = strip_apart(all);
-    return f_select(c->crossing.meeting, f_clamp(gap, least, f_set(WIDEST_MEETING)), least);
+    Float steps = MEETING_STEPS * f_select(c->crossing.meeting, f_set(1), c->crossing.wedge);
+    Float gap = 2.0f * steps * interaction_step(c->crossing.p) * f_safe_rcp(c->slope);
+    return f_clamp(gap, strip_apart(all), f_set(WIDEST_MEETING));
 }
 
 // Keeps a strip's ends (o, d), what it is worth (behind), how far apart the two paths are that look at its curve (along), and its

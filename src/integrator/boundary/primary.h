@@ -32,13 +32,14 @@ typedef struct PrimarySample {
 // Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
 // Where surfaces pass through each other, shadow rays start above the one and may miss the other, if the paths pass nearer than at
 // most; there, rays that one lets pass start a step behind it and must meet the other one; where a plane
-// cuts surfaces, they start on that. scale: pixels per length across the edge.
+// cuts surfaces, they start on that; so do they in acute wedges. scale: pixels per length across the edge.
 static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     const real finest = 2 * film_resolution(t->sensor);
     Float step = f_select(e->meeting, f_set(PRIMARY_STEP), f_min(f_set(finest), f_set(PRIMARY_STEP)));
     step = f_select(smooth & m_set(b->chains), f_set(finest), step);
     Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
+    step = f_max(step, edge_wedge(e) * scale);
     return f_select((e->meeting & m_set(b->chains)) | edge_clips(e), behind, step);
 }
 
@@ -222,8 +223,8 @@ static void primary_turn(Tracer *t, const PrimarySample *s, int32_t k, int32_t h
 // is seen there, along the view of it: the paths' step may go beyond that triangle, or beyond the band that is dark because its
 // normals turn away, whose other side is for the curve that ends it (facet.h); and where shading runs on over many narrow
 // triangles, what it changes by over that step at each of their edges adds up. Faces without vertex normals are left where the step
-// stays in the triangle: rays that begin on an inner edge begin on both of its faces. What textures are there is looked up a little
-// inside: exactly on the edge, one that jumps along it has the same value for both sides.
+// stays in the triangle, and so are acute wedges: rays that begin on an inner edge begin on both of its faces. What textures are
+// there is looked up a little inside: exactly on the edge, one that jumps along it has the same value for both sides.
 static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k, real side, Mask m) {
     const SceneView *scene = t->scene;
     const EdgePoint *e = &s->edge;
@@ -253,7 +254,8 @@ static NOINLINE void primary_touch(Tracer *t, const PrimarySample *s, int32_t k,
     hit.v = f_lerp(f_clamp(hit.v, f_set(0), f_set(1)), f_set(1.0f / 3), f_set(PRIMARY_INSET));
     Mask inside = m & mi_eq(met.shape, hit.shape) & mi_eq(met.prim, hit.prim) & mi_eq(met.instance, hit.instance);
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
-    m = m & (smooth | ~inside);
+    Mask wedge = m_gt(edge_wedge(e), f_set(0));
+    m = m & ((smooth & ~wedge) | ~inside);
     met = hit_select(m, &hit, &met);
     d = v3_select(m, s->seen.d, d);
     hit_store(t, k, &met);

@@ -26,14 +26,13 @@ enum { EMITTER_INFINITE_KINDS = 1 << EMITTER_CONSTANT | 1 << EMITTER_ENVMAP | 1 
 #define SEGMENT_POINT(F, x) F(x##_u) F(x##_v) F(x##_x) F(x##_y) F(x##_z)
 #define SEGMENT_HIT(I, x) I(x##_shape) I(x##_prim) I(x##_instance)
 // Origin and direction of the far half; n times the weight; distance of edge and near point, absolute and over that of the
-// ends; what the
-// near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface of a meeting:
-// what its motion is worth; of the paths beside lines of textures, what is added to their uv. In media: what the near point is in
-// (leg.h), and the edge, what the flight to it weighs, and whether it was looked for along a ray of the sensor's. Of
-// rims: the lobe, or the map's number.
+// ends; what the near point's share of the derivative is worth where it is seen by the camera, and elsewhere; the second surface
+// of a meeting: what its motion is worth; of the paths beside lines of textures, what is added to their uv; how far chained ones
+// pass from the edge. In media: what the near point is in (leg.h), and the edge, what the flight to it weighs, and whether it was
+// looked for along a ray of the sensor's. Of rims: the lobe, or the map's number.
 #define SEGMENT_FLOATS(F)                                                                                              \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(nx) F(ny) F(nz) F(behind) F(along) F(seen) F(unseen) F(mx) F(my) F(mz)                \
-        F(nudge_u) F(nudge_v)                                                                                                  \
+        F(nudge_u) F(nudge_v) F(apart)                                                                                          \
         SEGMENT_POINT(F, near) SEGMENT_POINT(F, edge) SEGMENT_POINT(F, far)
 #define SEGMENT_INTS(I)                                                                                                \
     I(number) I(lit) I(source) I(air) I(around) I(medium) I(sighted) I(rim)                                                     \
