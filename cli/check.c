@@ -17,6 +17,9 @@
 #include <stdio.h>
 #include <string.h>
 
+// Of extinctions, beyond the displacements of scenes that are replayed.
+#define CHECK_ROOM 1.1f
+
 typedef struct Work {
     Session session;
     rey_scene *displaced;            // a second copy of the scene, whose parameters are moved
@@ -383,6 +386,7 @@ static rey_result check_all(Work *w, Check *checks, int count) {
     s->def.spp = spp > CHECK_SETS ? spp / CHECK_SETS : 1;
     s->def.sets = 1;
     s->progress.parts = (double)count * CHECK_SETS * (1 + CHECK_POINTS);
+    rey_replay_make_room(s->scene, CHECK_ROOM);
     rey_result result = work_prepare(w, largest);
     int tests = 0;
     for (int i = 0; i < count && !result; i++) {

@@ -63,7 +63,7 @@ rey_result rey_reuse_open(Fit *fit) {
     if (!result) {
         result = rey_fit_load_scene(fit, 0, &fit->sampling);
     }
-    if (!result) {
+    if (!result) { // of the media that change, from then on
         fit->sampling->headroom = (float)fmin(fit->job.reuse_within, MOST_HEADROOM);
     }
     return result;

@@ -29,7 +29,9 @@ typedef struct Track {
 // Transmittances below this play roulette.
 #define DIM_TRANSMITTANCE 0.2f
 
-// Of padded walks: the optical depth of a whole walk, and the probability of real collisions, are at least this much.
+// Of padded walks: the optical depth of a whole walk, and the probabilities of real collisions and of others, are at least this
+// much: where the majorant is the extinction itself, another scene's may be less.
+#define PADDED_PASS 0.01f
 #define PADDED_DEPTH 0.5f
 #define PADDED_SHARE 0.05f
 
@@ -268,13 +270,15 @@ KFN Spec collision_weight(Spec weight, Spec sigma, Float majorant, Float p, Mask
 }
 
 // Delta tracking where all channels are alike.
-static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m, const SampleKey *random,
+static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Mask m, const SampleKey *key,
                                    uint32_t dimension) {
+    SampleKey random = *key;
+    random.sobol = false;
     MajorantWalk w = track_start(t, o, d, tmax, m);
     Flight flight = {tmax, spec_set(f_set(1)), m_set(false)};
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
-        Vec2 u = rng_2d(random, dimension + i);
+        Vec2 u = rng_2d(&random, dimension + i);
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Mask collided = met & m_lt(u.y * w.majorant, grey_extinction(t, &w));
         flight.t = f_select(collided, w.t, flight.t);
@@ -284,21 +288,15 @@ static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, M
     return flight;
 }
 
-// Delta tracking to the next real collision. Collision number i takes dimension + i. importance: shares of the channels,
-// which sum up to 1.
-static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
-                                    uint32_t dimension) {
-    if (track_is_uniform(t)) {
-        return t->foci > 0 ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
-                        : uniform_flight(t, d, tmax, importance, m, key, dimension);
-    }
+// Delta tracking in colour, and along the paths of another scene; of a flight towards tmax, no farther than `far`.
+static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, Float tmax, Spec importance, Mask m,
+                                     const SampleKey *key, uint32_t dimension) {
     SampleKey random = *key;
     random.sobol = false;
-    if (track_is_grey(t)) {
-        return grey_flight(t, o, d, tmax, m, &random, dimension);
-    }
     MajorantWalk w = track_start(t, o, d, tmax, m);
-    Flight flight = {tmax, spec_set(f_set(1)), m_set(false)};
+    w.end = f_min(w.end, far);
+    w.m = w.m & m_lt(w.t, w.end);
+    Flight flight = {far, spec_set(f_set(1)), m_set(false)};
     Spec weight = flight.weight; // in the deciding scene
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
@@ -306,7 +304,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Spec sigma = walk_extinction(t->scene, t, &w, o, d), counts = spec_mul(importance, weight);
         Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
-        real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
+        real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1 - (t->padded ? PADDED_PASS : 0)));
         Mask collided = met & m_lt(u.y, real_share);
         weight = spec_select(met, collision_weight(weight, sigma, w.majorant, real_share, collided), weight);
         if (t->values == t->scene) {
@@ -321,6 +319,18 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         left = met & ~collided;
     }
     return flight;
+}
+
+// The flight to the next real collision. Collision number i takes dimension + i. importance: shares of the channels, which sum up
+// to 1.
+static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
+                                    uint32_t dimension) {
+    if (track_is_uniform(t)) {
+        return t->foci > 0 ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
+                           : uniform_flight(t, d, tmax, importance, m, key, dimension);
+    }
+    return track_is_grey(t) ? grey_flight(t, o, d, tmax, m, key, dimension)
+                            : colour_flight(t, o, d, tmax, tmax, importance, m, key, dimension);
 }
 
 // What a flight towards tmax that gets as far as `far` weighs there. It is the same flight: its random numbers are those of
@@ -339,5 +349,5 @@ static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Flo
     if (track_is_grey(t)) {
         return spec_set(f_set(1));
     }
-    return track_flight(t, o, d, far, importance, m, key, dimension).weight;
+    return colour_flight(t, o, d, far, tmax, importance, m, key, dimension).weight;
 }

@@ -7,9 +7,17 @@
 #include "render/render_parts.h"
 #include "render/update.h"
 
+#include <string.h>
+
 bool rey_can_replay(const rey_scene *scene, int param) {
     const Param *p = &ARRAY_AT(scene->params, Param, param);
     return p->terms == REY_TERM_INTERIOR && (p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0);
+}
+
+void rey_replay_make_room(rey_scene *scene, float room) {
+    scene->headroom = room;
+    memset(scene->dirty_media, 1, (size_t)scene->view.media_count);
+    scene->dirty = true;
 }
 
 // One tile, with sums of weights of its own.

@@ -13,6 +13,10 @@ typedef struct ReplayWeights {
 // Whether pictures at other values of the parameter can be replayed: nothing moves, and no light sample does.
 bool rey_can_replay(const rey_scene *scene, int param);
 
+// Makes the bounds of a scene's extinctions `room` times as large as they need be (1 or more). Where the bound is the extinction
+// itself, paths never pass by, and other scenes, in which some would, are replayed with little weight on few.
+void rey_replay_make_room(rey_scene *scene, float room);
+
 // Renders `moved`, a second copy of `scene` whose parameters have other values, along the paths that derivatives of
 // `scene` take with the same def. Parameters that move points, lights or silhouettes must be equal in both.
 rey_result rey_replay(rey_scene *scene, rey_scene *moved, const rey_render_def *def, float *image, rey_stats *stats);
