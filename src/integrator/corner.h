@@ -1,8 +1,9 @@
-// corner.h: what takes the noise out of the interior term near inner corners, where two surfaces touch that move differently. With
-// both ends attached, light between points x and b at a distance r changes with |velocity of b - velocity of x| / r, whose square
-// is not integrable there. Seen from x the ends' motion is a field v of directions, and of the light  integral g(w) L(b(w)) dw,
-// g = f |cos|, the singular part of the derivative is  integral div(g v) L dw. Now for every function psi(w) that is 0 outside of
-// a part of the wall's plane, a lens that stands on the line where it meets the plane of x,
+// corner.h: what takes the noise out of the interior term near inner corners, where two surfaces touch that move differently, or
+// where a mesh meets itself and slides over the film. With both ends attached, light between points x and b at a distance r
+// changes with |velocity of b - velocity of x| / r, whose square is not integrable there. Seen from x the ends' motion is a field
+// v of directions, and of the light  integral g(w) L(b(w)) dw,  g = f |cos|, the singular part of the derivative is
+// integral div(g v) L dw. Now for every function psi(w) that is 0 outside of a part of the wall's plane, a lens that stands on the
+// line where it meets the plane of x,
 //   integral div(psi g v) dw = 0,   div(psi g v) = psi div(g v) + g v . grad psi,
 // because psi g is 0 all around the lens: on the line itself directions lie in the plane of x, where the cosine is 0. So any
 // number that does not depend on w, times that, may be subtracted. The number is an estimate L0 of the light that leaves the wall
@@ -34,8 +35,9 @@ typedef struct Corner {
              (i) * (int32_t)(sizeof(CornerRecord) / 4) + (int32_t)(offsetof(CornerRecord, field) / 4) + (k))
 #define CORNER_V3(t, i, field) v3(CORNER_FLOAT(t, i, field, 0), CORNER_FLOAT(t, i, field, 1), CORNER_FLOAT(t, i, field, 2))
 
-// Of vertices at p that rays along d have found.
-static NOINLINE Corner corner_find(const Tracer *t, const Hit *hit, Vec3 d, Mask m) {
+// Of vertices at p that rays along d have found. first: those of the sensor, which slide over surfaces that move: only there do
+// both ends move differently where a mesh meets itself.
+static NOINLINE Corner corner_find(const Tracer *t, const Hit *hit, Vec3 d, bool first, Mask m) {
     Corner c = {.m = m_set(false)};
     Int begin = i_gather(t->job->corner_at, hit->shape), end = i_gather(t->job->corner_at, hit->shape + 1), best = i_set(0);
     Float nearest = f_set(1);
@@ -46,8 +48,11 @@ static NOINLINE Corner corner_find(const Tracer *t, const Hit *hit, Vec3 d, Mask
         Float length = CORNER_FLOAT(t, i, length, 0), at = v3_dot(q, CORNER_V3(t, i, along)), above = v3_dot(q, normal);
         Float room = at * (length - at) * f_safe_rcp(length), apart2 = v3_dot(q, q) - at * at;
         Float ratio = f_safe_sqrt(apart2) * f_safe_rcp(room);
-        Mask take = left & m_gt(room, f_set(0)) & m_lt(ratio, nearest) & m_lt(v3_dot(d, normal), f_set(0)) &
-                    m_lt(f_abs(above), 1e-4f * length);
+        Mask parts = m_set(first) | ~mi_eq(CORNER_INT(t, i, wall), hit->shape);
+        // The wall may be of the same mesh: next to the line its points lie near the viewer's plane, but nearer to its own.
+        Float before = f_abs(v3_dot(q, v3_cross(CORNER_V3(t, i, along), CORNER_V3(t, i, up))));
+        Mask take = left & parts & m_gt(room, f_set(0)) & m_lt(ratio, nearest) & m_lt(v3_dot(d, normal), f_set(0)) &
+                    m_lt(f_abs(above), f_min(1e-4f * length, 0.5f * before));
         nearest = f_select(take, ratio, nearest);
         best = i_select(take, i, best);
         c.m = c.m | take;
@@ -99,7 +104,7 @@ static Corner corner_load(const Tracer *t, const RecordBatch *batch) {
     Mask smooth = m_first_n(batch->count) & m_gt(f_load(r->sw + at), f_set(0));
     smooth = smooth & mi_eq(i_select(smooth, i_load(r->lobe + at), i_set(-1)), i_set(LOBE_SMOOTH));
     Hit hit = {.shape = i_select(smooth, i_load(r->shape + at), i_set(0)), .p = record_v3(r->px, r->py, r->pz, at)};
-    Corner c = corner_find(t, &hit, record_v3(r->dx, r->dy, r->dz, at), smooth);
+    Corner c = corner_find(t, &hit, record_v3(r->dx, r->dy, r->dz, at), batch->bounce == 0, smooth);
     if (m_any(c.m)) {
         corner_pass(&c, hit.p, record_v3(r->wox, r->woy, r->woz, at));
     }

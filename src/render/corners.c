@@ -3,12 +3,14 @@
 
 #include "bsdf/table.h"
 #include "render/blame.h"
+#include "render/boundary.h"
 
-// What the sensor sees of surfaces slides over them where it moves itself.
+// What the sensor sees of surfaces slides over them where it moves itself, and what mirrors and glass show where they do.
 static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
     UNUSED(instance);
-    return r->job.any_camera || r->job.points_at[id] >= 0 || r->job.pose_at[id] >= 0;
+    bool slides = r->job.any_camera || rey_boundary_chained(&r->scene->view);
+    return slides || r->job.points_at[id] >= 0 || r->job.pose_at[id] >= 0;
 }
 
 // Whether what the viewer scatters is 0 at its horizon.

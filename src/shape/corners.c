@@ -12,6 +12,10 @@
 #define CORNER_STEEP 2.0  // of a lens on a wall that is high enough
 #define CORNER_FLAT 1e-2  // height of a wall over its length below which there is none
 
+// Meshes of more triangles are not looked through for corners of their own: most of those are not among the longest, and the light
+// of each triangle's neighbours changes little over it.
+enum { MOST_ITSELF = 64 };
+
 // Of one viewer, the longest ones: it looks at all of them at each of its points.
 enum { MOST_CORNERS = 32 };
 
@@ -97,17 +101,22 @@ static rey_result corners_overlap(void *user, int32_t first, int32_t second) {
     return result == REY_OK ? push_corner(s, body[1], t + 1, body[0], piece[0]->triangle, t, ends) : result;
 }
 
-// Those of a viewer together, the longest first.
+// Those of a viewer together, its own last, the longest first.
 static int compare_corners(const void *a, const void *b) {
     const CornerRecord *x = a, *y = b;
     if (x->viewer != y->viewer) {
         return x->viewer < y->viewer ? -1 : 1;
     }
+    const bool own[2] = {x->wall == x->viewer, y->wall == y->viewer};
+    if (own[0] != own[1]) {
+        return own[0] ? 1 : -1;
+    }
     return x->length != y->length ? (x->length > y->length ? -1 : 1) : memcmp(x, y, sizeof *x);
 }
 
 rey_result rey_corners_find(rey_scene *scene, MeetingMoves *moves, const void *user, Array *corners) {
-    Pieces s = {.scene = scene, .moves = moves, .user = user, .meshes = true, .margin = 1e-5f, .found = corners};
+    Pieces s = {.scene = scene, .moves = moves, .user = user, .itself = MOST_ITSELF, .meshes = true, .margin = 1e-5f,
+                .found = corners};
     rey_result result = rey_pieces_overlap(&s, corners_overlap);
     if (result != REY_OK || corners->count == 0) {
         return result;

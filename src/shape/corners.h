@@ -1,4 +1,5 @@
-// corners.h: inner corners: the lines along which flat surfaces of different bodies touch or pass through each other.
+// corners.h: inner corners: the lines along which flat surfaces touch or pass through each other, those of different bodies and
+// those of one small mesh.
 #pragma once
 
 #include "shape/meetings.h"

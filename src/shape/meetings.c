@@ -344,7 +344,7 @@ static rey_result pieces_overlap(void *user, int32_t first, int32_t second) {
 rey_result rey_meetings_find(rey_scene *scene, const LightBorder *borders, int32_t border_count, MeetingMoves *moves,
                              const void *user, Array *meetings) {
     Array halves = {0};
-    Pieces s = {.scene = scene, .borders = borders, .border_count = border_count, .moves = moves, .user = user, .itself = true,
+    Pieces s = {.scene = scene, .borders = borders, .border_count = border_count, .moves = moves, .user = user, .itself = INT32_MAX,
                 .found = meetings, .halves = &halves};
     rey_result result = rey_pieces_overlap(&s, pieces_overlap);
     result = result == REY_OK ? join_halves(&s) : result;

@@ -172,7 +172,8 @@ static Box box_of_round(const SceneView *view, const Body *body) {
 
 // Whether a body's triangles may meet each other.
 static bool meets_itself(const Pieces *s, const Body *body) {
-    return s->itself && body->shape >= 0 && s->scene->view.shapes[body->shape].kind == SHAPE_MESH;
+    const ShapeRecord *shape = body->shape < 0 ? NULL : s->scene->view.shapes + body->shape;
+    return shape && shape->kind == SHAPE_MESH && shape->triangle_count <= s->itself;
 }
 
 static rey_result add_body(Pieces *s, int32_t shape, int32_t instance, int32_t segment) {

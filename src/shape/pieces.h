@@ -13,7 +13,7 @@ typedef struct Pieces {
     int32_t border_count;
     MeetingMoves *moves;
     const void *user;
-    bool itself;              // bodies overlap themselves, too
+    int32_t itself;           // meshes of at most so many triangles overlap themselves, too
     bool meshes;              // they are the only bodies
     float margin;             // by which boxes are larger than what they hold, over its size
     Array bodies, body_boxes; // of Body, of Box
