@@ -37,7 +37,12 @@ static bool ends_with(const char *name, const char *ending) {
     return n >= m && !strcmp(name + n - m, ending);
 }
 
+static bool is_strand(const rey_param_info *info) { return ends_with(info->name, "control_points"); }
+
 static Geometry geometry_of(const rey_param_info *info) {
+    if (is_strand(info)) { // four points of one are no transform
+        return GEOMETRY_POINTS;
+    }
     if (info->dims == 2 && info->shape[0] == 4 && info->shape[1] == 4) {
         return GEOMETRY_TRANSFORM;
     }
@@ -184,8 +189,8 @@ static rey_result add_motion(rey_context *ctx, const char *spec, const Op *op, c
     bool local = op->id == OP_LOCAL_TRANSLATE;
     if (geometry == GEOMETRY_NONE) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT,
-                        "%s: %s moves positions (N x 3) or transforms (4 x 4), and %s is neither; file=TANGENT.npy gives any "
-                        "direction", spec, op_names[op->id], info->name);
+                        "%s: %s moves positions (N x 3), control_points (N x 4) or transforms (4 x 4), and %s is none of these; "
+                        "file=TANGENT.npy gives any direction", spec, op_names[op->id], info->name);
     }
     if (local && geometry != GEOMETRY_TRANSFORM) {
         return rey_fail(ctx, REY_ERROR_ARGUMENT, "%s: local_translate needs a transform (to_world)", spec);
@@ -203,10 +208,14 @@ static rey_result add_motion(rey_context *ctx, const char *spec, const Op *op, c
                         op_names[op->id]);
     }
     double w = geometry == GEOMETRY_POINTS ? 1 : 0;
-    for (int64_t n = 0; n + 3 <= info->count; n += 3) {
+    const int64_t numbers = is_strand(info) ? 4 : 3; // the fourth is a radius, which grows with the rest
+    for (int64_t n = 0; n + numbers <= info->count; n += numbers) {
         for (int i = 0; i < 3; i++) {
             tangent[n + i] += (float)(L[i][0] * (double)values[n] + L[i][1] * (double)values[n + 1] +
                                       L[i][2] * (double)values[n + 2] + L[i][3] * w);
+        }
+        if (numbers == 4 && op->id == OP_SCALE) {
+            tangent[n + 3] += (float)(op->values[0] * (double)values[n + 3]);
         }
     }
     return REY_OK;

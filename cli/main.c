@@ -13,10 +13,10 @@
     "\nA direction P is NAME[:OP]. Names are listed by 'reynolds params'; a * in NAME stands for any text: for the\n"  \
     "parameters that move nothing, with OP for those that OP fits. OP is one of\n"                                     \
     "  add=V                       every entry moves by theta*V (default add=1); V may list the last dimension\n"      \
-    "  translate=x,y,z             positions or to_world, in the world\n"                                              \
+    "  translate=x,y,z             positions, control_points or to_world, in the world\n"                              \
     "  local_translate=x,y,z       to_world, in the object's own frame\n"                                              \
     "  rotate=ax,ay,az[@cx,cy,cz]  theta in degrees, about an axis through a centre\n"                                 \
-    "  scale=S[@cx,cy,cz]          positions or to_world, about a centre\n"                                            \
+    "  scale=S[@cx,cy,cz]          positions, control_points or to_world, about a centre\n"                            \
     "  file=TANGENT.npy            a tangent of the parameter's size\n"
 
 typedef struct CommandRow {

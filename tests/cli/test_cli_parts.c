@@ -344,6 +344,32 @@ static void motions_of_transforms(void **state) {
     check_motion(f, "camera.to_world:scale=0.5@1,0,2", scaling, e, false);
 }
 
+// Control points move as positions do, also where there are four of them; their radii grow where they are scaled.
+static void motions_of_control_points(void **state) {
+    Fixture strand = *(Fixture *)*state;
+    assert_int_equal(rey_scene_load(strand.ctx, TEST_STRAND, NULL, 0, &strand.scene), REY_OK);
+    const char *const specs[] = {"strand.control_points:translate=1,2,3", "strand.control_points:scale=0.5@1,0,2",
+                                 "strand.control_points:rotate=0,0,1@1,0,0"};
+    const float radian = 3.14159265f / 180;
+    for (int i = 0; i < 3; i++) {
+        Direction d = build(&strand, specs[i], NULL);
+        const float *p = rey_param_values(strand.scene, d.params[0]);
+        for (int k = 0; k < 16; k += 4) {
+            const float expected[3][4] = {{1, 2, 3, 0},
+                                          {0.5f * (p[k] - 1), 0.5f * p[k + 1], 0.5f * (p[k + 2] - 2), 0.5f * p[k + 3]},
+                                          {-radian * p[k + 1], radian * (p[k] - 1), 0, 0}};
+            for (int c = 0; c < 4; c++) {
+                assert_float_equal(d.tangent[k + c], expected[i][c], 1e-6);
+            }
+        }
+        cli_direction_free(strand.ctx, &d);
+    }
+    const char *local = "strand.control_points:local_translate=1,2,3";
+    Direction d;
+    assert_int_equal(cli_direction_build(strand.ctx, strand.scene, &local, 1, &d), REY_ERROR_ARGUMENT);
+    rey_scene_destroy(strand.scene);
+}
+
 static void malformed_directions_are_refused(void **state) {
     Fixture *f = *state;
     static const char *const malformed[] = {"red.reflectance.value:ad=1",
@@ -380,6 +406,7 @@ int main(void) {
         cmocka_unit_test(noise_that_is_shared_is_told),
         cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
+        cmocka_unit_test_setup_teardown(motions_of_control_points, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_transforms, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(malformed_directions_are_refused, open_scene, close_scene),
     };
