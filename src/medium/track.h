@@ -29,9 +29,8 @@ typedef struct Track {
 // Transmittances below this play roulette.
 #define DIM_TRANSMITTANCE 0.2f
 
-// Of padded walks: the optical depth of a whole walk, and the probabilities of real collisions and of others, are at least this
-// much: where the majorant is the extinction itself, another scene's may be less.
-#define PADDED_PASS 0.01f
+// Of padded walks: the optical depth of a whole walk, and the probability of real collisions, are at least this much. (That of
+// others is by the majorants, which must be larger than the extinctions wherever another scene's may be less.)
 #define PADDED_DEPTH 0.5f
 #define PADDED_SHARE 0.05f
 
@@ -304,7 +303,7 @@ static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, 
         Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Spec sigma = walk_extinction(t->scene, t, &w, o, d), counts = spec_mul(importance, weight);
         Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
-        real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1 - (t->padded ? PADDED_PASS : 0)));
+        real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
         Mask collided = met & m_lt(u.y, real_share);
         weight = spec_select(met, collision_weight(weight, sigma, w.majorant, real_share, collided), weight);
         if (t->values == t->scene) {

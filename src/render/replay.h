@@ -13,8 +13,9 @@ typedef struct ReplayWeights {
 // Whether pictures at other values of the parameter can be replayed: nothing moves, and no light sample does.
 bool rey_can_replay(const rey_scene *scene, int param);
 
-// Makes the bounds of a scene's extinctions `room` times as large as they need be (1 or more). Where the bound is the extinction
-// itself, paths never pass by, and other scenes, in which some would, are replayed with little weight on few.
+// Makes the bounds of a scene's extinctions `room` times as large as they need be (1 or more). Where other scenes that are replayed
+// have other extinctions, it takes more than 1: under bounds that are the extinction itself paths never pass by, and what would
+// pass in other scenes is missing.
 void rey_replay_make_room(rey_scene *scene, float room);
 
 // Renders `moved`, a second copy of `scene` whose parameters have other values, along the paths that derivatives of
