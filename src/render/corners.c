@@ -5,12 +5,16 @@
 #include "render/blame.h"
 #include "render/boundary.h"
 
+typedef struct Sliding {
+    const Render *render;
+    bool all;
+} Sliding;
+
 // What the sensor sees of surfaces slides over them where it moves itself, and what mirrors and glass show where they do.
-static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
-    const Render *r = render;
+static bool moves_on_film(const void *sliding, int32_t id, int32_t instance) {
+    const Sliding *s = sliding;
     UNUSED(instance);
-    bool slides = r->job.any_camera || rey_boundary_chained(&r->scene->view);
-    return slides || r->job.points_at[id] >= 0 || r->job.pose_at[id] >= 0;
+    return s->all || s->render->job.points_at[id] >= 0 || s->render->job.pose_at[id] >= 0;
 }
 
 // Whether what the viewer scatters is 0 at its horizon.
@@ -30,7 +34,8 @@ rey_result rey_corners_begin(Render *r) {
     if (!r->job.any_motion || !plain || r->request.asked || !(r->terms & REY_TERM_INTERIOR)) {
         return REY_OK;
     }
-    rey_result result = rey_corners_find(r->scene, moves_on_film, r, &r->corners);
+    const Sliding sliding = {r, r->job.any_camera || rey_boundary_chained(view)};
+    rey_result result = rey_corners_find(r->scene, moves_on_film, &sliding, &r->corners);
     CornerRecord *all = r->corners.data;
     size_t kept = 0;
     for (size_t i = 0; i < r->corners.count && result == REY_OK; i++) {
