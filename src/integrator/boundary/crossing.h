@@ -255,8 +255,7 @@ static void crossing_turns(const Tracer *t, const Sightline lines[2], const Ends
 static Float crossing_wedge(const Ends *e, const Miss *miss, Mask m) {
     const Hit *h = e->hit;
     m = m & mi_eq(h[0].shape, h[1].shape) & mi_eq(h[0].instance, h[1].instance) & ~mi_eq(h[0].prim, h[1].prim);
-    Float cosine = -v3_dot(miss[0].normal, miss[1].normal), sine = v3_length(v3_cross(miss[0].normal, miss[1].normal));
-    return f_zero_unless(m & m_gt(cosine, f_set(0)), f_min(cosine * f_safe_rcp(sine), f_set(MOST_WEDGE)));
+    return f_zero_unless(m, acute_cotangent(v3_neg(miss[0].normal), miss[1].normal));
 }
 
 static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, const Sightline lines[2], Int level, Mask m) {

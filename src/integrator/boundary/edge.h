@@ -298,6 +298,12 @@ KFN Float edge_first_rise(const EdgePoint *e, Vec3 n) {
     return f_select(m_gt(f_abs(rise), f_set(0)), rise, f_zero_unless(~e->open, edge_rise(e, e->side[1], n)));
 }
 
+// The cotangent of the angle between a and b where it is acute, MOST_WEDGE at most; else 0.
+KFN Float acute_cotangent(Vec3 a, Vec3 b) {
+    Float cosine = v3_dot(a, b), sine = v3_length(v3_cross(a, b));
+    return f_zero_unless(m_gt(cosine, f_set(0)), f_min(cosine * f_safe_rcp(sine), f_set(MOST_WEDGE)));
+}
+
 // How far from an edge between two surfaces that meet at an acute angle, by which they part too slowly: rays that start a step
 // (interaction_step) off the one, into the wedge, must start on their own side of the other. 0 elsewhere.
 KFN Float edge_wedge(const EdgePoint *e) {
@@ -306,9 +312,8 @@ KFN Float edge_wedge(const EdgePoint *e) {
         Float run = v3_dot(e->side[i], e->tangent) * f_safe_rcp(v3_dot(e->tangent, e->tangent));
         across[i] = v3_madd(e->side[i], -run, e->tangent);
     }
-    Float cosine = v3_dot(across[0], across[1]), sine = v3_length(v3_cross(across[0], across[1]));
-    Float steps = f_min(cosine * f_safe_rcp(sine), f_set(MOST_WEDGE)) * MEETING_STEPS;
-    return f_zero_unless(~(e->open | e->round | e->meeting) & m_gt(cosine, f_set(0)), steps * interaction_step(e->p));
+    Float steps = acute_cotangent(across[0], across[1]) * MEETING_STEPS;
+    return f_zero_unless(~(e->open | e->round | e->meeting), steps * interaction_step(e->p));
 }
 
 // Whether a surface at an edge lies on the same side as `first`. What rays along d meet edge-on is an outline once, at the edge
