@@ -1,9 +1,11 @@
-// test_io_bmp_hdr.c: Windows bitmaps and Radiance pictures: every sort that is read, and broken ones refused.
+// test_io_bmp_hdr.c: Windows bitmaps and Radiance pictures: every sort that is read, and broken ones refused; names of channels of
+// OpenEXR pictures, and what PFM and NPY say of their numbers.
 #include "io/image.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -241,11 +243,60 @@ static void broken_radiance(void **state) {
     expect_failure(&file, file.count, "0");
 }
 
+// Three channels 1, 2, 3 under names in this order are read as so many, with `first` in the first.
+static void expect_channels(const char *const names[3], int component, int channels, float first) {
+    static const char path[] = "test_io_names.exr";
+    float data[2 * 5 * 3];
+    rey_image image;
+    for (int i = 0; i < COUNT_OF(data); i++) {
+        data[i] = (float)(i % 3 + 1);
+    }
+    assert_int_equal(rey_exr_write_as(ctx, path, data, 5, 2, 3, names, component), REY_OK);
+    assert_int_equal(rey_image_read(ctx, path, &image), REY_OK);
+    assert_int_equal(image.channels, channels);
+    for (int i = 0; i < 2 * 5; i++) {
+        assert_float_equal(image.data[i * channels], first, 0);
+    }
+    rey_image_free(ctx, &image);
+    remove(path);
+}
+
+// Channels that nobody asks for, before the one that is, or in a fast routine of the library's; and other names of colours.
+static void names_of_channels(void **state) {
+    UNUSED(state);
+    static const int components[] = {REY_COMPONENT_FLOAT16, REY_COMPONENT_FLOAT32};
+    for (int i = 0; i < COUNT_OF(components); i++) {
+        expect_channels((const char *const[]){"A", "Y", "Z"}, components[i], 1, 2);
+        expect_channels((const char *const[]){"Y", "u", "v"}, components[i], 1, 1);
+        expect_channels((const char *const[]){"Y", "RY", "BY"}, components[i], 1, 1);
+        expect_channels((const char *const[]){"b", "g", "r"}, components[i], 3, 3);
+        expect_channels((const char *const[]){"d.b", "d.g", "d.r"}, components[i], 3, 3);
+        expect_channels((const char *const[]){"blue", "green", "red"}, components[i], 3, 3);
+    }
+}
+
+static void scales_and_records(void **state) {
+    UNUSED(state);
+    static const char header[] = "{'descr': [('a', '<f4'), ('b', '<f4')], 'fortran_order': False, 'shape': (1, 2), }";
+    const float stored[] = {1, -3, 0.5f, 4}, expected[] = {2.5f, -7.5f, 1.25f, 10};
+    file.count = 0;
+    put(&file, "Pf\n4 1\n-2.5\n", 12);
+    put(&file, stored, sizeof stored);
+    expect_pixels(&file, 4, 1, 1, false, expected);
+    file.count = 0;
+    put(&file, "\x93NUMPY\x01", 8);
+    put_number(&file, sizeof header - 1, 2);
+    put(&file, header, sizeof header - 1);
+    put(&file, stored, sizeof stored);
+    expect_failure(&file, file.count, "C-ordered");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bitmaps_of_24_and_32_bits), cmocka_unit_test(bitmaps_of_16_bits_and_palettes),
         cmocka_unit_test(broken_bitmaps),            cmocka_unit_test(flat_pictures),
         cmocka_unit_test(pictures_in_runs),          cmocka_unit_test(broken_radiance),
+        cmocka_unit_test(names_of_channels),         cmocka_unit_test(scales_and_records),
     };
     return cmocka_run_group_tests(tests, open_context, close_context);
 }

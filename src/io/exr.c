@@ -2,9 +2,11 @@
 #include "io/file.h"
 #include "io/image.h"
 
+#include <ctype.h>
 #include <openexr.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 enum { EXR_MOST_CHANNELS = 256 };
 
@@ -15,6 +17,8 @@ typedef struct Stream {
     const unsigned char *in; // reading
     size_t size;
     bool whole;              // nothing is cut off, although something is wrong
+    float *dropped;          // where channels go that nobody asks for: the core's fast routines take no null for them
+    int64_t dropped_room;
     Array out;               // writing
     char message[256];       // of the library, "" = none yet
 } Stream;
@@ -100,11 +104,13 @@ static const char *base_name(const char *name) {
     return dot ? dot + 1 : name;
 }
 
-// The places of the unlayered channels that are called by three letters; true when all three are there.
-static bool choose_three(const exr_attr_chlist_t *list, const char *letters, ChannelChoice *choice) {
+// The places of the unlayered channels that are called by three letters; true when all three are there, once.
+static bool choose_three(const exr_attr_chlist_t *list, const char *letters, bool lower, ChannelChoice *choice) {
     int found = 0;
     for (int i = 0; i < list->num_channels; i++) {
-        const char *name = list->entries[i].name.str, *at = name[0] && !name[1] ? strchr(letters, name[0]) : NULL;
+        const char *name = list->entries[i].name.str;
+        const int letter = lower ? toupper((unsigned char)name[0]) : name[0];
+        const char *at = name[0] && !name[1] ? strchr(letters, letter) : NULL;
         choice->at[i] = at ? (int)(at - letters) : -1;
         found += at != NULL;
     }
@@ -125,12 +131,12 @@ static void xyz_to_rgb(rey_image *image) {
 }
 
 static ChannelChoice choose_channels(const exr_attr_chlist_t *list) {
-    static const char *const rgb[] = {"R", "G", "B"};
+    static const char *const rgb[] = {"R", "G", "B"}, *const words[] = {"red", "green", "blue"};
     ChannelChoice choice = {0};
-    if (choose_three(list, "RGB", &choice)) {
+    if (choose_three(list, "RGB", false, &choice) || choose_three(list, "RGB", true, &choice)) {
         return choice;
     }
-    if (choose_three(list, "XYZ", &choice)) {
+    if (choose_three(list, "XYZ", false, &choice)) {
         choice.xyz = true;
         return choice;
     }
@@ -141,7 +147,7 @@ static ChannelChoice choose_channels(const exr_attr_chlist_t *list) {
             const char *word = layered ? base_name(name) : name;
             choice.at[i] = -1;
             for (int c = 0; c < 3; c++) {
-                if (strcmp(word, rgb[c]) == 0 && !taken[c]) {
+                if ((strcasecmp(word, rgb[c]) == 0 || strcasecmp(word, words[c]) == 0) && !taken[c]) {
                     choice.at[i] = c;
                     taken[c] = true;
                 }
@@ -170,8 +176,24 @@ static ChannelChoice choose_channels(const exr_attr_chlist_t *list) {
     return choice;
 }
 
+// Sends a channel of a chunk to where nobody looks; false: out of memory.
+static bool drop_channel(Stream *s, exr_coding_channel_info_t *c) {
+    int64_t room = (int64_t)c->width * c->height;
+    if (room > s->dropped_room || !s->dropped) {
+        rey_free(s->ctx, s->dropped);
+        s->dropped = rey_alloc_array(s->ctx, (size_t)room + 1, sizeof *s->dropped);
+        s->dropped_room = room;
+    }
+    c->user_data_type = EXR_PIXEL_FLOAT;
+    c->user_bytes_per_element = 4;
+    c->user_pixel_stride = 4;
+    c->user_line_stride = 4 * c->width;
+    c->decode_to_ptr = (uint8_t *)s->dropped;
+    return s->dropped != NULL;
+}
+
 // Decodes one chunk (scanlines or a tile) into the picture at pixel (x, y).
-static exr_result_t decode_chunk(exr_context_t file, const exr_chunk_info_t *chunk, exr_decode_pipeline_t *pipeline,
+static exr_result_t decode_chunk(Stream *s, exr_context_t file, const exr_chunk_info_t *chunk, exr_decode_pipeline_t *pipeline,
                                  bool fresh, const ChannelChoice *choice, rey_image *image, int64_t x, int64_t y) {
     exr_result_t code = fresh ? exr_decoding_initialize(file, 0, chunk, pipeline)
                               : exr_decoding_update(file, 0, chunk, pipeline);
@@ -180,8 +202,10 @@ static exr_result_t decode_chunk(exr_context_t file, const exr_chunk_info_t *chu
     }
     for (int i = 0; i < pipeline->channel_count; i++) {
         exr_coding_channel_info_t *c = &pipeline->channels[i];
-        c->decode_to_ptr = NULL;
         if (choice->at[i] < 0) {
+            if (!drop_channel(s, c)) {
+                return EXR_ERR_OUT_OF_MEMORY;
+            }
             continue;
         }
         if (c->x_samples != 1 || c->y_samples != 1 || x < 0 || y < 0 || x + c->width > image->width ||
@@ -198,7 +222,7 @@ static exr_result_t decode_chunk(exr_context_t file, const exr_chunk_info_t *chu
     return code == EXR_ERR_SUCCESS ? exr_decoding_run(file, 0, pipeline) : code;
 }
 
-static exr_result_t read_scanlines(exr_context_t file, const exr_attr_box2i_t *window, const ChannelChoice *choice,
+static exr_result_t read_scanlines(Stream *s, exr_context_t file, const exr_attr_box2i_t *window, const ChannelChoice *choice,
                                    rey_image *image) {
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     int32_t lines;
@@ -207,14 +231,14 @@ static exr_result_t read_scanlines(exr_context_t file, const exr_attr_box2i_t *w
         exr_chunk_info_t chunk;
         code = exr_read_scanline_chunk_info(file, 0, (int)y, &chunk);
         if (code == EXR_ERR_SUCCESS) {
-            code = decode_chunk(file, &chunk, &pipeline, y == window->min.y, choice, image, 0, y - window->min.y);
+            code = decode_chunk(s, file, &chunk, &pipeline, y == window->min.y, choice, image, 0, y - window->min.y);
         }
     }
     exr_decoding_destroy(file, &pipeline);
     return code;
 }
 
-static exr_result_t read_tiles(exr_context_t file, const ChannelChoice *choice, rey_image *image) {
+static exr_result_t read_tiles(Stream *s, exr_context_t file, const ChannelChoice *choice, rey_image *image) {
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     int32_t width, height;
     exr_result_t code = exr_get_tile_sizes(file, 0, 0, 0, &width, &height);
@@ -224,7 +248,7 @@ static exr_result_t read_tiles(exr_context_t file, const ChannelChoice *choice, 
             exr_chunk_info_t chunk;
             code = exr_read_tile_chunk_info(file, 0, (int)(x / width), (int)(y / height), 0, 0, &chunk);
             if (code == EXR_ERR_SUCCESS) {
-                code = decode_chunk(file, &chunk, &pipeline, fresh, choice, image, x, y);
+                code = decode_chunk(s, file, &chunk, &pipeline, fresh, choice, image, x, y);
                 fresh = false;
             }
         }
@@ -271,7 +295,7 @@ static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
     if (result != REY_OK) {
         return result;
     }
-    code = storage == EXR_STORAGE_TILED ? read_tiles(file, &choice, out) : read_scanlines(file, &window, &choice, out);
+    code = storage == EXR_STORAGE_TILED ? read_tiles(s, file, &choice, out) : read_scanlines(s, file, &window, &choice, out);
     if (code == EXR_ERR_SUCCESS && choice.xyz) {
         xyz_to_rgb(out);
     }
@@ -293,6 +317,7 @@ rey_result rey_exr_read(rey_context *ctx, const char *name, const unsigned char 
     if (file) {
         exr_finish(&file);
     }
+    rey_free(ctx, stream.dropped);
     return result;
 }
 

@@ -29,6 +29,9 @@ rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char 
     for (int y = 0; y < height && result == REY_OK; y++) { // rows from the bottom
         memcpy(out->data + (size_t)(height - 1 - y) * row / sizeof(float), bytes + at + (size_t)y * row, row);
     }
+    for (int64_t i = 0; i < (int64_t)width * height * channels && result == REY_OK && scale != -1; i++) {
+        out->data[i] *= -scale;
+    }
     return result;
 }
 

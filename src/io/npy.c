@@ -30,8 +30,8 @@ static bool parse_header(const char *text, rey_npy *out) {
     if (!descr || !order || !list) {
         return false;
     }
-    const char *number = strpbrk(descr + 7, "<>=|"), *falsehood = strstr(order, "False");
-    out->item = !number ? 0 : strncmp(number, "<f4'", 4) == 0 ? 4 : strncmp(number, "<f8'", 4) == 0 ? 8 : 0;
+    const char *number = descr + 7 + strspn(descr + 7, ": "), *falsehood = strstr(order, "False");
+    out->item = strncmp(number, "'<f4'", 5) == 0 ? 4 : strncmp(number, "'<f8'", 5) == 0 ? 8 : 0;
     list = strchr(list, '(');
     return out->item && list && falsehood && falsehood - order <= 24 && parse_shape(list + 1, out);
 }
