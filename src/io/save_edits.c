@@ -7,6 +7,7 @@
 #include "io/vol.h"
 #include "shape/sdfgrid.h"
 #include "shape/shape.h"
+#include "shape/update.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -383,6 +384,22 @@ static rey_result list_attributes(Writer *w, int32_t shape, rey_mesh *mesh) {
     return REY_OK;
 }
 
+// Normals that follow vertices which have moved since the scene was last brought up to date. To be freed; null: there are none.
+static rey_result find_moved_normals(Writer *w, const ShapeRecord *shape, float **normals) {
+    const SceneView *view = &w->scene->view;
+    bool moved = false;
+    for (size_t i = 0; i < w->scene->params.count; i++) {
+        const Param *p = &ARRAY_AT(w->scene->params, Param, i);
+        moved |= p->geometry == shape - view->shapes && p->theta == shape->positions && p->version != p->built;
+    }
+    *normals = NULL;
+    if (!moved || !(shape->flags & SHAPE_SMOOTH_NORMALS)) {
+        return REY_OK;
+    }
+    *normals = rey_alloc_array(w->ctx, (size_t)shape->vertex_count, 3 * sizeof **normals);
+    return *normals ? rey_shape_normals(w->scene, shape, *normals) : REY_ERROR_MEMORY;
+}
+
 // A mesh's own vertices, which are in the world already. Flat shading is said in the XML.
 static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     const SceneView *view = &w->scene->view;
@@ -401,10 +418,12 @@ static rey_result write_mesh(Writer *w, int depth, const ShapeRecord *shape) {
     mesh.normals = shape->normals >= 0 ? view->theta + shape->normals : NULL;
     mesh.uvs = shape->uvs >= 0 ? view->theta + shape->uvs : NULL;
     mesh.faces = (uint32_t *)view->triangles + 3 * (size_t)shape->triangle;
-    rey_result result = list_attributes(w, (int32_t)(shape - view->shapes), &mesh);
-    if (result == REY_OK) {
-        result = rey_mesh_write_ply(w->ctx, path, &mesh);
-    }
+    float *moved;
+    rey_result result = find_moved_normals(w, shape, &moved);
+    mesh.normals = moved ? moved : mesh.normals;
+    result = result == REY_OK ? list_attributes(w, (int32_t)(shape - view->shapes), &mesh) : result;
+    result = result == REY_OK ? rey_mesh_write_ply(w->ctx, path, &mesh) : result;
+    rey_free(w->ctx, moved);
     rey_free(w->ctx, mesh.attributes);
     return result;
 }

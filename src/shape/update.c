@@ -100,9 +100,8 @@ static void mesh_areas(SceneView *view, ShapeRecord *shape) {
     }
 }
 
-// Vertex normals that were computed when the mesh was loaded follow its vertices.
-static rey_result smooth_normals(rey_scene *scene, const ShapeRecord *shape) {
-    SceneView *view = &scene->view;
+rey_result rey_shape_normals(const rey_scene *scene, const ShapeRecord *shape, float *normals) {
+    const SceneView *view = &scene->view;
     MeshView mesh = {view->theta + shape->positions, (const uint32_t *)view->triangles + 3 * (size_t)shape->triangle,
                      (const uint32_t *)view->welded + shape->welded, shape->vertex_count, shape->triangle_count};
     double *sums = rey_alloc_array(scene->ctx, 3 * (size_t)shape->vertex_count, sizeof *sums);
@@ -110,7 +109,7 @@ static rey_result smooth_normals(rey_scene *scene, const ShapeRecord *shape) {
         return REY_ERROR_MEMORY;
     }
     rey_normal_sums(&mesh, sums);
-    rey_normals_from_sums(&mesh, sums, view->theta + shape->normals);
+    rey_normals_from_sums(&mesh, sums, normals);
     rey_free(scene->ctx, sums);
     return REY_OK;
 }
@@ -161,7 +160,7 @@ rey_result rey_shape_update(rey_scene *scene, int32_t id) {
         result = mesh_follow(scene, shape);
     }
     if (result == REY_OK && (shape->flags & SHAPE_SMOOTH_NORMALS) && (scene->dirty_shapes[id] & SHAPE_DIRTY_VERTICES)) {
-        result = smooth_normals(scene, shape);
+        result = rey_shape_normals(scene, shape, scene->view.theta + shape->normals);
     }
     if (result == REY_OK) {
         mesh_areas(&scene->view, shape);

@@ -287,6 +287,38 @@ static void expect_values(Fixture *f, const char *path, int define_count) {
     assert_memory_equal(before, after, sizeof before);
 }
 
+// Normals that follow vertices are written as these have them, whether or not the scene was rendered since they moved.
+static void moved_vertices_take_their_normals_along(void **state) {
+    static float values[1 << 16], before[NUMBERS], after[NUMBERS];
+    Fixture *f = *state;
+    char copy[128];
+    snprintf(copy, sizeof copy, "%s/copy.xml", f->folder);
+    rey_scene *scene = load(f, RENDER_DIR "/moving_dome.xml", 1);
+    rey_param_info info;
+    int param = rey_param_find(scene, "moving_dome.positions");
+    assert_int_equal(rey_param_get_info(scene, param, &info), REY_OK);
+    assert_true(info.count <= COUNT_OF(values));
+    for (int64_t k = 0; k < info.count; k++) {
+        values[k] = rey_param_values(scene, param)[k] * (k % 3 ? 1 : 1.4f);
+    }
+    for (int rendered = 0; rendered < 2; rendered++) {
+        assert_int_equal(rey_param_set(scene, param, values, info.count), REY_OK);
+        if (rendered) {
+            render(f, scene, before);
+        }
+        if (rey_scene_save(scene, copy)) {
+            fail_msg("%s", rey_error(f->ctx));
+        }
+        render(f, scene, before);
+        rey_scene *again = load(f, copy, 0);
+        render(f, again, after);
+        rey_scene_destroy(again);
+        assert_memory_equal(before, after, sizeof before);
+        values[0] += 0.01f;
+    }
+    rey_scene_destroy(scene);
+}
+
 static void values_load_by_name(void **state) {
     Fixture *f = *state;
     expect_values(f, RENDER_DIR "/materials.xml", 2);
@@ -379,7 +411,7 @@ int main(void) {
         cmocka_unit_test(mesh_flags_come_back),
         cmocka_unit_test(changes_come_back), cmocka_unit_test(impossible_shapes_are_refused),
         cmocka_unit_test(files_are_written_once),
-        cmocka_unit_test(values_load_by_name),
+        cmocka_unit_test(moved_vertices_take_their_normals_along), cmocka_unit_test(values_load_by_name),
         cmocka_unit_test(wrong_values_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
