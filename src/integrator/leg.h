@@ -39,12 +39,15 @@ typedef struct LegDef {
     bool emission, coherent;
 } LegDef;
 
-// What the ray meets first, `solid` the first surface that lets no light pass.
+// What the ray meets first, `solid` the first surface that lets no light pass, however far away.
 KFN Hit leg_meet(const SceneView *scene, const Ray *ray, const Hit *solid, Mask m) {
     Ray before = *ray;
-    before.tmax = f_select(mi_lt(i_set(-1), solid->shape), v3_dot(v3_sub(solid->p, ray->o), ray->d), ray->tmax);
-    Hit open = trace_open(scene, &before, m);
-    return hit_select(mi_lt(i_set(-1), open.shape), &open, solid);
+    Float distance = v3_dot(v3_sub(solid->p, ray->o), ray->d);
+    Mask near = mi_lt(i_set(-1), solid->shape) & m_le(distance, ray->tmax);
+    before.tmax = f_select(near, distance, ray->tmax);
+    Hit open = trace_open(scene, &before, m), none = *solid;
+    none.shape = i_select(near, solid->shape, i_set(-1));
+    return hit_select(mi_lt(i_set(-1), open.shape), &open, &none);
 }
 
 // The ray's media begin at `from`, a point of its line; what it passes before that is nothing. weight: of the paths that go so.
@@ -58,14 +61,15 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
     const bool apart = t->scene->open_apart && !t->scene->borders_touch;
     Hit solid = HIT_NONE;
     if (apart && m_any(m)) {
-        solid = trace_kinds(t->scene, &ray, MEET_SOLID, m, def.coherent);
+        Ray endless = {ray.o, ray.d, f_set(INFINITY)};
+        solid = trace_kinds(t->scene, &endless, MEET_SOLID, m, def.coherent);
         t->job->rays += m_count(m);
     }
     for (int i = 0; i <= def.most && m_any(left); i++) {
         Hit hit = apart ? leg_meet(t->scene, &ray, &solid, left) : trace_media(t, &ray, left, def.coherent && i == 0);
         t->job->rays += apart ? 0 : m_count(left);
         Mask found = left & mi_lt(i_set(-1), hit.shape), collides = m_set(false);
-        Float far = f_select(found, v3_dot(v3_sub(hit.p, from), ray.d), f_set(INFINITY));
+        Float far = f_select(found, v3_dot(v3_sub(hit.p, from), ray.d), v3_dot(v3_sub(ray.o, from), ray.d) + ray.tmax);
         Mask begun = m_gt(far, f_set(0));
         for (Mask rest = left & begun & mi_lt(i_set(-1), medium), mine; m_any(rest); rest = rest & ~mine) {
             int32_t id = i_lane(medium, m_first(rest));
@@ -91,6 +95,7 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
         Mask met = found & ~collides & ~passed;
         medium = i_select(begun, behind, medium);
         from = v3_select(passed & begun, hit.p, from);
+        ray.tmax = f_select(passed, f_set(INFINITY), ray.tmax); // the sensor's far plane ends its rays before the first surface
         leg.near = hit_select(met, &hit, &leg.near);
         leg.m = leg.m | met | collides;
         left = passed;

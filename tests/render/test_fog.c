@@ -274,6 +274,36 @@ static void test_score(void **state) {
     room_close(room);
 }
 
+// The sensor's far plane ends its rays in a medium, too, in pictures and derivatives alike: the glow is j (1 - exp(-s d)) / s.
+static void test_far_plane(void **state) {
+    UNUSED(state);
+    static const char *const ends[] = {"1.7", "100"};
+    const double thickness[] = {1.2, 2.5}, s = 0.8, glow = 0.5;
+    for (int i = 0; i < COUNT_OF(ends); i++) {
+        const rey_define define = {"far", ends[i]};
+        const double seen = exp(-s * thickness[i]), sum = (1 - seen) / s;
+        const double exact[] = {glow * sum, glow * (thickness[i] * seen - sum)};
+        static float image[NUMBERS];
+        Room room;
+        assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
+        ok(room, rey_scene_load(room.ctx, RENDER_DIR "/fog_far_plane.xml", &define, 1, &room.scene));
+        int scale = rey_param_find(room.scene, "glow.scale");
+        for (int k = 0; k < 2; k++) {
+            const float along = 1;
+            double mean = 0;
+            rey_render_def def = def_make(256, 1, 1);
+            ok(room, k ? rey_jvp(room.scene, &def, (rey_selection){&scale, 1}, &along, image, NULL, NULL)
+                       : rey_render(room.scene, &def, image, NULL));
+            for (int n = 0; n < NUMBERS; n++) {
+                mean += (double)image[n] / NUMBERS;
+            }
+            printf("far plane %s: %.5f, expected %.5f\n", ends[i], mean, exact[k]);
+            assert_true(fabs(mean - exact[k]) < 0.01 / sqrt(sample_share()) * fabs(exact[k]));
+        }
+        room_close(room);
+    }
+}
+
 static void test_refusals(void **state) {
     UNUSED(state);
     const rey_define particles[MOST_DEFINES] = {{"integrator", "ptracer"}};
@@ -304,6 +334,7 @@ int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_far_plane),
                                        cmocka_unit_test(test_score),         cmocka_unit_test(test_flakes),
                                        cmocka_unit_test(test_growing_flakes), cmocka_unit_test(test_turned_flakes),
                                        cmocka_unit_test(test_borders),
