@@ -199,11 +199,9 @@ static rey_result boundary_check(const Render *r, int term) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         bool hides = rey_boundary_hides(view, shape);
-        bool tube = shape->kind == SHAPE_BSPLINE && (term == REY_TERM_SPECULAR || r->job.rides);
-        if (hides && (tube || shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
+        if (hides && (shape->kind == SHAPE_SDFGRID || shape->kind == SHAPE_LINEAR)) {
             rey_name_shape(scene, (int32_t)i, name);
-            return refuse(scene, term, tube ? "what mirrors, glass and participating media show of the outlines of curves"
-                                            : "the outlines of polylines and grids of distances", name);
+            return refuse(scene, term, "the outlines of polylines and grids of distances", name);
         }
         if (hides && shape->kind == SHAPE_BSPLINE && rey_tube_folds(view, (int32_t)i)) {
             rey_name_shape(scene, (int32_t)i, name);

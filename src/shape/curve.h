@@ -100,6 +100,15 @@ KFN CurvePoint bspline_foot(const SceneView *scene, Hit *hit, Vec3 x, int steps)
     }
 }
 
+// Whether a tube ends with a segment, behind it or before it: the next one does not begin a control point further.
+KFN Mask tube_ends(const SceneView *scene, const Hit *hit, bool behind) {
+    Int first = SHAPE_FIELD(scene, hit->shape, segment), next = hit->prim + (behind ? 1 : -1);
+    Mask there = mi_lt(i_set(-1), next) & mi_lt(next, SHAPE_FIELD(scene, hit->shape, segment_count));
+    Int own = i_gather(scene->segments, first + hit->prim);
+    Int other = i_gather(scene->segments, first + i_select(there, next, hit->prim));
+    return ~(there & mi_eq(other, own + (behind ? 1 : -1)));
+}
+
 // Where nothing is known of the foot.
 enum { BSPLINE_SEARCH = 6 };
 

@@ -114,6 +114,50 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
     return out;
 }
 
+// Next to the tube where it is closest to the ray, from the foot of `own` on, or to the circle at which it ends.
+static NOINLINE Miss miss_tube(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
+    enum { APPROACHES = 6 };
+    Hit h = *own, entry = *own;
+    CurvePoint c = bspline_point(scene, own);
+    Vec3 x = own->p, away = v3_sub(x, c.c);
+    Float t = v3_dot(v3_sub(x, o), d), slope = f_set(0), bend = f_set(1);
+    for (int i = 0; i < APPROACHES; i++) { // to where |x - c| - r is least: tube_step has its derivatives
+        x = v3_madd(o, t, d);
+        c = bspline_foot(scene, &h, x, 2);
+        away = v3_sub(x, c.c);
+        slope = f_safe_rcp(v3_dot(c.c1, c.c1) - v3_dot(away, c.c2));
+        Float along = v3_dot(d, c.c1), u1 = along * slope;
+        bend = 1.0f - along * u1 - c.r1 * c.r1 * u1 * u1;
+        t = t - f_clamp((v3_dot(away, d) - c.r * c.r1 * u1) * f_safe_rcp(bend), -c.r, c.r);
+    }
+    Float distance = v3_length(away), across = 1.0f - distance * f_safe_rcp(c.r);
+    Vec3 e = v3_scale(away, f_safe_rcp(distance));
+    Miss out = {.edge = h, .inside = across};
+    out.edge.u = f_clamp(h.u, f_set(0), f_set(1));
+    out.edge.p = v3_madd(c.c, c.r, e);
+    out.n = v3_normalize(v3_madd(e, -c.r1 * slope, c.c1));
+    // Where the ray enters, and how far from an end that is.
+    Float half = f_safe_sqrt((c.r * c.r - distance * distance) * f_safe_rcp(bend));
+    bspline_foot(scene, &entry, v3_madd(o, t - half, d), 2);
+    Mask low = tube_ends(scene, own, false), high = tube_ends(scene, own, true);
+    Float speed = v3_length(c.c1) * f_safe_rcp(c.r), begin = entry.u * speed, rest = (1.0f - entry.u) * speed;
+    Float along = f_min(f_select(low, begin, f_set(INFINITY)), f_select(high, rest, f_set(INFINITY)));
+    Mask rim = m_ge(across, f_set(0)) & m_lt(along, across);
+    if (m_any(rim)) {
+        Hit end = *own;
+        end.u = f_select(low & (m_lt(begin, rest) | ~high), f_set(0), f_set(1));
+        CurvePoint p = bspline_point(scene, &end);
+        Vec3 axis = v3_normalize(p.c1), q = v3_sub(p.c, o);
+        q = v3_sub(v3_scale(d, v3_dot(q, axis) * f_safe_rcp(v3_dot(d, axis))), q);
+        Vec3 radial = v3_normalize(v3_madd(q, -v3_dot(q, axis), axis));
+        out.edge.u = f_select(rim, end.u, out.edge.u);
+        out.edge.p = v3_select(rim, v3_madd(p.c, p.r, radial), out.edge.p);
+        out.n = v3_select(rim, v3_normalize(v3_cross(d, v3_cross(axis, radial))), out.n);
+        out.inside = f_select(rim, along, out.inside);
+    }
+    return out;
+}
+
 static Miss miss_round(const SceneView *scene, int32_t kind, const Hit *own, Vec3 o, Vec3 d) {
     switch (kind) {
     case SHAPE_SPHERE:
@@ -122,6 +166,8 @@ static Miss miss_round(const SceneView *scene, int32_t kind, const Hit *own, Vec
         return miss_disk(scene, own, o, d);
     case SHAPE_CYLINDER:
         return miss_cylinder(scene, own, o, d);
+    case SHAPE_BSPLINE:
+        return miss_tube(scene, own, o, d);
     default:
         return (Miss){.edge = *own, .n = v3_zero(), .inside = f_set(1)};
     }

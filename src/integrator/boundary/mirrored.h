@@ -102,10 +102,30 @@ static Mask triangles_join(const SceneView *scene, const Hit *a, const Hit *b, M
     return m & mi_lt(i_set(1), shared) & m_gt(dot, f_set(0)) & m_ge(dot * dot, flat);
 }
 
+// The part of a segment by which hits on one piece of a tube differ at most: it may hide itself where it bends.
+#define TUBE_APART 0.05f
+
+// Lanes of m in which hits on one shape, a tube, lie next to each other.
+static Mask tubes_join(const SceneView *scene, const Hit *a, const Hit *b, Mask m) {
+    Hit h = *a;
+    h.shape = i_select(m, a->shape, i_set(i_lane(a->shape, m_first(m))));
+    h.prim = i_select(m, a->prim, i_set(0));
+    Int behind = b->prim - a->prim;
+    Mask next = mi_eq(behind, i_set(1)) & ~tube_ends(scene, &h, true);
+    Mask before = mi_eq(behind, i_set(-1)) & ~tube_ends(scene, &h, false);
+    Mask near = m_lt(f_abs(b->u + f_from_i(behind) - a->u), f_set(TUBE_APART));
+    return m & near & (mi_eq(behind, i_set(0)) | next | before);
+}
+
 // Lanes of m in which two lines meet one triangle, or two between which nothing jumps.
 static Mask lines_share(const SceneView *scene, const Hit *a, const Hit *b, Mask m) {
     m = m & mi_eq(a->shape, b->shape) & mi_eq(a->instance, b->instance);
-    Mask one = mi_eq(a->prim, b->prim), apart = m & ~one & mi_lt(i_set(-1), a->shape);
+    Mask one = mi_eq(a->prim, b->prim), found = m & mi_lt(i_set(-1), a->shape), apart = found & ~one;
+    Mask tube = found & mi_eq(SHAPE_FIELD(scene, i_select(found, a->shape, i_set(0)), kind), i_set(SHAPE_BSPLINE));
+    if (m_any(tube)) {
+        one = (one & ~tube) | tubes_join(scene, a, b, tube);
+        apart = apart & ~tube;
+    }
     if (!m_any(apart) || scene->attributes_count > 0) { // which may be of faces
         return m & one;
     }
