@@ -4,6 +4,7 @@
 #include "integrator/lamps.h"
 #include "integrator/path_adj.h"
 #include "integrator/path_replay.h"
+#include "integrator/within.h"
 #include "math/colour.h"
 
 // Adds one sample of n channels to the film of the tile.
@@ -59,6 +60,27 @@ static void film_add_powers(Tracer *t, const FilterTable *filter, int32_t slot, 
 // Whether a sample brings nothing for having met only surfaces that let it pass (SceneView.drops). Derivatives: kept.h.
 KFN bool film_drops(const Tracer *t, int32_t i) { return t->scene->drops && !t->derivative && t->ws.coverage[i] <= 0; }
 
+// Adds what samples carry across the film (beacon_view.h).
+static void film_add_drift(Tracer *t, const FilterTable *filter, int32_t slot) {
+    const PathJob *job = t->job;
+    int32_t x0 = job->x - job->border, y0 = job->y - job->border;
+    int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
+    float w[2][MAX_FOOTPRINT], by[2][MAX_FOOTPRINT];
+    const float x = (float)t->ws.film_x[slot], y = (float)t->ws.film_y[slot];
+    int32_t first_x, first_y;
+    int32_t nx = film_weights(t->sensor, filter, x, x0, x0 + width, &first_x, w[0]);
+    int32_t ny = film_weights(t->sensor, filter, y, y0, y0 + height, &first_y, w[1]);
+    film_slopes(filter, x, first_x, nx, by[0]);
+    film_slopes(filter, y, first_y, ny, by[1]);
+    for (int32_t j = 0; j < ny; j++) {
+        double *row = job->film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * SPEC_N;
+        for (int32_t k = 0; k < nx * SPEC_N; k++) {
+            row[k] += (double)(by[0][k / SPEC_N] * w[1][j]) * (double)t->ws.adjoint_x[k % SPEC_N][slot] +
+                      (double)(w[0][k / SPEC_N] * by[1][j]) * (double)t->ws.adjoint_y[k % SPEC_N][slot];
+        }
+    }
+}
+
 // Adds the chunk's radiances (or derivatives) to the tile's film.
 static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
     PathJob *job = t->job;
@@ -73,6 +95,9 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
             continue;
         }
         film_add(t, filter, i, l, SPEC_N, job->film);
+        if (t->pinhole && t->sensor->filter != FILM_BOX) {
+            film_add_drift(t, filter, i);
+        }
         if (job->coverage) {
             film_add_coverage(t, filter, i);
         }
@@ -105,6 +130,17 @@ static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count)
     }
 }
 
+static void film_splat_slope(Tracer *t, const FilterTable *filter, int32_t i) {
+    float slope[2][SPEC_N] = {{0}};
+    if (t->sensor->filter != FILM_BOX) {
+        film_worth_slope(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i], slope);
+    }
+    for (int c = 0; c < SPEC_N; c++) {
+        t->ws.adjoint_x[c][i] = slope[0][c];
+        t->ws.adjoint_y[c][i] = slope[1][c];
+    }
+}
+
 // The adjoint of film_splat: what each slot's radiance is worth.
 static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) {
     const int32_t margin = filter_margin(t->sensor), stride = t->sensor->width + 2 * margin;
@@ -114,6 +150,9 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
                    t->ws.pixel[i] % stride - margin, t->ws.pixel[i] / stride - margin, delta);
         for (int c = 0; c < SPEC_N; c++) {
             t->ws.adjoint[c][i] = delta[c];
+        }
+        if (t->pinhole) {
+            film_splat_slope(t, filter, i);
         }
     }
 }
@@ -169,6 +208,10 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         }
         for (int c = 0; c < SPEC_N; c++) {
             memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
+            if (t->pinhole && t->job->mode == MODE_FORWARD) {
+                memset(t->ws.adjoint_x[c], 0, (size_t)count * sizeof(real));
+                memset(t->ws.adjoint_y[c], 0, (size_t)count * sizeof(real));
+            }
         }
         if (t->job->moved) {
             sweep_moved(t, count);
@@ -208,6 +251,14 @@ void KNAME(rey_kernel_run)(PathJob *job) {
     int64_t total = (int64_t)job->width * job->height * job->spp;
     t.most = t.ws.chunk;
     lamps_find(&t);
+    if (job->lamp_medium) {
+        lights_within(&t, job->lamp_medium);
+    }
+    Pinhole pinhole;
+    if (job->rides && job->beacons && (job->any_camera || job->any_places)) {
+        pinhole = pinhole_make(t.scene, t.sensor);
+        t.pinhole = &pinhole;
+    }
     for (int64_t first = 0, count; first < total && (!job->go_on || job->go_on(job->user)); first += count) {
         count = total - first < t.most ? total - first : t.most;
         run_chunk(&t, &filter, first, (int32_t)count, begin);

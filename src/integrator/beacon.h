@@ -1,34 +1,33 @@
-// beacon.h: collisions beside lights at a point, where surfaces move in media. What such a collision scatters of the light goes
-// with one over the square of their distance r. If it rode along with the vertex before it (ride.h), that would change with one
-// over the cube, whose integral has no limit; if it stood still, so would what goes with its distance s to that vertex. So this
-// part of what leaves it is parted smoothly into chi of it, whose collision stands still, as a point of a surface at rest does
-// (path_move.h), and 1 - chi, which rides:
+// beacon.h: collisions beside lights at a point, where surfaces, lights or sensors move in media. What such a collision scatters of
+// the light goes with one over the square of their distance r. If it rode along with the vertex before it (ride.h), that would
+// change with one over the cube, whose integral has no limit; if it stayed with the light, so would what goes with its distance s
+// to that vertex. So this part of what leaves it is parted smoothly into chi of it, whose collision moves as the light does, like
+// a point of a surface (path_move.h), and 1 - chi, which rides:
 //   chi = (1 - r^2 / R^2)^2 s^2 / (r^2 + s^2)   within the ball of radius R around the light, 0 outside;
-// each part is differentiated with its share. The balls are such (render/beacons.h) that nothing but even media lies in them.
-// Sensors' rays do not move there, so that all of what they meet first stands still anyway.
+// each part is differentiated with its share. The balls are such (render/beacons.c) that nothing but even media lies in them.
+// Collisions that the sensor sees: beacon_view.h.
 #pragma once
 
 #include "integrator/stages.h"
 
-// The balls of the lights of m; lanes without one have the radius 0.
+// Numbers of the lights' balls, of which there are some; -1: of lanes that are not in m, and of lights without one.
+KFN Int beacon_number(const Tracer *t, Int light, Mask m) {
+    return i_select(m, i_gather(t->job->beacon_of, i_select(m, light, i_set(0))), i_set(-1));
+}
+#define BEACON_FIELD(t, number, field)                                                                                 \
+    f_gather(&(t)->job->beacons[0].field, i_max(number, i_set(0)) * (int32_t)(sizeof(Beacon) / sizeof(float)))
+
+// The radii of the balls of the lights of m; lanes without one have the radius 0.
 KFN Float beacon_radius(const Tracer *t, Int light, Mask m) {
     if (!t->job->beacons) {
         return f_set(0);
     }
-    Int at = i_select(m, i_gather(t->job->beacon_of, i_select(m, light, i_set(0))), i_set(-1));
-    Float radius = f_gather(&t->job->beacons[0].radius, i_max(at, i_set(0)) * (int32_t)(sizeof(Beacon) / sizeof(float)));
-    return f_zero_unless(mi_lt(i_set(-1), at), radius);
+    Int number = beacon_number(t, light, m);
+    return f_zero_unless(mi_lt(i_set(-1), number), BEACON_FIELD(t, number, radius));
 }
 
-// Whether a medium is the same everywhere, as far as volumes go.
-KFN bool medium_is_even(const SceneView *scene, int32_t id) {
-    const MediumNode *medium = scene->media + id;
-    const int32_t volumes[] = {medium->sigma_t, medium->albedo, medium->sigma_s, medium->sigma_a};
-    bool even = medium->flakes < 0;
-    for (int i = 0; i < COUNT_OF(volumes); i++) {
-        even = even && (volumes[i] < 0 || scene->volumes[volumes[i]].kind == VOLUME_CONSTANT);
-    }
-    return even;
+KFN Vec3 beacon_place(const Tracer *t, Int number) {
+    return v3(BEACON_FIELD(t, number, x), BEACON_FIELD(t, number, y), BEACON_FIELD(t, number, z));
 }
 
 // chi, and its derivatives with respect to r and s.

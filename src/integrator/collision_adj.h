@@ -1,7 +1,7 @@
 // collision_adj.h: the adjoint of vertices in media. What leaves a collision is
 //   albedo (sum_lights p Le T w_l + p w_s L_next),
-// p the phase function; the extinction is in the flight's weight. Where surfaces move, it rides (ride.h) or stands still in part
-// (beacon.h).
+// p the phase function; the extinction is in the flight's weight. Where surfaces move, it rides (ride.h), or moves with a light in
+// part (beacon.h).
 #pragma once
 
 #include "integrator/walk_adj.h"
@@ -18,23 +18,32 @@ typedef struct CollisionSweep {
     Vec3 light_d, wo;
     Hit hit;
     Collision at;
-    BeaconShare still;                   // of the light sample
-    Float before;                        // distance to the vertex before it
-    Spec extinction;                     // where that counts: of lanes that stand still in part
+    BeaconFlow flow;                     // of the light sample
+    Spec extinction;                     // where that counts: of lanes that move with their light in part
     Mask ahead;                          // lanes whose next vertex does; and what that leaves
     Spec attached;
 } CollisionSweep;
 
-// What of the light sample stands still, and of what was found onwards (beacon.h).
-static NOINLINE void collision_still(Tracer *t, const RecordBatch *batch, Int slot, CollisionSweep *s) {
+// What of the light sample moves with its light, and of what was found onwards (beacon.h).
+static NOINLINE void collision_flow(Tracer *t, const RecordBatch *batch, Int slot, CollisionSweep *s) {
     const Records *r = &t->ws.records;
     s->ahead = s->scattered & mi_eq(i_gather(t->ws.next, slot), i_set(NEXT_STILL));
     s->attached = spec_zero_unless(s->ahead, spec_scale(spec_gather(t->ws.attached, slot), f_load(r->sw + batch->first)));
-    s->before = f_load(r->u + batch->first);
-    Mask m = s->connected & ~records_first(t, batch, s->m) & m_set(medium_is_even(t->scene, batch->group));
-    Float radius = beacon_radius(t, s->light, m);
-    s->still = beacon_share(radius, s->light_distance, s->before, m & m_gt(radius, f_set(0)));
-    if (m_any(m_gt(s->still.chi, f_set(0)))) {
+    Float before = f_load(r->u + batch->first); // distance of the vertex before it
+    Mask m = s->connected & m_set(medium_is_even(t->scene, batch->group)), first = records_first(t, batch, m);
+    s->flow = (BeaconFlow){f_set(0), f_set(0), v3_zero(), v3_zero(), v3_zero(), first};
+    if (t->pinhole && m_any(first)) {
+        s->flow = beacon_view(t, s->light, slot, s->hit.p, first);
+    }
+    Float radius = beacon_radius(t, s->light, m & ~first);
+    BeaconShare near = beacon_share(radius, s->light_distance, before, m & ~first & m_gt(radius, f_set(0)));
+    // Vertices per volume are as one over the square of `before`.
+    Float along = near.by_vertex - 2.0f * near.chi * f_safe_rcp(before);
+    Vec3 slope = v3_madd(v3_scale(s->at.wi, -along), -near.by_light, s->light_d);
+    s->flow.share = f_select(first, s->flow.share, near.chi);
+    s->flow.rcp = f_select(first, s->flow.rcp, f_safe_rcp(before));
+    s->flow.slope = v3_select(first, s->flow.slope, v3_select(m_gt(near.chi, f_set(0)), slope, v3_zero()));
+    if (m_any(m_gt(s->flow.share, f_set(0)))) {
         Track track = track_of(t, batch->group);
         s->extinction = medium_extinction(t->scene, &track, s->hit.p, v3_neg(s->at.wi));
     }
@@ -65,46 +74,70 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     s.transmittance = p->transmittance;
     s.lit = spec_mul(s.light_value, spec_mul(s.unshadowed, s.transmittance));
     if (t->job->rides && t->job->beacons) {
-        collision_still(t, batch, slot, &s);
+        collision_flow(t, batch, slot, &s);
     }
     return s;
 }
 
-// What the light sample's contribution asks of the positions of the collision and of the vertex before it where a part of it stands
-// still, beside what that would ask of a collision that rides, which is left with its share in *ride. dwi: the adjoint of the
-// direction back. As the still part's segment r = s w changes, its solid angle, transmittance and the values at its ends do
-// (path_move.h), and so does chi with either distance.
-static Vec3 still_adj(const CollisionSweep *s, Spec lit, Vec3 dwi, Vec3 *ride) {
-    const BeaconShare *still = &s->still;
-    Mask m = s->connected & m_gt(still->chi, f_set(0));
-    Vec3 w = v3_neg(s->at.wi);
+// What the flow asks of the motion of the light beyond that of the ray, beside what is on the way of either: of a contribution
+// `lit` of the light sample, by which dwi is the adjoint of the direction back, and ride that of the collision's position.
+static NOINLINE Vec3 flow_adj(const Tracer *t, const CollisionSweep *s, Int slot, Spec lit, Vec3 dwi, Vec3 ride) {
+    const BeaconFlow *flow = &s->flow;
     Spec worth = spec_scale(spec_mul(lit, s->at.albedo), s->light_phase);
-    Float c = spec_dot(worth, spec_set(f_set(1))), rcp = f_safe_rcp(s->before);
-    Float along = still->chi * (2.0f * c * rcp + spec_dot(worth, s->extinction)) - c * still->by_vertex;
-    Vec3 across = v3_madd(dwi, -v3_dot(w, dwi), w);
-    *ride = v3_select(m, v3_scale(*ride, 1.0f - still->chi), *ride);
-    Vec3 d = v3_madd(v3_scale(w, along), still->chi * rcp, across);
-    return v3_select(m, v3_madd(d, c * still->by_light, s->light_d), v3_zero());
+    Vec3 w = v3_neg(s->at.wi), across = v3_madd(dwi, -v3_dot(w, dwi), w);
+    Vec3 d = v3_madd(v3_madd(ride, -flow->rcp, across), -spec_dot(worth, s->extinction), w);
+    d = v3_madd(v3_scale(d, flow->share), spec_sum(worth), flow->slope);
+    if (t->job->mode == MODE_REVERSE && t->pinhole) { // in forward mode: flow_drift
+        Spec brought = spec_scale(spec_mul(spec_mul(s->beta, s->lit), s->at.albedo), s->light_phase * flow->share);
+        d = v3_madd(d, spec_dot(brought, spec_gather(t->ws.adjoint_x, slot)), flow->film_x);
+        d = v3_madd(d, spec_dot(brought, spec_gather(t->ws.adjoint_y, slot)), flow->film_y);
+    }
+    return v3_select(s->connected & m_gt(flow->share, f_set(0)), d, v3_zero());
 }
 
-// What the part of the radiance onwards that stands still asks of the collision's position.
-static Vec3 still_onward_adj(const Tracer *t, const CollisionSweep *s, Spec delta, Int slot, int channel, const Sink *sink) {
+// Forward mode: what the flow carries across the film.
+static NOINLINE void flow_drift(const Tracer *t, const CollisionSweep *s, Int slot, int channel, Sink *sink, Mask m) {
+    const BeaconFlow *flow = &s->flow;
+    m = m & s->connected & flow->first & m_gt(flow->share, f_set(0));
+    if (t->job->mode != MODE_FORWARD || t->sensor->filter == FILM_BOX || !m_any(m)) {
+        return;
+    }
+    Float brought = s->beta.c[channel] * s->lit.c[channel] * s->at.albedo.c[channel] * s->light_phase * flow->share;
+    const Vec3 along[2] = {flow->film_x, flow->film_y};
+    real *out[2] = {t->ws.adjoint_x[channel], t->ws.adjoint_y[channel]};
+    for (int i = 0; i < 2; i++) {
+        beacon_flow_adj(t, s->light, slot, v3_scale(along[i], brought), flow->first, sink, m);
+        f_scatter_add(out[i], slot, sink_taken(sink), m);
+    }
+}
+
+// What the part of the radiance onwards that moves with a light asks of the collision's position.
+static Vec3 still_onward_adj(const Tracer *t, const CollisionSweep *s, Spec delta, Int slot, int channel, Sink *sink) {
     Sink quiet = *sink; // parameters have had their share
     quiet.texture_at = t->job->none;
     quiet.point = NULL;
     Vec3 dwi = v3_zero(), dwo = v3_zero();
     Spec onward = spec_mul(spec_mul(delta, s->beta), s->attached);
     phase_adj(&s->at.call, s->at.wi, s->wo, spec_dot(onward, s->at.albedo), &quiet, s->ahead, &dwi, &dwo);
-    return still_move_adj(t, slot, channel, s->hit.p, s->wo, dwo, s->ahead);
+    return still_move_adj(t, slot, channel, still_turn(t, slot, s->hit.p), s->wo, dwo, m_set(false), sink, s->ahead);
 }
 
-// g: the ray that the collision ended; null unless it glides.
-static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int32_t live, Spec delta, Glide *g, Sink *sink) {
+// What the light sample of a flow asks, `pull`, of its light and of the ray; the sensor's part has its own place.
+static void flow_finish(const Tracer *t, const CollisionSweep *s, Int slot, Vec3 pull, Glide *g, Sink *sink) {
+    Mask m = s->connected & m_gt(s->flow.share, f_set(0));
+    beacon_flow_adj(t, s->light, slot, pull, s->flow.first, sink, m);
+    glide_add(g, s->hit.p, v3_neg(pull), m & ~s->flow.first);
+}
+
+// g: the ray that the collision ended; null unless it glides. Returns what flow_adj does.
+static NOINLINE Vec3 collision_adj(const Tracer *t, const CollisionSweep *s, Int slot, int32_t live, Spec delta, Glide *g,
+                                   Sink *sink) {
     const SceneView *scene = t->scene;
     Spec worth = spec_mul(delta, s->beta);
     Spec lit = spec_zero_unless(s->connected, spec_mul(worth, s->lit)), onward = spec_mul(worth, s->onward);
     LightMove move = light_move_zero();
-    Vec3 dwi = v3_zero(), dwo = v3_zero(), slope = v3_zero(), light_slope = v3_zero(); // the latter: where volumes are looked up
+    Vec3 dwi = v3_zero(), dwo = v3_zero(), pull = v3_zero();
+    Vec3 slope = v3_zero(), light_slope = v3_zero(); // the latter: where volumes are looked up
     const bool moves = sink->any_places || g;
     if (t->job->live_lights && m_any(s->connected)) {
         Spec dl = spec_mul(spec_mul(worth, spec_mul(s->unshadowed, s->transmittance)), s->at.albedo);
@@ -128,8 +161,7 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
         phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
         lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
         if (t->job->rides && t->job->beacons) {
-            Vec3 still = still_adj(s, lit, dwi, &move.ref);
-            glide_add(g, s->hit.p, still, s->connected);
+            pull = flow_adj(t, s, slot, lit, dwi, move.ref);
         }
     }
     if (live & LIVE_ALBEDO) {
@@ -151,12 +183,13 @@ static NOINLINE void collision_adj(const Tracer *t, const CollisionSweep *s, int
         glide_add(g, s->hit.p, v3_add(slope, v3_select(s->connected, move.ref, v3_zero())), s->m);
         g->turn = v3_select(s->m, v3_neg(dwi), v3_zero());
     }
+    return pull;
 }
 
 static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, bool live_passing,
                             Passage *p, Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
-    const bool glides = t->job->glides || t->job->rides;
+    const bool glides = t->job->glides || t->job->rides, flows = t->job->rides && t->job->beacons;
     if (!(live & (LIVE_ALBEDO | LIVE_PHASE)) && !t->job->live_lights && !live_passing && !glides) {
         return;
     }
@@ -173,34 +206,39 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         if (glides) {
             g.position = rows_gather(&t->ws.drag, c, slot);
         }
-        collision_adj(t, &s, live, delta, glides ? &g : NULL, sink);
+        Vec3 pull = collision_adj(t, &s, slot, live, delta, glides ? &g : NULL, sink);
         if (live_passing) {
             // L += albedo p Le w_l T
             Spec dt = spec_mul(spec_mul(delta, s.beta), spec_mul(s.unshadowed, spec_mul(s.at.albedo, s.light_value)));
             dt = spec_scale(dt, s.light_phase);
             Connection to = {s.hit.p, s.light_d, s.light_distance, s.light, s.light_prim, s.connected};
             Vec3 dp = connection_passage_adj(t, &p->walk, s.transmittance, dt, slot, batch->bounce, &to, true, sink);
-            g.position = v3_madd(g.position, 1.0f - s.still.chi, dp);
+            g.position = v3_add(g.position, dp);
+            pull = flows ? v3_madd(pull, s.flow.share, dp) : pull;
         }
         if (m_any(s.ahead)) {
             v3_acc(&g.position, still_onward_adj(t, &s, delta, slot, c, sink));
+        }
+        if (flows) {
+            flow_finish(t, &s, slot, pull, &g, sink);
         }
         if (t->job->rides) {
             const Carried first = {g.position, g.turn};
             first_ride_adj(t, batch, slot, s.hit.p, &first, sink, finite);
         }
         forward_flush(t, sink, slot, c, s.m);
-        if (glides) {
-            g.turn = v3_select(m_gt(s.still.chi, f_set(0)), v3_zero(), g.turn); // is in what it asks for already
-            glide_store(t, &g, c, slot, finite);
-        }
-        if (t->job->rides && t->job->beacons) {
+        if (flows) {
+            flow_drift(t, &s, slot, c, sink, finite);
+            g.turn = v3_select(m_gt(s.flow.share, f_set(0)), v3_zero(), g.turn); // is in what it asks for already
             rows_scatter(&t->ws.pull, c, slot, v3_zero(), s.m);
+        }
+        if (glides) {
+            glide_store(t, &g, c, slot, finite);
         }
     }
     if (t->job->rides) {
-        Spec lit = spec_mul(spec_scale(s.lit, s.light_phase * s.still.chi), s.at.albedo);
-        ride_collision(t, slot, s.hit.p, spec_zero_unless(s.connected, lit), s.m);
+        Spec lit = spec_mul(spec_scale(s.lit, s.light_phase * s.flow.share), s.at.albedo);
+        ride_collision(t, slot, s.hit.p, spec_zero_unless(s.connected & m_set(flows), lit), s.light, s.m);
     } else if (glides) {
         glide_refer(t, slot, s.hit.p, finite);
     }

@@ -2,7 +2,7 @@
 // that follows moves with the point where the camera's ray collides, by o' + s d' at the distance s along it: collisions are fixed
 // in space no longer, and next to a vertex nothing moves differently than it does. Along a ray whose point at x moves by v(x), what
 // is looked up in a volume f changes by grad f . v, and borders of media are crossed at dx = -n . v / n . d (border.h).
-// Where surfaces scatter, cameras move as surfaces do (ride.h). NOT differentiated: lights at a point within a medium.
+// Where surfaces scatter, or lights at a point lie within media, cameras move as surfaces do (ride.h).
 #pragma once
 
 #include "integrator/sweep.h"

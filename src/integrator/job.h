@@ -21,9 +21,10 @@ static inline bool mode_records(int32_t mode) {
 enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
 enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8, LIVE_BORDER = 16 };
 
-// A ball around a light at a point (beacon.h).
+// A ball around a light at a point (beacon.h), and how far around it on the film nothing hides what is seen of the ball [pixels];
+// 0 where the light itself is hidden, or neither it nor the sensor moves (beacon_view.h).
 typedef struct Beacon {
-    float x, y, z, radius;
+    float x, y, z, radius, reach;
     int32_t light;
 } Beacon;
 
@@ -59,7 +60,9 @@ typedef struct PathJob {
     bool rides;                   // surfaces move in media, and collisions with them (ride.h)
     const Beacon *beacons;        // null: lights at a point within media are not known beside what moves
     int32_t beacon_count;
+    int32_t seen_x, seen_y, seen_width, seen_height; // what of the film is sampled, in pixels (beacon_view.h)
     const int32_t *beacon_of;     // by emitter: its beacon, -1 = none
+    int32_t *lamp_medium;         // not null: by emitter, filled with the medium that it lies in, -1 = none, before all else
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none

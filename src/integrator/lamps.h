@@ -7,6 +7,9 @@
 
 enum { MOST_LAMPS_TRIED = 64 }; // lights that it is asked of in which medium they lie
 
+// The direction in which it is asked.
+KFN Vec3 lamp_way(void) { return v3_normalize(v3(f_set(0.37f), f_set(0.21f), f_set(0.9f))); }
+
 // Puts a light of a medium behind those of the same one and before those of others.
 static void lamp_keep(Tracer *t, const real p[3], int32_t medium) {
     int32_t at = t->lamp_count++;
@@ -38,8 +41,7 @@ static void lamps_find(Tracer *t) {
             places[0][i] = places[1][i] = places[2][i] = 0;
         }
         Vec3 o = v3(f_load(places[0] + k), f_load(places[1] + k), f_load(places[2] + k));
-        Vec3 d = v3_normalize(v3(f_set(0.37f), f_set(0.21f), f_set(0.9f)));
-        Int medium = medium_around(t, o, d, m_first_n(n - k));
+        Int medium = medium_around(t, o, lamp_way(), m_first_n(n - k));
         for (int32_t i = 0; i < LANES && k + i < n && t->lamp_count < MOST_FOCI; i++) {
             const int32_t id = i_lane(medium, i);
             const real p[3] = {places[0][k + i], places[1][k + i], places[2][k + i]};

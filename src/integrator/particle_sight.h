@@ -60,22 +60,30 @@ typedef struct Sight {
     Mask valid;
 } Sight;
 
-// Through a point on the lens, of which only thin lenses have more than one: slopes of the film's directions and of the
-// rays differ by a constant, so that both kinds see the same density.
-KFN Sight camera_look(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
-    Vec3 origin = p->origin, on_lens = v3_zero();
-    real rcp_focus = 0;
-    if (s->kind == SENSOR_THINLENS) {
-        real radius = (real)scene->theta[s->lens];
-        Vec2 disk = warp_uniform_disk(u);
-        rcp_focus = 1 / (real)scene->theta[s->lens + 1];
-        on_lens = v3(radius * disk.x, radius * disk.y, f_set(0));
-        origin = pose_point(scene, s, on_lens);
+// Where rays begin, but for the near plane: at a point of the lens, of which only thin lenses have more than one.
+KFN Vec3 pinhole_origin(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec2 u, Vec3 *on_lens) {
+    *on_lens = v3_zero();
+    if (s->kind != SENSOR_THINLENS) {
+        return p->origin;
     }
-    Vec3 q = v3_sub(point, origin), local;
+    real radius = (real)scene->theta[s->lens];
+    Vec2 disk = warp_uniform_disk(u);
+    *on_lens = v3(radius * disk.x, radius * disk.y, f_set(0));
+    return pose_point(scene, s, *on_lens);
+}
+
+// A vector from there in the sensor's space.
+KFN Vec3 pinhole_local(const Pinhole *p, Vec3 q) {
     const real *r = p->to_local;
-    local = v3(r[0] * q.x + r[1] * q.y + r[2] * q.z, r[3] * q.x + r[4] * q.y + r[5] * q.z,
-               r[6] * q.x + r[7] * q.y + r[8] * q.z);
+    return v3(r[0] * q.x + r[1] * q.y + r[2] * q.z, r[3] * q.x + r[4] * q.y + r[5] * q.z,
+              r[6] * q.x + r[7] * q.y + r[8] * q.z);
+}
+
+// Slopes of the film's directions and of the rays from a point of a lens differ by a constant, so that both kinds of sensor see
+// the same density.
+KFN Sight camera_look(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
+    Vec3 on_lens, q = v3_sub(point, pinhole_origin(p, scene, s, u, &on_lens)), local = pinhole_local(p, q);
+    const real rcp_focus = s->kind == SENSOR_THINLENS ? 1 / (real)scene->theta[s->lens + 1] : 0;
     Mask inside = m_ge(local.z, f_set(s->near_clip)) & m_le(local.z, f_set(s->far_clip));
     Float z = f_select(inside, local.z, f_set(1)), rcp = 1.0f / (p->parallel ? f_set(1) : z);
     Float distance2 = v3_dot(q, q), distance = f_sqrt(distance2);
@@ -96,6 +104,27 @@ KFN Sight camera_look(const Pinhole *p, const SceneView *scene, const SensorReco
     }
     e.valid = inside;
     return e;
+}
+
+// How where a point is seen changes as it moves: gradients of x and y, and of the density's logarithm.
+typedef struct SightSlope {
+    Vec3 x, y, density;
+} SightSlope;
+
+static NOINLINE SightSlope camera_slope(const Pinhole *p, const SceneView *scene, const SensorRecord *s, Vec3 point, Vec2 u) {
+    Vec3 on_lens, q = v3_sub(point, pinhole_origin(p, scene, s, u, &on_lens)), local = pinhole_local(p, q), row[3];
+    for (int i = 0; i < 3; i++) {
+        row[i] = v3(f_set(p->to_local[3 * i]), f_set(p->to_local[3 * i + 1]), f_set(p->to_local[3 * i + 2]));
+    }
+    const real per_x = (real)-0.5 * (real)s->width / p->tangent, per_y = (real)-0.5 * (real)s->height * p->aspect / p->tangent;
+    if (p->parallel) {
+        return (SightSlope){v3_scale(row[0], f_set(per_x)), v3_scale(row[1], f_set(per_y)), v3_zero()};
+    }
+    // (x, y) = (local.x, local.y) / z, and density = length / z^3
+    Float rcp = f_safe_rcp(local.z);
+    return (SightSlope){v3_scale(v3_madd(row[0], -local.x * rcp, row[2]), per_x * rcp),
+                        v3_scale(v3_madd(row[1], -local.y * rcp, row[2]), per_y * rcp),
+                        v3_madd(v3_scale(q, f_safe_rcp(v3_dot(q, q))), -3.0f * rcp, row[2])};
 }
 
 // By a point on the sensor's shape, whose area the pixels divide: E = integral of L cos.

@@ -236,6 +236,34 @@ static void glides_end(Tracer *t, int32_t count, Sink *sink) {
     }
 }
 
+// What lies between the sensor and collisions that move with their lights (beacon_view.h).
+static void flows_end(Tracer *t, int32_t count, Sink *sink) {
+    for (int32_t k = 0; k < count; k += LANES) {
+        Int slot = i_select(m_first_n(count - k), i_iota() + k, i_set(k));
+        Mask m = m_first_n(count - k) & mi_eq(i_gather(t->ws.next, slot), i_set(NEXT_STILL));
+        if (!m_any(m)) {
+            continue;
+        }
+        Vec2 lens = slot_lens(t, slot);
+        Vec3 d = sensor_ray(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), lens).ray.d;
+        Float rcp = beacon_turn(t, LOAD_V3(t->ws, next_px, next_py, next_pz, slot), lens);
+        for (int c = 0; c < drives(t); c++) {
+            still_move_adj(t, slot, c, rcp, d, v3_zero(), m, sink, m);
+            forward_flush(t, sink, slot, c, m);
+        }
+    }
+}
+
+// What is left of the sensor's rays.
+static void first_rays_end(Tracer *t, int32_t count, Sink *sink) {
+    if (t->job->glides) {
+        glides_end(t, count, sink);
+    }
+    if (t->pinhole) {
+        flows_end(t, count, sink);
+    }
+}
+
 // The borders that a batch of surface vertices lies on. Whether these are no vertices of the path: where surfaces move, segments
 // are attached through surfaces of the kind null.
 static bool passed_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Mask m, Sink *sink) {
@@ -303,8 +331,6 @@ static void path_backward(Tracer *t, int32_t count) {
         }
         ride_end_sweep(t, batch, l, finite, &sink);
     }
-    if (job->glides) {
-        glides_end(t, count, &sink);
-    }
+    first_rays_end(t, count, &sink);
     job->faces |= sink.faces;
 }

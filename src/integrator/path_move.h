@@ -14,7 +14,7 @@
 // transmittances of shadow rays.
 #pragma once
 
-#include "integrator/carried.h"
+#include "integrator/beacon_view.h"
 #include "shape/move.h"
 
 // Adjoint of one vertex: of wi (local), of the direction onwards, of the light sample, shading frame, surface and uv; and
@@ -180,16 +180,22 @@ static Vec3 connection_move_adj(const Tracer *t, const SurfaceSweep *s, const Ve
     return dp;
 }
 
-// The segment along w to a collision that stands still in part (beacon.h), of the lanes of m: returns the adjoint of where it
-// begins by its direction there, whose adjoint is dw, and by points of the way, which move with that end. What else it asks for,
-// collisions know.
-static NOINLINE Vec3 still_move_adj(const Tracer *t, Int slot, int channel, Vec3 from, Vec3 w, Vec3 dw, Mask m) {
+// One over the distance of the next vertex.
+KFN Float still_turn(const Tracer *t, Int slot, Vec3 from) {
+    return f_safe_rcp(v3_length(v3_sub(LOAD_V3(t->ws, next_px, next_py, next_pz, slot), from)));
+}
+
+// The segment along w to a collision that moves with its light in part (beacon.h), of the lanes of m, rcp one over its length:
+// returns the adjoint of where it begins by its direction there, whose adjoint is dw, and by points of the way, which move with
+// both ends. What else it asks for, collisions know. seen: from the sensor.
+static NOINLINE Vec3 still_move_adj(const Tracer *t, Int slot, int channel, Float rcp, Vec3 w, Vec3 dw, Mask seen, Sink *sink,
+                                    Mask m) {
     const Workspace *ws = &t->ws;
-    Vec3 q = LOAD_V3(*ws, next_px, next_py, next_pz, slot);
-    Float rcp = f_safe_rcp(v3_length(v3_sub(q, from)));
     Vec3 pull = rows_gather(&ws->pull, channel, slot), turn = rows_gather(&ws->turn, channel, slot);
     Vec3 dr = v3_madd(pull, rcp, v3_add(turn, dw));
-    return v3_select(m, v3_neg(v3_madd(dr, -v3_dot(w, dr), w)), v3_zero());
+    dr = v3_select(m, v3_madd(dr, -v3_dot(w, dr), w), v3_zero());
+    beacon_flow_adj(t, i_gather(ws->next_light, slot), slot, dr, seen, sink, m);
+    return v3_neg(dr);
 }
 
 // The segment to the next vertex, which the sweep has just left: returns the adjoint of this vertex's position.
@@ -202,7 +208,8 @@ static Vec3 onward_move_adj(const Tracer *t, const SurfaceSweep *s, const Vertex
     Vec3 drag = v3_select(spread, rows_gather(&ws->drag, channel, s->slot), v3_zero());
     Mask still = spread & mi_eq(next, i_set(NEXT_STILL));
     if (m_any(still)) {
-        v3_acc(&drag, still_move_adj(t, s->slot, channel, s->si.p, s->wo_d, v->wo, still));
+        v3_acc(&drag, still_move_adj(t, s->slot, channel, still_turn(t, s->slot, s->si.p), s->wo_d, v->wo, m_set(false), sink,
+                                     still));
     }
     if (!m_any(attached)) {
         return drag;

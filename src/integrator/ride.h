@@ -1,8 +1,9 @@
-// ride.h: surfaces that move in media. What is scattered from one point to the next changes with one over the cube of their
-// distance if they move differently, whose integral has no limit. So directions into media and distances to collisions are fixed,
-// as behind a camera that moves (glide.h): a collision rides along with the surface that its ray left, and so does every later
-// one, up to where the ray meets a surface. There the path slides over it; it goes on as from any surface. Segments that lead from
-// surface to surface are attached at both ends (path_move.h), with what the medium between them lets through.
+// ride.h: surfaces that move in media, and lights at a point and cameras there (beacon.h). What is scattered from one point to the
+// next changes with one over the cube of their distance if they move differently, whose integral has no limit. So directions into
+// media and distances to collisions are fixed, as behind a camera that moves (glide.h): a collision rides along with the surface
+// that its ray left, and so does every later one, up to where the ray meets a surface. There the path slides over it; it goes on as
+// from any surface. Segments that lead from surface to surface are attached at both ends (path_move.h), with what the medium
+// between them lets through.
 // With dx the motion of a ray's end along it, of a medium with extinction s that ends there,
 //   dL = dx T (s a S + j) - dD s L,                                                                            (border.h, 1)
 // dD = dx where the end slides, and along segments that are attached the change of their length. S is found by the path's probe.
@@ -49,10 +50,12 @@ static NOINLINE Vec3 connection_end_adj(const Tracer *t, const Connection *c, co
 }
 
 // A collision has no point of a surface to which the vertex before it could be attached: it rides with that one. But for the part
-// `still` of what leaves it (beacon.h).
-KFN void ride_collision(Tracer *t, Int slot, Vec3 p, Spec still, Mask m) {
+// `still` of what leaves it, which moves with its light (beacon.h).
+KFN void ride_collision(Tracer *t, Int slot, Vec3 p, Spec still, Int light, Mask m) {
+    Mask beside = m & m_gt(spec_max(still), f_set(0));
     next_point(t, slot, p, m);
-    i_scatter(t->ws.next, slot, i_set(NEXT_STILL), m & m_gt(spec_max(still), f_set(0)));
+    i_scatter(t->ws.next, slot, i_set(NEXT_STILL), beside);
+    i_scatter(t->ws.next_light, slot, light, beside);
     spec_scatter(t->ws.attached, slot, spec_zero_unless(m, still), m);
 }
 

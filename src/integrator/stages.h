@@ -57,6 +57,7 @@ typedef struct Tracer {
     bool shadows_later;      // shadow rays are traced by the sweep, which must know what they pass
     real *nudge[2];          // per slot, what is added to the uv of those; or null
     const Vec3 *focus;       // where particles are to be seen from (track.h), or null
+    const struct Pinhole *pinhole; // where lights at a point within media move, or the sensor (beacon_view.h); or null
     Vec3 lamps[MOST_FOCI];   // lights at a point within homogeneous media, near which paths look for collisions (lamps.h)
     int32_t lamp_medium[MOST_FOCI], lamp_count;
     bool overflow;           // the chunk's vertices did not fit the records

@@ -76,7 +76,7 @@ typedef struct ChannelRows {
 } ChannelRows;
 
 // What stands for the record of the next vertex where rays meet no surface: nothing, a point of the ray, such as a collision, or a
-// collision a part of which stands still (beacon.h).
+// collision a part of which moves with a light (beacon.h).
 enum { NEXT_NONE = -1, NEXT_POINT = -2, NEXT_STILL = -3 };
 
 typedef struct Workspace {
@@ -92,13 +92,15 @@ typedef struct Workspace {
     // per slot: radiance (or derivative), film's adjoint, radiance of the path behind a vertex, film position, alpha, pixel
     // and sample numbers
     SpecRows radiance, adjoint, suffix;
+    // how the adjoint changes across the film; in forward mode, what is carried across it (beacon_view.h)
+    SpecRows adjoint_x, adjoint_y;
     SAMPLE_FLOATS(DECLARE_FLOAT)
     int32_t *pixel, *sample;
     // per slot, of the vertex that the sweep has just left (path_move.h): its record (or NEXT_), position and normal, what
     // leaves it but does not go on along a chain, and per channel the adjoint of the direction back to the vertex before it,
     // and where the vertex slides, of the ray's position there and of its direction; where it is attached in media, of points on
-    // the way to it, and of these times their distance beyond it (ride_add)
-    int32_t *next;
+    // the way to it, and of these times their distance beyond it (ride_add); and beside which light it moves (beacon.h)
+    int32_t *next, *next_light;
     MOVE_FLOATS(DECLARE_FLOAT)
     SpecRows attached;
     ChannelRows back, drag, turn, pull;
@@ -134,8 +136,11 @@ typedef struct Workspace {
 // What the sweep keeps per slot of what moves, from `at` on; returns where it ends.
 static inline size_t workspace_layout_moves(Workspace *ws, char *block, size_t at, size_t n) {
     CARVE(ws->next, n)
+    CARVE(ws->next_light, n)
     MOVE_FLOATS(CARVE_SAMPLE)
     CARVE_SPEC(ws->attached, n)
+    CARVE_SPEC(ws->adjoint_x, n)
+    CARVE_SPEC(ws->adjoint_y, n)
     ChannelRows *rows[] = {&ws->back, &ws->drag, &ws->turn, &ws->pull};
     for (int i = 0; i < 4; i++) {
         CARVE_SPEC(rows[i]->x, n)

@@ -1,4 +1,5 @@
-// beacons.c: how far around lights at a point nothing lies: no surface, and no border of a medium.
+// beacons.c: how far around lights at a point nothing lies, no surface and no border of a medium, and how far around the sensor's
+// view of them nothing hides it.
 #include "render/beacons.h"
 
 #include "bsdf/ends.h"
@@ -6,6 +7,10 @@
 #include "render/blame.h"
 #include "render/light_borders.h"
 #include "render/live.h"
+#include "render/projection.h"
+#include "render/terms.h"
+#include "render/update.h"
+#include "sensor/kinds.h"
 #include "shape/affine.h"
 
 #include <math.h>
@@ -136,11 +141,13 @@ static double shape_distance(const SceneView *view, const ShapeRecord *shape, co
     return local_distance(shape->kind, q) * worth * worth_of_instance;
 }
 
-static double free_radius(const SceneView *view, const double p[3]) {
+// The least of those of all shapes; solid: that do not let everything pass.
+static double surface_distance(const SceneView *view, const double p[3], bool solid) {
     double least = HUGE_VAL;
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
-        if (shape->flags & SHAPE_UNSEEN) {
+        bool passes = shape->emitter < 0 && rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        if ((shape->flags & SHAPE_UNSEEN) || (solid && passes)) {
             continue;
         }
         if (shape->collection < 0) {
@@ -153,6 +160,11 @@ static double free_radius(const SceneView *view, const double p[3]) {
             }
         }
     }
+    return least;
+}
+
+static double free_radius(const SceneView *view, const double p[3]) {
+    double least = surface_distance(view, p, false);
     for (int64_t i = 0; i < view->media_count; i++) {
         const VolumeNode *v = view->volumes + view->media[i].sigma_t;
         double q[3], worth;
@@ -179,6 +191,129 @@ static bool turns(const SceneView *view) {
     return found;
 }
 
+// ---- what the sensor sees of them --------------------------------------------------------------------------------
+
+// A ray of the sensor's to a light. Others that begin in the lens and end around the light stay within `width` times their distance
+// from the sensor, or of parallel rays, within `width`.
+typedef struct SightLine {
+    double from[3], d[3], length, lens;
+    bool parallel;
+} SightLine;
+
+static bool line_to(const Render *r, const double p[3], SightLine *line) {
+    const float *m = r->scene->view.theta + r->plan.sensor->to_world;
+    const Projection projection = rey_projection_of(&r->scene->view, &r->plan);
+    double local[3];
+    rey_to_sensor(&projection, p, local);
+    *line = (SightLine){.lens = projection.lens / 3, .parallel = projection.parallel};
+    for (int k = 0; k < 3; k++) {
+        double axis = (double)m[4 * k + 2] * local[2];
+        line->d[k] = line->parallel ? axis : p[k] - (double)m[4 * k + 3];
+        line->from[k] = p[k] - line->d[k];
+    }
+    line->length = sqrt(dot(line->d, line->d));
+    return local[2] > projection.near;
+}
+
+enum { MOST_SIGHT_PARTS = 64 }; // the line is halved, and halves of halves, breadth last
+static const double sight_slack = 0.8, least_sight = 1e-5;
+
+// How wide nothing hides what the sensor sees along the line, less what was not looked at closely.
+static double line_width(const SceneView *view, const SightLine *line) {
+    double parts[MOST_SIGHT_PARTS][2] = {{0, 1}}, best = HUGE_VAL;
+    for (int n = 1; n > 0 && best > least_sight;) {
+        n--;
+        const double low = parts[n][0], high = parts[n][1], middle = 0.5 * (low + high);
+        double p[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = line->from[k] + middle * line->d[k];
+        }
+        const double distance = surface_distance(view, p, true) - line->lens, half = 0.5 * (high - low) * line->length;
+        best = fmin(best, distance / (line->parallel ? 1 : middle * line->length));
+        bool clear = (distance - half) / (line->parallel ? 1 : high * line->length) > sight_slack * best;
+        if (!clear && n + 2 <= MOST_SIGHT_PARTS && half > 1e-7 * line->length) {
+            parts[n][0] = middle, parts[n++][1] = high;
+            parts[n][0] = low, parts[n++][1] = middle;
+        }
+    }
+    return best > least_sight ? sight_slack * best : 0;
+}
+
+// How far around a light on the film nothing hides what is seen of it [pixels]; 0 where it is hidden, and below 0 where that is not
+// known.
+static double film_reach(const Render *r, const double p[3]) {
+    const SceneView *view = &r->scene->view;
+    const float *m = view->theta + r->plan.sensor->to_world;
+    const Projection projection = rey_projection_of(view, &r->plan);
+    SightLine line;
+    if (!line_to(r, p, &line)) {
+        return 0;
+    }
+    double width = line_width(view, &line), pixel = 0;
+    for (int k = 0; k < 2; k++) {
+        double axis = sqrt((double)(m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k]));
+        pixel = fmax(pixel, (line.parallel ? axis : 1) / fabs(k ? projection.scale_y : projection.scale_x));
+    }
+    return width > 0 || line.lens <= 0 ? fmin(width / (sqrt(2) * pixel), 1e6) : -1;
+}
+
+static double distance_to_sensor(const Render *r, const double p[3]) {
+    const float *m = r->scene->view.theta + r->plan.sensor->to_world;
+    return hypot(hypot(p[0] - (double)m[3], p[1] - (double)m[7]), p[2] - (double)m[11]);
+}
+
+// Whether the motion of a light counts beyond that of the sensor.
+static bool light_is_shifted(const Render *r, int64_t light) {
+    bool moves = r->job.any_camera;
+    for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
+        moves |= r->job.place_at[MAX_EMITTER_SLOTS * light + k] >= 0;
+    }
+    return moves;
+}
+
+// Whether what a light lights changes as something moves.
+static bool lights_what_moves(const Render *r, int64_t light) {
+    return r->job.any_motion || r->job.glides || light_is_shifted(r, light);
+}
+
+// Asks a kernel in which media lights at a point lie.
+static rey_result find_lamps(Render *r) {
+    rey_context *ctx = r->scene->ctx;
+    const SceneView *view = &r->scene->view;
+    const Backend *backend = rey_backend_cpu(ctx->def.lanes);
+    size_t others = (size_t)(view->groups_count + view->media_count + 3) * sizeof(int32_t);
+    void *workspace = rey_alloc(ctx, backend->workspace_bytes(MODE_PRIMAL) + others);
+    r->lamp_medium = rey_alloc_array(ctx, (size_t)view->emitters_count + 1, sizeof *r->lamp_medium);
+    rey_result result = workspace && r->lamp_medium ? rey_scene_update(r->scene) : REY_ERROR_MEMORY;
+    if (result == REY_OK) {
+        PathJob job = {.scene = view, .sensor = r->job.sensor, .mode = MODE_PRIMAL, .workspace = workspace,
+                       .lamp_medium = r->lamp_medium};
+        backend->run(&job);
+    }
+    rey_free(ctx, workspace);
+    return result;
+}
+
+rey_result rey_lights_ride(Render *r) {
+    const SceneView *view = &r->scene->view;
+    bool beside = false;
+    for (int64_t i = 0; i < view->emitters_count && view->has_media; i++) {
+        int32_t at[3];
+        beside |= emitter_place(view->emitters + i, at) && lights_what_moves(r, i);
+    }
+    rey_result result = beside ? find_lamps(r) : REY_OK;
+    if (!beside || result != REY_OK || rey_rides_gap(view) || turns(view)) {
+        return result;
+    }
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        if (r->lamp_medium[i] >= 0 && light_is_shifted(r, i)) {
+            r->job.glides = false;
+            r->job.rides = r->job.any_motion = true;
+        }
+    }
+    return REY_OK;
+}
+
 // Where a light at a point lies whose light does not jump; false of others.
 static bool place_of(const SceneView *view, const EmitterRecord *e, double p[3]) {
     int32_t at[3];
@@ -191,9 +326,48 @@ static bool place_of(const SceneView *view, const EmitterRecord *e, double p[3])
     return e->kind == EMITTER_POINT || !(rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
 }
 
+// Whether the sensor is one that is looked up backwards.
+static bool camera_is_known(const Render *r) {
+    const int32_t kind = r->plan.sensor->kind;
+    return kind == SENSOR_PERSPECTIVE || kind == SENSOR_THINLENS || kind == SENSOR_ORTHOGRAPHIC;
+}
+
+// The ball around a light, if there is one.
+static bool beacon_of_light(const Render *r, int32_t light, Beacon *beacon) {
+    const SceneView *view = &r->scene->view;
+    const bool seen = light_is_shifted(r, light);
+    double p[3] = {0}, radius = place_of(view, view->emitters + light, p) ? free_radius(view, p) : 0, reach = 0;
+    if (!(radius > least_radius * (double)view->bounds_radius) || (seen && !camera_is_known(r))) {
+        return false;
+    }
+    radius = camera_is_known(r) ? fmin(radius, 2 * (double)view->bounds_radius + distance_to_sensor(r, p)) : radius;
+    reach = seen ? film_reach(r, p) : 0;
+    *beacon = (Beacon){(float)p[0], (float)p[1], (float)p[2], (float)radius, (float)reach, light};
+    return isfinite(radius) && reach >= 0;
+}
+
+static rey_result refuse_lamp(const Render *r, int32_t light) {
+    const SceneView *view = &r->scene->view;
+    const char *why = "so close to a surface, or to the border of its medium";
+    char name[OBJECT_NAME];
+    rey_name_emitter(r->scene, light, name);
+    const EmitterRecord *e = view->emitters + light;
+    bool hard = e->kind == EMITTER_SPOT && (rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
+    why = hard ? "where its beam_width is its cutoff_angle, or all but it" : why;
+    why = light_is_shifted(r, light) && !camera_is_known(r) ? "with sensors that are no cameras" : why;
+    why = medium_is_even(view, r->lamp_medium[light]) ? why : "where the medium differs from place to place";
+    why = turns(view) ? "in scenes with smooth mirrors, glass or normals of their own" : why;
+    why = rey_rides_gap(view) ? rey_rides_gap(view) : why;
+    return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                    "the gradient of what moves beside '%s', a light at a point that lies within a participating medium, does "
+                    "not exist yet %s: points next to the light, from which its light is scattered, must move as it does "
+                    "(docs/media.md)", name, why);
+}
+
 rey_result rey_beacons_begin(Render *r) {
     const SceneView *view = &r->scene->view;
-    if (r->request.asked || !r->job.rides || r->job.any_camera || r->job.any_places || turns(view)) {
+    const bool moves = r->job.rides && !turns(view);
+    if (!r->lamp_medium) {
         return REY_OK;
     }
     size_t n = (size_t)view->emitters_count + 1;
@@ -204,15 +378,24 @@ rey_result rey_beacons_begin(Render *r) {
     }
     int32_t count = 0;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
-        double p[3] = {0}, radius = place_of(view, view->emitters + i, p) ? free_radius(view, p) : 0;
-        of[i] = radius > least_radius * (double)view->bounds_radius && isfinite(radius) ? count : -1;
-        if (of[i] >= 0) {
-            beacons[count++] = (Beacon){(float)p[0], (float)p[1], (float)p[2], (float)radius, i};
+        const int32_t medium = r->lamp_medium[i];
+        bool known = moves && medium >= 0 && medium_is_even(view, medium) && beacon_of_light(r, i, beacons + count);
+        of[i] = known ? count++ : -1;
+        if (!known && medium >= 0 && lights_what_moves(r, i)) {
+            return refuse_lamp(r, i);
         }
     }
     if (count > 0) {
         r->job.beacons = beacons, r->job.beacon_of = of, r->job.beacon_count = count;
+        r->job.seen_x = r->plan.x, r->job.seen_width = r->plan.width;
+        r->job.seen_y = r->plan.y, r->job.seen_height = r->plan.height;
         r->job.none = r->none;
     }
     return REY_OK;
+}
+
+void rey_beacons_end(Render *r) {
+    rey_free(r->scene->ctx, r->lamp_medium);
+    rey_free(r->scene->ctx, r->beacons);
+    rey_free(r->scene->ctx, r->beacon_of);
 }

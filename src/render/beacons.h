@@ -1,9 +1,14 @@
-// beacons.h: the balls around lights at a point beside which collisions may stand still (integrator/beacon.h).
+// beacons.h: the balls around lights at a point beside which collisions may move as the lights do (integrator/beacon.h).
 #pragma once
 
 #include "render/render_parts.h"
 
-// Where surfaces move in media and lights and sensor stand still: fills job->beacons. None, and job->beacons null, where directions
-// matter beyond what collisions see: smooth mirrors and glass, normals that are not the surfaces' own, phase functions that differ
-// from place to place.
+// Where lights at a point that lie within media move, or the sensor beside them: collisions ride (integrator/ride.h), which
+// job->rides and what goes with it say from here on. Not where directions matter beyond what collisions see (rey_beacons_begin),
+// and where collisions cannot ride.
+rey_result rey_lights_ride(Render *r);
+// Where collisions ride: fills job->beacons. None, and job->beacons null, where directions matter beyond what collisions see:
+// smooth mirrors and glass, normals that are not the surfaces' own, phase functions that differ from place to place; and where
+// lights or the sensor move, with sensors that are no cameras. Refuses what moves beside lights that need one and have none.
 rey_result rey_beacons_begin(Render *r);
+void rey_beacons_end(Render *r);

@@ -2,6 +2,7 @@
 // that do not depend on the number of threads, and merge the units' results in a fixed order.
 #include "base/parallel.h"
 #include "math/rng.h"
+#include "render/beacons.h"
 #include "render/boundary.h"
 #include "render/dropped.h"
 #include "render/facing.h"
@@ -39,8 +40,7 @@ static void render_free(Render *r) {
     rey_free(ctx, r->columns);
     rey_free(ctx, r->rows);
     rey_free(ctx, r->offsets);
-    rey_free(ctx, r->beacons);
-    rey_free(ctx, r->beacon_of);
+    rey_beacons_end(r);
     rey_free(ctx, r->adjoint);
     rey_free(ctx, r->tangent);
     pthread_mutex_destroy(&r->lock);
@@ -332,9 +332,8 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     if (result == REY_OK && rey_traces_particles(scene)) {
         result = rey_particles_begin(r, selection);
     }
-    if (result == REY_OK) {
-        result = map_selection(r, selection);
-    }
+    result = result == REY_OK ? map_selection(r, selection) : result;
+    result = result == REY_OK ? rey_lights_ride(r) : result;
     if (result != REY_OK) {
         return result;
     }

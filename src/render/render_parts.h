@@ -55,7 +55,8 @@ typedef struct Render {
     bool meetings_found;
     Array corners;         // where the interior term looks through lenses (shape/corners.h)
     int32_t *corner_at;    // by viewer
-    Beacon *beacons;       // those of the job (beacons.h)
+    int32_t *lamp_medium;  // by emitter, where it matters, else null: the medium that it lies in, -1 = none (beacons.h)
+    Beacon *beacons;       // those of the job
     int32_t *beacon_of;
     Array marks;           // curves along which textures jump (shape/marks.h)
     BoundaryPlan boundary[BOUNDARY_KINDS];

@@ -110,7 +110,7 @@ static const char *gap_of_glides(const SceneView *view) {
 }
 
 // What is not known of surfaces that move in scenes with media, and of cameras among them, null where all is.
-static const char *gap_of_rides(const SceneView *view) {
+const char *rey_rides_gap(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         bool passes = rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
@@ -147,13 +147,13 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
         return NULL;
     }
     if (p->camera >= 0) {
-        return rey_cameras_glide(view) ? gap_of_glides(view) : gap_of_rides(view);
+        return rey_cameras_glide(view) ? gap_of_glides(view) : rey_rides_gap(view);
     }
     if (p->geometry >= 0 || p->instance >= 0) {
-        return gap_of_rides(view);
+        return rey_rides_gap(view);
     }
     if (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR)) { // which turns rays at smooth mirrors and glass
-        return gap_of_rides(view);
+        return rey_rides_gap(view);
     }
     if (p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) && has_jumping_media(view)) {
         return "in participating media with filter_type=\"nearest\", light that moves passes jumps from voxel to voxel";
@@ -365,8 +365,8 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
                         "that move beside them, does not exist yet here: points next to a light, from which its light is "
-                        "scattered, must move as it does. Known is what surfaces do that move beside lights that hang free in a "
-                        "homogeneous medium, where light, sensor and normals stand still (docs/media.md)");
+                        "scattered, must move as it does. Known are lights that hang free in a homogeneous medium, in scenes "
+                        "without smooth mirrors, glass and normals of their own (docs/media.md)");
     }
     int missing = r->stats.missing_terms & REY_TERM_TERMINATOR, bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {

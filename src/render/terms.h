@@ -9,6 +9,9 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
 // `result`, unless all went well but paths met what no term covers: then refuses the gradient.
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection);
 
+// What is not known of what moves where collisions ride (integrator/ride.h), null where all is.
+const char *rey_rides_gap(const SceneView *view);
+
 // Books what has come together in a set since the last call, or since the set began where the term is `interior`, for a
 // term. picture: of the forward mode; in reverse mode the shards' gradients count.
 void rey_terms_book(Render *r, int set, int term, const double *picture);

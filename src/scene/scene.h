@@ -255,6 +255,17 @@ typedef struct SceneView {
     int32_t emitter_cdf;      // tables offset of cumulative emitter weights
 } SceneView;
 
+// Whether a medium is the same everywhere, as far as its own volumes go.
+static inline bool medium_is_even(const SceneView *scene, int32_t id) {
+    const MediumNode *medium = scene->media + id;
+    const int32_t volumes[] = {medium->sigma_t, medium->albedo, medium->sigma_s, medium->sigma_a};
+    bool even = medium->flakes < 0;
+    for (int i = 0; i < COUNT_OF(volumes); i++) {
+        even = even && (volumes[i] < 0 || scene->volumes[volumes[i]].kind == VOLUME_CONSTANT);
+    }
+    return even;
+}
+
 // A named parameter: a range of theta.
 typedef struct Param {
     char *name;

@@ -38,6 +38,13 @@ typedef struct Sink {
     Float derivative;          // forward: accumulates
 } Sink;
 
+// Forward mode: takes what was accumulated.
+KFN Float sink_taken(Sink *s) {
+    Float d = s->derivative;
+    s->derivative = f_set(0);
+    return d;
+}
+
 // The same entry for all lanes of m.
 KFN void sink_add_uniform(Sink *s, int32_t at, Float d, Mask m) {
     if (s->gradient) {

@@ -1,9 +1,10 @@
 // beside.h: what edges hide of collisions beside lights at a point. From a vertex y past an edge e such a collision x is seen as a
-// point that stands still, with the share chi of the light that it scatters (beacon.h): the edge leaves the line of the two by
-//   n . (e' - (1 - a) y'),   a = |e - y| / |x - y|.
-// riding.h knows n . (e' - y') of all that is scattered, so that n . y' times a chi of this light is missing: these are segments
-// that end there, of which nothing moves but the vertices they come from. Edges between x and its light lie outside of the ball,
-// and so would x, behind them.
+// point that moves as the light does, with the share chi of the light that it scatters (beacon.h): the edge leaves the line of the
+// two by
+//   n . (e' - (1 - a) y' - a x'),   a = |e - y| / |x - y|.
+// riding.h knows n . (e' - y') of all that is scattered, so that n . (y' - x') times a chi of this light is missing: these are
+// segments that end there, of which nothing moves but the vertices they come from, and the light. Edges between x and its light
+// lie outside of the ball, and so would x, behind them.
 #pragma once
 
 #include "integrator/beacon.h"
@@ -44,9 +45,8 @@ static Float beside_sample(Tracer *t, const BoundaryJob *b, Int slot, Float shar
     Float choice = rng_1d(&key, DIMENSION_SEGMENT_LIGHT) * (real)job->beacon_count;
     Int which = i_min(i_from_f(choice), i_set(job->beacon_count - 1));
     Float part = choice - f_from_i(which);
-    Int row = which * (int32_t)(sizeof(Beacon) / sizeof(float));
-    Vec3 centre = v3(f_gather(&job->beacons->x, row), f_gather(&job->beacons->y, row), f_gather(&job->beacons->z, row));
-    *radius = f_gather(&job->beacons->radius, row);
+    Vec3 centre = beacon_place(t, which);
+    *radius = BEACON_FIELD(t, which, radius);
     Vec3 away = warp_uniform_sphere(rng_2d(&key, DIMENSION_SEGMENT_END));
     Vec3 x = v3_madd(centre, f_max(part, f_set(1e-6f)) * *radius, away);
     Float r = v3_length(v3_sub(x, centre)); // after rounding
@@ -60,7 +60,8 @@ static Float beside_sample(Tracer *t, const BoundaryJob *b, Int slot, Float shar
     s->m = m;
     segment_measure(t, b, true, share, s);
     if (m_any(s->m)) {
-        Int light = i_gather(&job->beacons->light, row);
+        Int light = i_gather(&job->beacons->light, which * (int32_t)(sizeof(Beacon) / sizeof(float)));
+        s->source = i_select(s->m, light, s->source);
         // Volume over its density, and solid angle from the edge over volume.
         Float weight = 4 * PI * r * r * *radius * (real)job->beacon_count * f_safe_rcp(s->distance * s->distance);
         s->light = spec_scale(beside_light(t, light, x, away, s->d, slot, s->m), weight);

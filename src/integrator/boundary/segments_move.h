@@ -131,6 +131,9 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
     if (!still) {
         segments_ahead_adj(in, k, n, worth, sink, m & ~beside);
     }
+    if (!still && sink->any_places && m_any(m & beside)) {
+        beacon_flow_adj(in->t, i_load(q->source + k), i_set(0), v3_scale(n, -worth), m_set(false), sink, m & beside);
+    }
     Float drag = f_select(beside, f_set(1), f_load(q->along + k) - 1.0f);
     return (Carried){v3_scale(n, drag * worth), v3_zero()};
 }

@@ -59,8 +59,3 @@ static void collisions_slide_adj(const Indirect *in, Vec3 p, Vec3 dp, Vec2 lens,
     }
 }
 
-KFN Float sink_taken(Sink *sink) {
-    Float d = sink->derivative;
-    sink->derivative = f_set(0);
-    return d;
-}
