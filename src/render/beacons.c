@@ -367,6 +367,7 @@ static rey_result refuse_lamp(const Render *r, int32_t light) {
 rey_result rey_beacons_begin(Render *r) {
     const SceneView *view = &r->scene->view;
     const bool moves = r->job.rides && !turns(view);
+    const bool needed = r->needed & (REY_TERM_PRIMARY | REY_TERM_INDIRECT | REY_TERM_SPECULAR); // not by what turns normals alone
     if (!r->lamp_medium) {
         return REY_OK;
     }
@@ -381,7 +382,7 @@ rey_result rey_beacons_begin(Render *r) {
         const int32_t medium = r->lamp_medium[i];
         bool known = moves && medium >= 0 && medium_is_even(view, medium) && beacon_of_light(r, i, beacons + count);
         of[i] = known ? count++ : -1;
-        if (!known && medium >= 0 && lights_what_moves(r, i)) {
+        if (needed && !known && medium >= 0 && lights_what_moves(r, i)) {
             return refuse_lamp(r, i);
         }
     }

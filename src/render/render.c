@@ -325,9 +325,8 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
         result = rey_fail(scene->ctx, REY_ERROR_UNSUPPORTED, "the integrator '%s' has no derivatives, 'path' has%s",
                           scene->integrator, scene->integrators.count > 1 ? ": of several, put one such first" : "");
     }
-    int needed = 0;
     if (result == REY_OK) {
-        result = rey_terms_check(scene, def, selection, &needed);
+        result = rey_terms_check(scene, def, selection, &r->needed);
     }
     if (result == REY_OK && rey_traces_particles(scene)) {
         result = rey_particles_begin(r, selection);
@@ -343,7 +342,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     r->job.spp = set_spp(r);
     r->rims = rey_rims_move(scene, selection);
     r->facing = r->job.watch_turned && !rey_facing_gap(&scene->view, r->plan.sensor) && (!scene->view.has_media || r->job.rides);
-    r->terms = def->terms ? def->terms & (needed | REY_TERM_INTERIOR) : needed | REY_TERM_INTERIOR;
+    r->terms = (r->needed | REY_TERM_INTERIOR) & (def->terms ? def->terms : ~0);
     return rey_boundaries_begin(r);
 }
 

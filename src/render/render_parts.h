@@ -46,7 +46,7 @@ typedef struct Render {
     bool facing;           // it moves where normals of maps turn away from what looks at them, and that is known
     bool turns_rays;       // the selection turns rays everywhere: the camera's, or mirrored and refracted ones
     float *adjoint;
-    int terms;             // REY_TERM_ bits that are computed
+    int needed, terms;     // REY_TERM_ bits that the selection needs; that are computed
     TermRequest request;
     double booked;         // of a set's value: what its terms have brought so far
     Array edges, fans;     // what all boundary terms choose from (shape/edges.h)
