@@ -8,18 +8,14 @@
 // The least cosine between rays and normals: what rounding leaves of it.
 #define TUBE_GRAZE 1e-3f
 
-// One step along rays at x, x and d in the space of the curve. With c(u) the foot of x, (x - c) . c' = 0, the rays meet the tube
-// where f(t) = |x + t d - c|^2 - r^2 is 0, which is a quadratic in t but for how the curve bends: its root at which they enter.
-// Returns t. Rays of *misses do not get there.
+// One step along rays at x, x and d in the space of the curve: the rays meet the tube at the root of a quadratic (tube_line) at
+// which they enter. Returns t. Rays of *misses do not get there.
 KFN Float tube_step(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d, CurvePoint *foot, Mask *misses) {
-    const CurvePoint p = *foot = bspline_foot(scene, hit, x, 2);
-    Vec3 away = v3_sub(x, p.c);
-    Float along = v3_dot(d, p.c1), u1 = along * f_safe_rcp(v3_dot(p.c1, p.c1) - v3_dot(away, p.c2));
-    // halves of f' and f''
-    Float f = v3_dot(away, away) - p.r * p.r, f1 = v3_dot(away, d) - p.r * p.r1 * u1;
-    Float f2 = v3_dot(d, d) - along * u1 - p.r1 * p.r1 * u1 * u1, root2 = f1 * f1 - f * f2;
-    *misses = m_lt(root2, TUBE_GRAZE * TUBE_GRAZE * v3_dot(d, d) * p.r * p.r);
-    return (-f1 - f_zero_unless(~*misses, f_safe_sqrt(root2))) * f_safe_rcp(f2);
+    const TubeLine l = tube_line(scene, hit, x, d);
+    Float root2 = l.f1 * l.f1 - l.f * l.f2;
+    *foot = l.foot;
+    *misses = m_lt(root2, TUBE_GRAZE * TUBE_GRAZE * v3_dot(d, d) * l.foot.r * l.foot.r);
+    return (-l.f1 - f_zero_unless(~*misses, f_safe_sqrt(root2))) * f_safe_rcp(l.f2);
 }
 
 // In lanes of m that met B-spline curves: moves hits along their rays, by no more than a tube's radius. Those few that Embree lets

@@ -65,18 +65,13 @@ static void film_add_drift(Tracer *t, const FilterTable *filter, int32_t slot) {
     const PathJob *job = t->job;
     int32_t x0 = job->x - job->border, y0 = job->y - job->border;
     int32_t width = job->width + 2 * job->border, height = job->height + 2 * job->border;
-    float w[2][MAX_FOOTPRINT], by[2][MAX_FOOTPRINT];
-    const float x = (float)t->ws.film_x[slot], y = (float)t->ws.film_y[slot];
-    int32_t first_x, first_y;
-    int32_t nx = film_weights(t->sensor, filter, x, x0, x0 + width, &first_x, w[0]);
-    int32_t ny = film_weights(t->sensor, filter, y, y0, y0 + height, &first_y, w[1]);
-    film_slopes(filter, x, first_x, nx, by[0]);
-    film_slopes(filter, y, first_y, ny, by[1]);
-    for (int32_t j = 0; j < ny; j++) {
-        double *row = job->film + ((int64_t)(first_y + j - y0) * width + first_x - x0) * SPEC_N;
-        for (int32_t k = 0; k < nx * SPEC_N; k++) {
-            row[k] += (double)(by[0][k / SPEC_N] * w[1][j]) * (double)t->ws.adjoint_x[k % SPEC_N][slot] +
-                      (double)(w[0][k / SPEC_N] * by[1][j]) * (double)t->ws.adjoint_y[k % SPEC_N][slot];
+    FilmFootprint f;
+    film_footprint(t->sensor, filter, (float)t->ws.film_x[slot], (float)t->ws.film_y[slot], x0, y0, x0 + width, y0 + height, &f);
+    for (int32_t j = 0; j < f.ny; j++) {
+        double *row = job->film + ((int64_t)(f.first_y + j - y0) * width + f.first_x - x0) * SPEC_N;
+        for (int32_t k = 0; k < f.nx * SPEC_N; k++) {
+            row[k] += (double)(f.by_x[k / SPEC_N] * f.y[j]) * (double)t->ws.adjoint_x[k % SPEC_N][slot] +
+                      (double)(f.x[k / SPEC_N] * f.by_y[j]) * (double)t->ws.adjoint_y[k % SPEC_N][slot];
         }
     }
 }
@@ -95,7 +90,7 @@ static void film_splat(Tracer *t, const FilterTable *filter, int32_t count) {
             continue;
         }
         film_add(t, filter, i, l, SPEC_N, job->film);
-        if (t->pinhole && t->sensor->filter != FILM_BOX) {
+        if (flows_drift(t)) {
             film_add_drift(t, filter, i);
         }
         if (job->coverage) {
@@ -131,10 +126,8 @@ static void film_splat_aovs(Tracer *t, const FilterTable *filter, int32_t count)
 }
 
 static void film_splat_slope(Tracer *t, const FilterTable *filter, int32_t i) {
-    float slope[2][SPEC_N] = {{0}};
-    if (t->sensor->filter != FILM_BOX) {
-        film_worth_slope(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i], slope);
-    }
+    float slope[2][SPEC_N];
+    film_worth_slope(t->sensor, filter, t->job->adjoint, (float)t->ws.film_x[i], (float)t->ws.film_y[i], slope);
     for (int c = 0; c < SPEC_N; c++) {
         t->ws.adjoint_x[c][i] = slope[0][c];
         t->ws.adjoint_y[c][i] = slope[1][c];
@@ -151,7 +144,7 @@ static void film_splat_adj(Tracer *t, const FilterTable *filter, int32_t count) 
         for (int c = 0; c < SPEC_N; c++) {
             t->ws.adjoint[c][i] = delta[c];
         }
-        if (t->pinhole) {
+        if (flows_drift(t)) {
             film_splat_slope(t, filter, i);
         }
     }
@@ -208,7 +201,7 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         }
         for (int c = 0; c < SPEC_N; c++) {
             memset(t->ws.radiance[c], 0, (size_t)count * sizeof(real));
-            if (t->pinhole && t->job->mode == MODE_FORWARD) {
+            if (flows_drift(t) && t->job->mode == MODE_FORWARD) {
                 memset(t->ws.adjoint_x[c], 0, (size_t)count * sizeof(real));
                 memset(t->ws.adjoint_y[c], 0, (size_t)count * sizeof(real));
             }

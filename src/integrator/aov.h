@@ -25,10 +25,7 @@ static NOINLINE UvSlopes uv_slopes(const Tracer *t, const Interaction *si, Int s
     Float x = real_gather(t->ws.film_x, slot), y = real_gather(t->ws.film_y, slot);
     real step = 1 / (real)sqrt((double)t->job->spp);
     SampleKey key = slot_key(t, slot);
-    Vec2 lens = {f_set(0), f_set(0)};
-    if (sensor_has_lens(t->sensor)) {
-        lens = rng_2d(&key, DIMENSION_LENS);
-    }
+    Vec2 lens = sample_lens(t, &key);
     Ray ray = sensor_ray(t->scene, t->sensor, x, y, lens).ray;
     Ray right = sensor_ray(t->scene, t->sensor, x + 1.0f, y, lens).ray;
     Ray below = sensor_ray(t->scene, t->sensor, x, y + 1.0f, lens).ray;

@@ -22,9 +22,12 @@ typedef struct BeaconFlow {
     Mask first;                 // lanes that the sensor sees
 } BeaconFlow;
 
+// Whether what flows carry across the film is worth more or less there: the box filter's weights do not change within pixels.
+KFN bool flows_drift(const Tracer *t) { return t->pinhole && t->sensor->filter != FILM_BOX; }
+
 KFN Vec2 slot_lens(const Tracer *t, Int slot) {
     SampleKey key = slot_key(t, slot);
-    return sensor_has_lens(t->sensor) ? rng_2d(&key, DIMENSION_LENS) : (Vec2){f_set((real)0.5), f_set((real)0.5)};
+    return sample_lens(t, &key);
 }
 
 // b along one axis of the film, and its derivative by x, where [low, low + width) is sampled.

@@ -10,14 +10,10 @@ typedef struct Carried {
 
 // The sensor's part in the adjoints of the rays that it sent out.
 static void camera_move_adj(const Tracer *t, Int slot, Vec3 target, const Carried *carried, Sink *sink, Mask m) {
-    Vec2 lens = {f_set(0), f_set(0)};
-    if (sensor_has_lens(t->sensor)) {
-        SampleKey key = slot_key(t, slot);
-        lens = rng_2d(&key, DIMENSION_LENS);
-    }
+    SampleKey key = slot_key(t, slot);
     RayAdj ray = {target, carried->drag, carried->turn};
-    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), lens, &ray, sink,
-                   m);
+    sensor_ray_adj(t->scene, t->sensor, real_gather(t->ws.film_x, slot), real_gather(t->ws.film_y, slot), sample_lens(t, &key),
+                   &ray, sink, m);
 }
 
 // Keeps points of rays that are attached to nothing (path_move.h).

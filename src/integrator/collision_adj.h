@@ -18,7 +18,8 @@ typedef struct CollisionSweep {
     Vec3 light_d, wo;
     Hit hit;
     Collision at;
-    BeaconFlow flow;                     // of the light sample
+    BeaconFlow flow;                     // of the light sample: its share is 0 where there is none
+    Spec flowing;                        // that share of what the light sample brings, but for the throughput before it
     Spec extinction;                     // where that counts: of lanes that move with their light in part
     Mask ahead;                          // lanes whose next vertex does; and what that leaves
     Spec attached;
@@ -43,7 +44,9 @@ static NOINLINE void collision_flow(Tracer *t, const RecordBatch *batch, Int slo
     s->flow.share = f_select(first, s->flow.share, near.chi);
     s->flow.rcp = f_select(first, s->flow.rcp, f_safe_rcp(before));
     s->flow.slope = v3_select(first, s->flow.slope, v3_select(m_gt(near.chi, f_set(0)), slope, v3_zero()));
-    if (m_any(m_gt(s->flow.share, f_set(0)))) {
+    Mask flows = m_gt(s->flow.share, f_set(0));
+    s->flowing = spec_zero_unless(flows, spec_scale(spec_mul(s->lit, s->at.albedo), s->light_phase * s->flow.share));
+    if (m_any(flows)) {
         Track track = track_of(t, batch->group);
         s->extinction = medium_extinction(t->scene, &track, s->hit.p, v3_neg(s->at.wi));
     }
@@ -87,22 +90,22 @@ static NOINLINE Vec3 flow_adj(const Tracer *t, const CollisionSweep *s, Int slot
     Vec3 w = v3_neg(s->at.wi), across = v3_madd(dwi, -v3_dot(w, dwi), w);
     Vec3 d = v3_madd(v3_madd(ride, -flow->rcp, across), -spec_dot(worth, s->extinction), w);
     d = v3_madd(v3_scale(d, flow->share), spec_sum(worth), flow->slope);
-    if (t->job->mode == MODE_REVERSE && t->pinhole) { // in forward mode: flow_drift
-        Spec brought = spec_scale(spec_mul(spec_mul(s->beta, s->lit), s->at.albedo), s->light_phase * flow->share);
+    if (t->job->mode == MODE_REVERSE && flows_drift(t)) { // in forward mode: flow_drift
+        Spec brought = spec_mul(s->beta, s->flowing);
         d = v3_madd(d, spec_dot(brought, spec_gather(t->ws.adjoint_x, slot)), flow->film_x);
         d = v3_madd(d, spec_dot(brought, spec_gather(t->ws.adjoint_y, slot)), flow->film_y);
     }
-    return v3_select(s->connected & m_gt(flow->share, f_set(0)), d, v3_zero());
+    return v3_select(m_gt(flow->share, f_set(0)), d, v3_zero());
 }
 
 // Forward mode: what the flow carries across the film.
 static NOINLINE void flow_drift(const Tracer *t, const CollisionSweep *s, Int slot, int channel, Sink *sink, Mask m) {
     const BeaconFlow *flow = &s->flow;
-    m = m & s->connected & flow->first & m_gt(flow->share, f_set(0));
-    if (t->job->mode != MODE_FORWARD || t->sensor->filter == FILM_BOX || !m_any(m)) {
+    m = m & flow->first & m_gt(flow->share, f_set(0));
+    if (t->job->mode != MODE_FORWARD || !flows_drift(t) || !m_any(m)) {
         return;
     }
-    Float brought = s->beta.c[channel] * s->lit.c[channel] * s->at.albedo.c[channel] * s->light_phase * flow->share;
+    Float brought = s->beta.c[channel] * s->flowing.c[channel];
     const Vec3 along[2] = {flow->film_x, flow->film_y};
     real *out[2] = {t->ws.adjoint_x[channel], t->ws.adjoint_y[channel]};
     for (int i = 0; i < 2; i++) {
@@ -124,7 +127,7 @@ static Vec3 still_onward_adj(const Tracer *t, const CollisionSweep *s, Spec delt
 
 // What the light sample of a flow asks, `pull`, of its light and of the ray; the sensor's part has its own place.
 static void flow_finish(const Tracer *t, const CollisionSweep *s, Int slot, Vec3 pull, Glide *g, Sink *sink) {
-    Mask m = s->connected & m_gt(s->flow.share, f_set(0));
+    Mask m = m_gt(s->flow.share, f_set(0));
     beacon_flow_adj(t, s->light, slot, pull, s->flow.first, sink, m);
     glide_add(g, s->hit.p, v3_neg(pull), m & ~s->flow.first);
 }
@@ -237,8 +240,7 @@ static void collision_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec 
         }
     }
     if (t->job->rides) {
-        Spec lit = spec_mul(spec_scale(s.lit, s.light_phase * s.flow.share), s.at.albedo);
-        ride_collision(t, slot, s.hit.p, spec_zero_unless(s.connected & m_set(flows), lit), s.light, s.m);
+        ride_collision(t, slot, s.hit.p, s.flowing, s.light, s.m);
     } else if (glides) {
         glide_refer(t, slot, s.hit.p, finite);
     }

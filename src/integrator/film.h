@@ -38,7 +38,12 @@ static int32_t film_weights(const SensorRecord *s, const FilterTable *table, flo
     return n;
 }
 
-// The derivatives by x of those weights.
+// The pixels around a sample, with their weights along both axes and how these change.
+typedef struct FilmFootprint {
+    int32_t first_x, first_y, nx, ny;
+    float x[MAX_FOOTPRINT], y[MAX_FOOTPRINT], by_x[MAX_FOOTPRINT], by_y[MAX_FOOTPRINT];
+} FilmFootprint;
+
 static void film_slopes(const FilterTable *table, float x, int32_t first, int32_t n, float *slopes) {
     for (int32_t i = 0; i < n; i++) {
         float away = (float)(first + i) + 0.5f - x, at = fabsf(away) * table->scale;
@@ -46,6 +51,15 @@ static void film_slopes(const FilterTable *table, float x, int32_t first, int32_
         float step = (table->value[k + 1] - table->value[k]) * table->scale;
         slopes[i] = away < 0 ? step : -step;
     }
+}
+
+// Of those in [left, right) x [top, bottom).
+static void film_footprint(const SensorRecord *s, const FilterTable *table, float x, float y, int32_t left, int32_t top,
+                           int32_t right, int32_t bottom, FilmFootprint *f) {
+    f->nx = film_weights(s, table, x, left, right, &f->first_x, f->x);
+    f->ny = film_weights(s, table, y, top, bottom, &f->first_y, f->y);
+    film_slopes(table, x, f->first_x, f->nx, f->by_x);
+    film_slopes(table, y, f->first_y, f->ny, f->by_y);
 }
 
 // What the radiance at x, y is worth to the adjoint of the delivered picture; with the box filter it counts for the pixel
@@ -75,19 +89,14 @@ static void film_worth(const SensorRecord *s, const FilterTable *table, const fl
 // How that changes with x and y, but for the box filter's jumps.
 static void film_worth_slope(const SensorRecord *s, const FilterTable *table, const float *adjoint, float x, float y,
                              float slope[2][SPEC_N]) {
-    const int32_t right = s->crop_x + s->crop_width, bottom = s->crop_y + s->crop_height;
-    float w[2][MAX_FOOTPRINT], by[2][MAX_FOOTPRINT];
-    int32_t first_x, first_y;
-    int32_t nx = film_weights(s, table, x, s->crop_x, right, &first_x, w[0]);
-    int32_t ny = film_weights(s, table, y, s->crop_y, bottom, &first_y, w[1]);
-    film_slopes(table, x, first_x, nx, by[0]);
-    film_slopes(table, y, first_y, ny, by[1]);
+    FilmFootprint f;
+    film_footprint(s, table, x, y, s->crop_x, s->crop_y, s->crop_x + s->crop_width, s->crop_y + s->crop_height, &f);
     memset(slope, 0, 2 * sizeof *slope);
-    for (int32_t j = 0; j < ny; j++) {
-        const float *row = adjoint + ((int64_t)(first_y + j - s->crop_y) * s->crop_width + first_x - s->crop_x) * SPEC_N;
-        for (int32_t k = 0; k < nx * SPEC_N; k++) {
-            slope[0][k % SPEC_N] += by[0][k / SPEC_N] * w[1][j] * row[k];
-            slope[1][k % SPEC_N] += w[0][k / SPEC_N] * by[1][j] * row[k];
+    for (int32_t j = 0; j < f.ny; j++) {
+        const float *row = adjoint + ((int64_t)(f.first_y + j - s->crop_y) * s->crop_width + f.first_x - s->crop_x) * SPEC_N;
+        for (int32_t k = 0; k < f.nx * SPEC_N; k++) {
+            slope[0][k % SPEC_N] += f.by_x[k / SPEC_N] * f.y[j] * row[k];
+            slope[1][k % SPEC_N] += f.x[k / SPEC_N] * f.by_y[j] * row[k];
         }
     }
 }

@@ -80,6 +80,11 @@ KFN SampleKey slot_key(const Tracer *t, Int slot) {
     return key;
 }
 
+// Where on the lens a sample's ray begins; of sensors that have none, 0.
+KFN Vec2 sample_lens(const Tracer *t, const SampleKey *key) {
+    return sensor_has_lens(t->sensor) ? rng_2d(key, DIMENSION_LENS) : (Vec2){f_set(0), f_set(0)};
+}
+
 // A vector per slot and channel.
 KFN Vec3 rows_gather(const ChannelRows *r, int channel, Int slot) {
     return v3(real_gather(r->x[channel], slot), real_gather(r->y[channel], slot), real_gather(r->z[channel], slot));
@@ -157,11 +162,7 @@ static void camera_stage(Tracer *t, int64_t first, int32_t count) {
         Float film_x = f_from_i(x - margin) + jitter.x, film_y = f_from_i(y - margin) + jitter.y;
         f_store(t->ws.film_x + i, film_x);
         f_store(t->ws.film_y + i, film_y);
-        Vec2 lens = {f_set(0), f_set(0)};
-        if (sensor_has_lens(t->sensor)) {
-            lens = rng_2d(&key, DIMENSION_LENS);
-        }
-        SensorRay sample = sensor_ray(t->scene, t->sensor, film_x, film_y, lens);
+        SensorRay sample = sensor_ray(t->scene, t->sensor, film_x, film_y, sample_lens(t, &key));
         path_begin(t, i, slot, &sample.ray, sample.weight);
     }
     t->active = count;

@@ -200,19 +200,23 @@ typedef struct SightLine {
     bool parallel;
 } SightLine;
 
-static bool line_to(const Render *r, const double p[3], SightLine *line) {
-    const float *m = r->scene->view.theta + r->plan.sensor->to_world;
-    const Projection projection = rey_projection_of(&r->scene->view, &r->plan);
-    double local[3];
-    rey_to_sensor(&projection, p, local);
-    *line = (SightLine){.lens = projection.lens / 3, .parallel = projection.parallel};
+// Of column k of a pose.
+static double axis_length(const float *m, int k) { return sqrt((double)(m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k])); }
+
+// False of what lies before the near plane.
+static bool line_to(const Render *r, const Projection *projection, const double p[3], SightLine *line) {
+    const SensorRecord *s = r->plan.sensor;
+    const float *theta = r->scene->view.theta, *m = theta + s->to_world;
+    double local[3], radius = projection->pinhole ? 0 : (double)theta[s->lens];
+    rey_to_sensor(projection, p, local);
+    *line = (SightLine){.lens = radius * fmax(axis_length(m, 0), axis_length(m, 1)), .parallel = projection->parallel};
     for (int k = 0; k < 3; k++) {
         double axis = (double)m[4 * k + 2] * local[2];
         line->d[k] = line->parallel ? axis : p[k] - (double)m[4 * k + 3];
         line->from[k] = p[k] - line->d[k];
     }
     line->length = sqrt(dot(line->d, line->d));
-    return local[2] > projection.near;
+    return local[2] > projection->near;
 }
 
 enum { MOST_SIGHT_PARTS = 64 }; // the line is halved, and halves of halves, breadth last
@@ -246,13 +250,12 @@ static double film_reach(const Render *r, const double p[3]) {
     const float *m = view->theta + r->plan.sensor->to_world;
     const Projection projection = rey_projection_of(view, &r->plan);
     SightLine line;
-    if (!line_to(r, p, &line)) {
+    if (!line_to(r, &projection, p, &line)) {
         return 0;
     }
     double width = line_width(view, &line), pixel = 0;
     for (int k = 0; k < 2; k++) {
-        double axis = sqrt((double)(m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k]));
-        pixel = fmax(pixel, (line.parallel ? axis : 1) / fabs(k ? projection.scale_y : projection.scale_x));
+        pixel = fmax(pixel, (line.parallel ? axis_length(m, k) : 1) / fabs(k ? projection.scale_y : projection.scale_x));
     }
     return width > 0 || line.lens <= 0 ? fmin(width / (sqrt(2) * pixel), 1e6) : -1;
 }
@@ -281,8 +284,7 @@ static rey_result find_lamps(Render *r) {
     rey_context *ctx = r->scene->ctx;
     const SceneView *view = &r->scene->view;
     const Backend *backend = rey_backend_cpu(ctx->def.lanes);
-    size_t others = (size_t)(view->groups_count + view->media_count + 3) * sizeof(int32_t);
-    void *workspace = rey_alloc(ctx, backend->workspace_bytes(MODE_PRIMAL) + others);
+    void *workspace = rey_alloc(ctx, backend->workspace_bytes(MODE_PRIMAL)); // no path is followed
     r->lamp_medium = rey_alloc_array(ctx, (size_t)view->emitters_count + 1, sizeof *r->lamp_medium);
     rey_result result = workspace && r->lamp_medium ? rey_scene_update(r->scene) : REY_ERROR_MEMORY;
     if (result == REY_OK) {
@@ -314,16 +316,9 @@ rey_result rey_lights_ride(Render *r) {
     return REY_OK;
 }
 
-// Where a light at a point lies whose light does not jump; false of others.
-static bool place_of(const SceneView *view, const EmitterRecord *e, double p[3]) {
-    int32_t at[3];
-    if (!emitter_place(e, at)) {
-        return false;
-    }
-    for (int k = 0; k < 3; k++) {
-        p[k] = (double)view->theta[at[k]];
-    }
-    return e->kind == EMITTER_POINT || !(rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
+// Whether the light of a light at a point jumps, or all but.
+static bool light_jumps(const SceneView *view, const EmitterRecord *e) {
+    return e->kind == EMITTER_SPOT && (rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
 }
 
 // Whether the sensor is one that is looked up backwards.
@@ -335,9 +330,15 @@ static bool camera_is_known(const Render *r) {
 // The ball around a light, if there is one.
 static bool beacon_of_light(const Render *r, int32_t light, Beacon *beacon) {
     const SceneView *view = &r->scene->view;
+    const EmitterRecord *e = view->emitters + light;
     const bool seen = light_is_shifted(r, light);
-    double p[3] = {0}, radius = place_of(view, view->emitters + light, p) ? free_radius(view, p) : 0, reach = 0;
-    if (!(radius > least_radius * (double)view->bounds_radius) || (seen && !camera_is_known(r))) {
+    int32_t at[3];
+    if (!emitter_place(e, at) || light_jumps(view, e) || (seen && !camera_is_known(r))) {
+        return false;
+    }
+    const double p[3] = {(double)view->theta[at[0]], (double)view->theta[at[1]], (double)view->theta[at[2]]};
+    double radius = free_radius(view, p), reach = 0;
+    if (!(radius > least_radius * (double)view->bounds_radius)) {
         return false;
     }
     radius = camera_is_known(r) ? fmin(radius, 2 * (double)view->bounds_radius + distance_to_sensor(r, p)) : radius;
@@ -348,12 +349,10 @@ static bool beacon_of_light(const Render *r, int32_t light, Beacon *beacon) {
 
 static rey_result refuse_lamp(const Render *r, int32_t light) {
     const SceneView *view = &r->scene->view;
-    const char *why = "so close to a surface, or to the border of its medium";
+    const char *why = "so close to a surface (curves and grids of distances count as close) or to the border of its medium";
     char name[OBJECT_NAME];
     rey_name_emitter(r->scene, light, name);
-    const EmitterRecord *e = view->emitters + light;
-    bool hard = e->kind == EMITTER_SPOT && (rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
-    why = hard ? "where its beam_width is its cutoff_angle, or all but it" : why;
+    why = light_jumps(view, view->emitters + light) ? "where its beam_width is its cutoff_angle, or all but it" : why;
     why = light_is_shifted(r, light) && !camera_is_known(r) ? "with sensors that are no cameras" : why;
     why = medium_is_even(view, r->lamp_medium[light]) ? why : "where the medium differs from place to place";
     why = turns(view) ? "in scenes with smooth mirrors, glass or normals of their own" : why;

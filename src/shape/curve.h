@@ -109,6 +109,26 @@ KFN Mask tube_ends(const SceneView *scene, const Hit *hit, bool behind) {
     return ~(there & mi_eq(other, own + (behind ? 1 : -1)));
 }
 
+// A tube next to a point x of a line along d: with c(u) the foot of x, (x - c) . c' = 0, f(t) = |x + t d - c|^2 - r^2 is
+// a quadratic in t but for how the curve bends. f, and halves of f' and f''; slope: du / dt over c' . d.
+typedef struct TubeLine {
+    CurvePoint foot;
+    Vec3 away;
+    Float f, f1, f2, slope;
+} TubeLine;
+
+KFN TubeLine tube_line(const SceneView *scene, Hit *hit, Vec3 x, Vec3 d) {
+    TubeLine l = {.foot = bspline_foot(scene, hit, x, 2)};
+    const CurvePoint *p = &l.foot;
+    l.away = v3_sub(x, p->c);
+    l.slope = f_safe_rcp(v3_dot(p->c1, p->c1) - v3_dot(l.away, p->c2));
+    Float along = v3_dot(d, p->c1), u1 = along * l.slope;
+    l.f = v3_dot(l.away, l.away) - p->r * p->r;
+    l.f1 = v3_dot(l.away, d) - p->r * p->r1 * u1;
+    l.f2 = v3_dot(d, d) - along * u1 - p->r1 * p->r1 * u1 * u1;
+    return l;
+}
+
 // Where nothing is known of the foot.
 enum { BSPLINE_SEARCH = 6 };
 

@@ -118,26 +118,21 @@ static Miss miss_cylinder(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d
 static NOINLINE Miss miss_tube(const SceneView *scene, const Hit *own, Vec3 o, Vec3 d) {
     enum { APPROACHES = 6 };
     Hit h = *own, entry = *own;
-    CurvePoint c = bspline_point(scene, own);
-    Vec3 x = own->p, away = v3_sub(x, c.c);
-    Float t = v3_dot(v3_sub(x, o), d), slope = f_set(0), bend = f_set(1);
-    for (int i = 0; i < APPROACHES; i++) { // to where |x - c| - r is least: tube_step has its derivatives
-        x = v3_madd(o, t, d);
-        c = bspline_foot(scene, &h, x, 2);
-        away = v3_sub(x, c.c);
-        slope = f_safe_rcp(v3_dot(c.c1, c.c1) - v3_dot(away, c.c2));
-        Float along = v3_dot(d, c.c1), u1 = along * slope;
-        bend = 1.0f - along * u1 - c.r1 * c.r1 * u1 * u1;
-        t = t - f_clamp((v3_dot(away, d) - c.r * c.r1 * u1) * f_safe_rcp(bend), -c.r, c.r);
+    Float t = v3_dot(v3_sub(own->p, o), d);
+    TubeLine l = tube_line(scene, &h, v3_madd(o, t, d), d);
+    for (int i = 1; i < APPROACHES; i++) { // to where |x - c| - r is least
+        t = t - f_clamp(l.f1 * f_safe_rcp(l.f2), -l.foot.r, l.foot.r);
+        l = tube_line(scene, &h, v3_madd(o, t, d), d);
     }
-    Float distance = v3_length(away), across = 1.0f - distance * f_safe_rcp(c.r);
-    Vec3 e = v3_scale(away, f_safe_rcp(distance));
+    const CurvePoint c = l.foot;
+    Float distance = v3_length(l.away), across = 1.0f - distance * f_safe_rcp(c.r);
+    Vec3 e = v3_scale(l.away, f_safe_rcp(distance));
     Miss out = {.edge = h, .inside = across};
     out.edge.u = f_clamp(h.u, f_set(0), f_set(1));
     out.edge.p = v3_madd(c.c, c.r, e);
-    out.n = v3_normalize(v3_madd(e, -c.r1 * slope, c.c1));
+    out.n = v3_normalize(v3_madd(e, -c.r1 * l.slope, c.c1));
     // Where the ray enters, and how far from an end that is.
-    Float half = f_safe_sqrt((c.r * c.r - distance * distance) * f_safe_rcp(bend));
+    Float half = f_safe_sqrt(-l.f * f_safe_rcp(l.f2));
     bspline_foot(scene, &entry, v3_madd(o, t - half, d), 2);
     Mask low = tube_ends(scene, own, false), high = tube_ends(scene, own, true);
     Float speed = v3_length(c.c1) * f_safe_rcp(c.r), begin = entry.u * speed, rest = (1.0f - entry.u) * speed;

@@ -94,7 +94,7 @@ static NOINLINE void level_look(Tracer *t, const BoundaryJob *b, Int slot, Float
     v->level = i_set(0);
     v->shadow = (Ray){v3_zero(), v3(f_set(0), f_set(0), f_set(1)), f_set(0)};
     m = turned ? m : m & rim_light(scene, &own, &v->x.light, &v->probability);
-    sightline_trace(t, &key, sightline_lens(t, &own), x, y, m, &v->line);
+    sightline_trace(t, &key, sample_lens(t, &own), x, y, m, &v->line);
     if (!m_any(m)) {
         return;
     }
@@ -200,7 +200,7 @@ static Mask level_place(Tracer *t, const BoundaryJob *b, const Strips *all, Int 
     at->y = y;
     level_look(t, b, slot, x, y, whole, m, &at->view);
     m = m & at->view.rim.m & strips_inside(all, x, y);
-    Vec2 g = level_slope(t, b, &at->view, sightline_lens(t, &own), x, y, m);
+    Vec2 g = level_slope(t, b, &at->view, sample_lens(t, &own), x, y, m);
     at->slope = f_sqrt(g.x * g.x + g.y * g.y);
     Float rcp = f_safe_rcp(at->slope);
     at->nx = g.x * rcp;
@@ -233,7 +233,7 @@ static void level_book(const Tracer *t, const BoundaryJob *b, Int slot, const Le
     Carried carried = level_view_adj(t, b, v, f_zero_unless(m, worth), sink, m);
     if (sink->any_camera) {
         RayAdj ray = {v->line.hit[0].p, carried.drag, carried.turn};
-        sensor_ray_adj(t->scene, t->sensor, x, y, sightline_lens(t, &own), &ray, sink, m);
+        sensor_ray_adj(t->scene, t->sensor, x, y, sample_lens(t, &own), &ray, sink, m);
     }
 }
 

@@ -275,7 +275,7 @@ static Mask curve_at_end(const SceneView *scene, const Sightline *line, Int leve
 static NOINLINE void curve_find(Tracer *t, const BoundaryJob *b, Int slot, const Strip *s, Mask m, Curve *c) {
     SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
     Sink still = sink_of(b->still);
-    c->lens = sightline_lens(t, &own);
+    c->lens = sample_lens(t, &own);
     strip_look(t, &key, c->lens, s, 0, m, c->line);
     strip_look(t, &key, c->lens, s, 1, m, c->line + 1);
     c->level = lines_part(t, b, c->line, c->line + 1, m);
@@ -320,7 +320,7 @@ static int32_t strips_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         Int slot = i_iota() + i;
         batch_numbers(t, i, first);
         SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
-        Vec2 lens = sightline_lens(t, &own);
+        Vec2 lens = sample_lens(t, &own);
         Strip s = strip_sample(all, &own);
         Sightline line[2];
         strip_look(t, &key, lens, &s, 0, m, line);
@@ -378,7 +378,7 @@ static void curves_find(Tracer *t, const BoundaryJob *b, const Strips *all, int6
         Int slot = i_iota() + i;
         SampleKey key = sightline_key(t, slot), own = slot_key(t, slot);
         Strip s = strip_sample(all, &own);
-        m = m & mi_lt(i_set(0), strip_narrow(t, b, &key, sightline_lens(t, &own), all->end, &s, m));
+        m = m & mi_lt(i_set(0), strip_narrow(t, b, &key, sample_lens(t, &own), all->end, &s, m));
         Curve c;
         curve_find(t, b, slot, &s, m, &c);
         c.m = c.m & m & strips_inside(all, c.x, c.y);
@@ -414,7 +414,7 @@ static void curves_start(Tracer *t, const Segments *q, int64_t first, int32_t ha
         f_store(t->ws.film_x + k, 0.5f * (s.x[0] + s.x[1]));
         f_store(t->ws.film_y + k, 0.5f * (s.y[0] + s.y[1]));
         for (int end = 0; end < 2; end++) {
-            SensorRay r = sensor_ray(t->scene, t->sensor, s.x[end], s.y[end], sightline_lens(t, &own));
+            SensorRay r = sensor_ray(t->scene, t->sensor, s.x[end], s.y[end], sample_lens(t, &own));
             r.ray.tmax = f_zero_unless(m_first_n(q->count - k), r.ray.tmax);
             path_begin(t, end * half + k, slot + end * half, &r.ray, r.weight);
         }

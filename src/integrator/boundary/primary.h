@@ -45,11 +45,7 @@ static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
     SampleKey key = slot_key(t, slot);
-    Vec2 lens = {f_set(0), f_set(0)};
-    if (sensor_has_lens(t->sensor)) {
-        lens = rng_2d(&key, DIMENSION_LENS);
-    }
-    out->view = view_make(t->scene, pinhole, t->sensor, lens);
+    out->view = view_make(t->scene, pinhole, t->sensor, sample_lens(t, &key));
     EdgePoint e = edge_sample(t->scene, b, rng_2d(&key, DIMENSION_EDGE), out->view.eye, pinhole->parallel);
     Seen s = view_see(&out->view, e.p);
     s.valid = s.valid | (edge_clips(&e) & m_gt(s.local.z, f_set(0))); // which lie on the plane, as far as floats can tell

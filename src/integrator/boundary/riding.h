@@ -53,7 +53,7 @@ static Vec3 riding_sight(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
     const PathJob *job = t->job;
     SampleKey key = slot_key(t, slot);
     Vec2 u = rng_2d(&key, DIMENSION_EDGE_SEGMENT), film = rng_2d(&key, DIMENSION_SEGMENT_END);
-    Vec2 lens = sensor_has_lens(t->sensor) ? rng_2d(&key, DIMENSION_LENS) : (Vec2){f_set(0.5f), f_set(0.5f)};
+    Vec2 lens = sample_lens(t, &key);
     Float x = (real)job->x + film.x * (real)job->width, y = (real)job->y + film.y * (real)job->height;
     Ray ray = sensor_ray(scene, t->sensor, x, y, lens).ray;
     Hit hit = trace_solid(t, &ray, true, m, NULL);

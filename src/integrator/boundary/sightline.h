@@ -90,12 +90,6 @@ KFN SampleKey sightline_key(const Tracer *t, Int slot) {
     return key;
 }
 
-// Where on its lens the sensor looks from.
-KFN Vec2 sightline_lens(const Tracer *t, const SampleKey *key) {
-    Vec2 centre = {f_set(0), f_set(0)};
-    return sensor_has_lens(t->sensor) ? rng_2d(key, DIMENSION_LENS) : centre;
-}
-
 static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens, Float x, Float y, Mask m, Sightline *s) {
     SensorRay start = sensor_ray(t->scene, t->sensor, x, y, lens);
     Ray ray = start.ray;

@@ -7,8 +7,7 @@
 KFN Vec2 near_lens(const Indirect *in, Int slot) {
     SampleKey key = slot_key(in->t, slot);
     key.scramble = in->b->job.scramble;
-    Vec2 centre = {f_set(0.5f), f_set(0.5f)};
-    return sensor_has_lens(in->t->sensor) ? rng_2d(&key, DIMENSION_LENS) : centre;
+    return sample_lens(in->t, &key);
 }
 
 // Adds the adjoint `worth` of points that slide over their surfaces because the sensor sees them at fixed film positions.
