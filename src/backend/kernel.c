@@ -193,6 +193,9 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
         if (t->job->corner_at) {
             corner_stage(t, begin);
         }
+        if (t->job->glossy) {
+            glossy_stage(t, begin);
+        }
         if (t->scene->drops) {
             kept_stage(t, t->job->moved ? t->job->moved : t->scene, count);
         }

@@ -52,6 +52,11 @@ bool rey_bsdf_spreads(int kind) {
     return !rey_bsdf_kinds[kind].adapter && (kind == BSDF_PLASTIC || !rey_bsdf_bends(kind));
 }
 
+bool rey_bsdf_glossy(int kind) {
+    bool rough = kind == BSDF_ROUGHCONDUCTOR || kind == BSDF_ROUGHDIELECTRIC || kind == BSDF_ROUGHPLASTIC;
+    return rough || kind == BSDF_PRINCIPLED || kind == BSDF_PRINCIPLEDTHIN;
+}
+
 bool rey_bsdf_mirrors(int kind) { return rey_bsdf_bends(kind) && kind != BSDF_MASK && kind != BSDF_NULL; }
 
 bool rey_bsdf_refracts(int kind) { return kind == BSDF_DIELECTRIC; }

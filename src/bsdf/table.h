@@ -27,6 +27,8 @@ int rey_bsdf_kind_find(const char *name); // -1 when unknown
 bool rey_bsdf_bends(int kind);
 // Whether light from other than single directions is scattered: by the function itself, not by its children.
 bool rey_bsdf_spreads(int kind);
+// Whether it scatters into lobes about single directions, which may be narrow: by itself, not through children.
+bool rey_bsdf_glossy(int kind);
 // Whether smooth surfaces of a kind turn paths into other directions by themselves.
 bool rey_bsdf_mirrors(int kind);
 // Whether smooth surfaces of a kind refract.

@@ -113,47 +113,38 @@ static Corner corner_load(const Tracer *t, const RecordBatch *batch) {
 
 // ---- the light of the walls --------------------------------------------------------------------------------------
 
-// Starts paths n... at the points next to the vertices of a batch; notes in ws.next which vertices those are.
-static int32_t corner_push(Tracer *t, const RecordBatch *batch, int32_t n) {
+// Starts paths n... of the lanes m, which are what vertices `at`... see along d from `from`, as directions of that density would;
+// notes in ws.next which vertices those are, and returns the number of paths.
+static int32_t side_push(Tracer *t, int32_t at, Vec3 from, Vec3 d, const Hit *hit, Float density, Mask m, int32_t n) {
     Workspace *ws = &t->ws;
     const Records *r = &ws->records;
-    Corner c = corner_load(t, batch);
-    if (!m_any(c.m)) {
-        return 0;
-    }
-    int32_t at = batch->first;
-    Vec3 from = record_v3(r->px, r->py, r->pz, at), normal;
-    Float room = c.at * (1.0f - c.at * f_safe_rcp(c.length));
-    Float height = f_min(c.apart, 0.5f * c.steep * room);
-    Vec3 p = v3_madd(v3_madd(c.o, c.at, c.along), height, c.up), d = v3_normalize(v3_sub(p, from));
-    Hit hit = corner_hit(t, &c, p, &normal);
     Paths *q = &ws->paths[0];
     Spec beta = spec_mul(spec_load(r->beta, at), spec_load(r->weight, at));
-    Int group = SHAPE_FIELD(t->scene, hit.shape, group) + 1;
-    v3_compress(q->ox + n, q->oy + n, q->oz + n, from, c.m);
-    v3_compress(q->px + n, q->py + n, q->pz + n, from, c.m);
-    v3_compress(q->dx + n, q->dy + n, q->dz + n, d, c.m);
-    f_compress(q->eta2 + n, f_max(spec_max(beta), f_set(1e-3f)), c.m); // roulette as of the path itself
-    i_compress(q->slot + n, i_load(r->slot + at), c.m);
-    v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, p, c.m);
-    f_compress(ws->hit_u + n, hit.u, c.m);
-    f_compress(ws->hit_v + n, hit.v, c.m);
-    i_compress(ws->hit_shape + n, hit.shape, c.m);
-    i_compress(ws->hit_prim + n, hit.prim, c.m);
-    i_compress(ws->hit_instance + n, hit.instance, c.m);
-    i_compress(ws->hit_group + n, group, c.m);
-    i_compress(ws->next + n, i_iota() + at, c.m);
-    return m_count(c.m);
+    Int group = SHAPE_FIELD(t->scene, hit->shape, group) + 1;
+    v3_compress(q->ox + n, q->oy + n, q->oz + n, from, m);
+    v3_compress(q->px + n, q->py + n, q->pz + n, from, m);
+    v3_compress(q->dx + n, q->dy + n, q->dz + n, d, m);
+    f_compress(q->pdf + n, density, m);
+    f_compress(q->eta2 + n, f_max(spec_max(beta), f_set(1e-3f)), m); // roulette as of the path itself
+    i_compress(q->slot + n, i_load(r->slot + at), m);
+    v3_compress(ws->hit_x + n, ws->hit_y + n, ws->hit_z + n, hit->p, m);
+    f_compress(ws->hit_u + n, hit->u, m);
+    f_compress(ws->hit_v + n, hit->v, m);
+    i_compress(ws->hit_shape + n, hit->shape, m);
+    i_compress(ws->hit_prim + n, hit->prim, m);
+    i_compress(ws->hit_instance + n, hit->instance, m);
+    i_compress(ws->hit_group + n, group, m);
+    i_compress(ws->next + n, i_iota() + at, m);
+    return m_count(m);
 }
 
 // Runs n such paths, whose first vertices are those of number `bounce`, and leaves what they bring with the vertices.
-static void corner_run(Tracer *t, int32_t *begin, int32_t n, int32_t bounce) {
+static void side_paths_run(Tracer *t, int32_t *begin, int32_t n, int32_t bounce) {
     Workspace *ws = &t->ws;
     Paths *q = &ws->paths[0];
     for (int32_t k = 0; k < n; k += LANES) {
         f_store(q->tmax + k, f_set(INFINITY));
         f_store(q->roulette + k, f_set(1));
-        f_store(q->pdf + k, f_set(PDF_DELTA));
         f_store(q->skip + k, f_set(0));
         spec_store(q->beta, k, spec_set(f_set(1)));
         i_store(q->depth + k, i_set(bounce));
@@ -170,9 +161,24 @@ static void corner_run(Tracer *t, int32_t *begin, int32_t n, int32_t bounce) {
     for (int32_t k = 0; k < n; k++) {
         int32_t record = ws->next[k], slot = ws->records.slot[record];
         for (int c = 0; c < SPEC_N; c++) {
-            ws->records.corner[c][record] = ws->radiance[c][slot];
+            ws->records.side[c][record] = ws->radiance[c][slot];
         }
     }
+}
+
+// Starts paths n... at the points next to the vertices of a batch.
+static int32_t corner_push(Tracer *t, const RecordBatch *batch, int32_t n) {
+    Corner c = corner_load(t, batch);
+    if (!m_any(c.m)) {
+        return 0;
+    }
+    const Records *r = &t->ws.records;
+    Vec3 from = record_v3(r->px, r->py, r->pz, batch->first), normal;
+    Float room = c.at * (1.0f - c.at * f_safe_rcp(c.length));
+    Float height = f_min(c.apart, 0.5f * c.steep * room);
+    Vec3 p = v3_madd(v3_madd(c.o, c.at, c.along), height, c.up);
+    Hit hit = corner_hit(t, &c, p, &normal);
+    return side_push(t, batch->first, from, v3_normalize(v3_sub(p, from)), &hit, f_set(PDF_DELTA), c.m, n);
 }
 
 // Finds it for all vertices of a chunk that look through a lens.
@@ -186,7 +192,7 @@ static void corner_stage(Tracer *t, int32_t *begin) {
             n += batch->tag == VERTEX_SURFACE && !batch->ends ? corner_push(t, batch, n) : 0;
         }
         if (n > 0) {
-            corner_run(t, begin, n, bounce + 1);
+            side_paths_run(t, begin, n, bounce + 1);
         }
     }
     *t = before;
@@ -227,7 +233,7 @@ KFN Vec3 corner_segment_adj(const Corner *k, Vec3 from, Vec3 w, Vec3 n, Float c,
 // What is subtracted for one delta: returns the adjoint of the vertex's position.
 static Vec3 corner_move_adj(const Tracer *t, const SurfaceSweep *s, Spec weight, Sink *sink) {
     const Corner *corner = s->corner;
-    Spec l0 = spec_zero_unless(corner->m, spec_load(t->ws.records.corner, s->at));
+    Spec l0 = spec_zero_unless(corner->m, spec_load(t->ws.records.side, s->at));
     VertexAdj v;
     double unused = 0;
     Sink still = still_sink(t->job, &unused);

@@ -66,6 +66,7 @@ typedef struct PathJob {
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none
+    bool glossy;                  // some surfaces scatter into narrow lobes (glossy.h)
     const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
     bool live_extinctions;        // that of some medium depends on the selection
     bool live_borders;            // so does where some medium begins and ends

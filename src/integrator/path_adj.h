@@ -7,7 +7,7 @@
 #pragma once
 
 #include "integrator/collision_adj.h"
-#include "integrator/corner.h"
+#include "integrator/glossy.h"
 #include "integrator/kept.h"
 
 static void escape_adj(Tracer *t, Sink *sink, const RecordBatch *batch) {
@@ -128,6 +128,9 @@ KFN void surface_adj(const Tracer *t, const SurfaceSweep *s, int32_t live, Spec 
     if (sink->any_motion) {
         d.onward = f_zero_unless(scattered, spec_dot(spec_mul(weight, s->attached), spec_load(t->ws.records.weight, s->at)));
         d.p = s->corner ? corner_move_adj(t, s, weight, sink) : s->dp;
+        if (s->glossy) {
+            glossy_move_adj(t, s, weight, &d, sink);
+        }
         vertex_move_adj(t, s, &d, weight, live, channel, sink);
     } else if (sink->any_normals && s->group->shape_kind == SHAPE_MESH) {
         vertex_frame_adj(s, call.surface != NULL, &d);
@@ -188,6 +191,11 @@ static void surface_sweep(Tracer *t, const RecordBatch *batch, SurfaceSweep *s, 
         corner = corner_load(t, batch);
         s->corner = m_any(corner.m) ? &corner : NULL;
         corner_meet(t, s->slot, &corner);
+    }
+    Glossy glossy;
+    if (job->glossy && !batch->ends) {
+        glossy = glossy_load(t, s);
+        s->glossy = m_any(glossy.m) ? &glossy : NULL;
     }
     Spec unshadowed = s->light_weight, transmittance = spec_set(f_set(1));
     if (t->scene->through) {

@@ -30,13 +30,14 @@ enum {
 // scattering function),
 // the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
 // camera or a collision, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
-// radiance arriving along the sampled direction. corner: see corner.h; keep, slope, met and the density
-// of the light sample: see kept.h.
+// radiance arriving along the sampled direction. side: see corner.h and glossy.h, glance_: the latter; keep, slope, met and the
+// density of the light sample: see kept.h.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
-    F(sw) F(keep) F(slope) F(light_pdf)
-#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(corner) S(met)
-#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)
+    F(sw) F(keep) F(slope) F(light_pdf) F(glance_distance)
+#define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(side) S(met)
+#define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)  \
+    I(glance_shape) I(glance_prim) I(glance_instance)
 
 // Of a camera sample: where it lies on the film, its alpha, and whether it has met what a derivative is asked for (vertex.h).
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage) F(reached)

@@ -47,6 +47,7 @@ typedef struct SurfaceSweep {
     const EmitterRecord *emitter;
     const Group *group;
     const struct Corner *corner; // where some look through a lens (corner.h), else null
+    const struct Glossy *glossy; // where some scatter into narrow lobes (glossy.h), else null
 } SurfaceSweep;
 
 // Lanes whose path goes on along a direction that follows from how it came. Where shadow rays pass surfaces, so does
@@ -71,6 +72,7 @@ KFN void surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec 
     s->attached = suffix;
     s->group = t->scene->groups + batch->group;
     s->corner = NULL;
+    s->glossy = NULL;
     s->dp = v3_zero();
     s->hit = batch->local ? (Hit){.u = f_load(r->u + at), .v = f_load(r->v + at)} : surface_hit(r, at);
     s->d = record_v3(r->dx, r->dy, r->dz, at);

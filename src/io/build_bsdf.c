@@ -257,6 +257,7 @@ static rey_result build_children(Builder *b, rey_xml_node *node, const BsdfKind 
         bsdf->turns |= nested->turns;
         bsdf->transmits |= nested->transmits;
         bsdf->spreads |= nested->spreads;
+        bsdf->glossy |= nested->glossy;
         bsdf->aims &= nested->aims;
     }
     return REY_OK;
@@ -267,6 +268,7 @@ static rey_result add_bsdf(Builder *b, int kind, BsdfNode bsdf, int32_t *out) {
     int32_t size = rey_bsdf_table_size(kind);
     bsdf.kind = kind;
     bsdf.spreads |= rey_bsdf_spreads(kind);
+    bsdf.glossy |= rey_bsdf_glossy(kind);
     bsdf.aims &= !bsdf.transmits && !rey_bsdf_bends(kind);
     bsdf.table = -1;
     if (size > 0) {

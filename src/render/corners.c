@@ -1,4 +1,4 @@
-// corners.c: which inner corners the interior term has to look out for.
+// corners.c: what the interior term has to look out for.
 #include "render/corners.h"
 
 #include "bsdf/table.h"
@@ -34,6 +34,8 @@ rey_result rey_corners_begin(Render *r) {
     if (!r->job.any_motion || !plain || r->request.asked || !(r->terms & REY_TERM_INTERIOR)) {
         return REY_OK;
     }
+    r->job.glossy = rey_bsdfs_used(view, rey_bsdf_glossy);
+    r->job.none = r->none;
     const Sliding sliding = {r, r->job.any_camera || rey_boundary_chained(view)};
     rey_result result = rey_corners_find(r->scene, moves_on_film, &sliding, &r->corners);
     CornerRecord *all = r->corners.data;
@@ -58,6 +60,5 @@ rey_result rey_corners_begin(Render *r) {
     }
     r->job.corners = all;
     r->job.corner_at = r->corner_at;
-    r->job.none = r->none;
     return REY_OK;
 }

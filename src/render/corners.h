@@ -1,7 +1,7 @@
-// corners.h: the inner corners that the interior term looks out for (integrator/corner.h).
+// corners.h: where noise is taken out of the interior term: at inner corners (integrator/corner.h) and narrow lobes (glossy.h).
 #pragma once
 
 #include "render/render_parts.h"
 
-// Finds them, after the selection is mapped and the terms are known.
+// Finds out, after the selection is mapped and the terms are known.
 rey_result rey_corners_begin(Render *r);

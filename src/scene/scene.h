@@ -45,6 +45,7 @@ typedef struct BsdfNode {
     int32_t table;               // first derived value in `tables`, -1 = none
     int32_t transmits;           // lets light through, itself or in a child
     int32_t spreads;             // scatters into more than single directions, itself or in a child
+    int32_t glossy;              // scatters into lobes about single directions, itself or in a child
     int32_t aims;                // all of its light, and of its children's, is spread to its own side: directions can be mixed
     int32_t surface;             // asks for the parameterisation of the surface, itself or in a child
     int32_t turns;               // turns the shading normal, itself or in a child
