@@ -97,16 +97,23 @@ static Hit corner_hit(const Tracer *t, const Corner *c, Vec3 p, Vec3 *n) {
     return point_hit(t->scene, i_select(c->m, c->wall, i_set(-1)), i_select(c->m, c->prim, i_set(0)), i_set(0), p, n);
 }
 
-// The recorded vertices of a batch, as their corners see them.
-static Corner corner_load(const Tracer *t, const RecordBatch *batch) {
+// Of the recorded vertices of a batch.
+static Corner corner_near(const Tracer *t, const RecordBatch *batch) {
     const Records *r = &t->ws.records;
     int32_t at = batch->first;
     Mask smooth = m_first_n(batch->count) & m_gt(f_load(r->sw + at), f_set(0));
     smooth = smooth & mi_eq(i_select(smooth, i_load(r->lobe + at), i_set(-1)), i_set(LOBE_SMOOTH));
     Hit hit = {.shape = i_select(smooth, i_load(r->shape + at), i_set(0)), .p = record_v3(r->px, r->py, r->pz, at)};
-    Corner c = corner_find(t, &hit, record_v3(r->dx, r->dy, r->dz, at), batch->bounce == 0, smooth);
+    return corner_find(t, &hit, record_v3(r->dx, r->dy, r->dz, at), batch->bounce == 0, smooth);
+}
+
+// As their corners see them.
+static Corner corner_load(const Tracer *t, const RecordBatch *batch) {
+    const Records *r = &t->ws.records;
+    int32_t at = batch->first;
+    Corner c = corner_near(t, batch);
     if (m_any(c.m)) {
-        corner_pass(&c, hit.p, record_v3(r->wox, r->woy, r->woz, at));
+        corner_pass(&c, record_v3(r->px, r->py, r->pz, at), record_v3(r->wox, r->woy, r->woz, at));
     }
     return c;
 }

@@ -52,18 +52,19 @@ static void glossy_refract(const SurfaceSweep *s, Glossy *g) {
 // Of the lanes of m, those whose path goes on in a narrow lobe.
 static NOINLINE Glossy glossy_find(const Tracer *t, const SurfaceSweep *s, Mask m) {
     const BsdfNode *node = t->scene->bsdfs + s->group->bsdf;
-    Glossy g = {.m = m_set(false), .refracts = m_set(false)};
+    Glossy g = {.m = m_set(false), .refracts = m_set(false), .k = f_set(0), .cos_t = f_set(1)};
     if (!node->glossy || node->turns || node->surface) {
         return g;
     }
     g.m = m & s->scattered & mi_eq(s->lobe, i_set(LOBE_SMOOTH)) & m_gt(f_abs(s->wi.z), f_set(1e-2f));
-    g.refracts = m_lt(s->wo.z * s->wi.z, f_set(0));
+    g.refracts = g.m & m_lt(s->wo.z * s->wi.z, f_set(0));
     g.local = v3(-s->wi.x, -s->wi.y, s->wi.z);
     g.reach = 1.0f - f_safe_sqrt(1.0f - s->wi.z * s->wi.z);
     if (node->kind == BSDF_ROUGHDIELECTRIC) {
         glossy_refract(s, &g);
     } else {
         g.m = g.m & ~g.refracts;
+        g.refracts = m_set(false);
     }
     g.d = frame_to_world(&s->si.sh, g.local);
     return g;
@@ -100,7 +101,11 @@ static int32_t glossy_push(Tracer *t, const RecordBatch *batch, int32_t n) {
     }
     SurfaceSweep s;
     glossy_sweep(t, batch, &s);
-    Glossy g = glossy_find(t, &s, t->job->corner_at ? s.m & ~corner_load(t, batch).m : s.m);
+    // Whether a vertex has a corner must not depend on w, as does whether that passes through the corner's lens.
+    Glossy g = glossy_find(t, &s, t->job->corner_at ? s.m & ~corner_near(t, batch).m : s.m);
+    if (!m_any(g.m)) {
+        return 0;
+    }
     Float density = bsdf_pdf(&s.call, s.wi, g.local, i_set(LOBE_SMOOTH));
     g.m = g.m & m_gt(density, f_set(NARROW)) & m_gt(density * g.reach, f_set(INSIDE));
     Vec3 o = interaction_offset(&s.si, g.d);

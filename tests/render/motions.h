@@ -81,6 +81,7 @@ static const Motion motions[] = {
     {"glossy_floor.xml", "wall.to_world", TURN, {1, 0.3f, 0.2f}, 1, 1},
     {"glossy_floor.xml", "camera.to_world", SHIFT, {1, 0.2f, 0.5f}, 0.02, 1},
     {"glossy_low.xml", "floor.to_world", TURN, {1, 0.3f, 0.2f}, 0.5, 4},
+    {"glossy_veil.xml", "floor.to_world", TURN, {1, 0.3f, 0.2f}, 0.5, 2},
     {"glossy_pane.xml", "pane.to_world", TURN, {1, 0.3f, 0.2f}, 1, 1},
     {"glossy_pane.xml", "wall.to_world", TURN, {1, 0.3f, 0.2f}, 1, 1},
     {"boundary_view.xml", "camera.to_world", TURN, {0.3f, 0.2f, 1}, 1, 1},
