@@ -191,10 +191,10 @@ static void run_chunk(Tracer *t, const FilterTable *filter, int64_t first, int32
             border_stage(t, begin, count);
         }
         if (t->job->corner_at) {
-            corner_stage(t, begin);
+            side_stage(t, begin, corner_push);
         }
         if (t->job->glossy) {
-            glossy_stage(t, begin);
+            side_stage(t, begin, glossy_push);
         }
         if (t->scene->drops) {
             kept_stage(t, t->job->moved ? t->job->moved : t->scene, count);

@@ -175,6 +175,9 @@ static void side_paths_run(Tracer *t, int32_t *begin, int32_t n, int32_t bounce)
 
 // Starts paths n... at the points next to the vertices of a batch.
 static int32_t corner_push(Tracer *t, const RecordBatch *batch, int32_t n) {
+    if (batch->ends) {
+        return 0;
+    }
     Corner c = corner_load(t, batch);
     if (!m_any(c.m)) {
         return 0;
@@ -188,15 +191,15 @@ static int32_t corner_push(Tracer *t, const RecordBatch *batch, int32_t n) {
     return side_push(t, batch->first, from, v3_normalize(v3_sub(p, from)), &hit, f_set(PDF_DELTA), c.m, n);
 }
 
-// Finds it for all vertices of a chunk that look through a lens.
-static void corner_stage(Tracer *t, int32_t *begin) {
+// Runs the side paths of all vertices of a chunk, bounce by bounce; push starts those of a batch, and returns their number.
+static void side_stage(Tracer *t, int32_t *begin, int32_t (*push)(Tracer *t, const RecordBatch *batch, int32_t n)) {
     const Tracer before = *t;
     t->derivative = false;
     for (int32_t b = 0; b < before.batch_count;) {
         int32_t n = 0, bounce = before.ws.batches[b].bounce;
         for (; b < before.batch_count && before.ws.batches[b].bounce == bounce; b++) {
             const RecordBatch *batch = before.ws.batches + b;
-            n += batch->tag == VERTEX_SURFACE && !batch->ends ? corner_push(t, batch, n) : 0;
+            n += batch->tag == VERTEX_SURFACE ? push(t, batch, n) : 0;
         }
         if (n > 0) {
             side_paths_run(t, begin, n, bounce + 1);

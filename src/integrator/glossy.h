@@ -84,107 +84,48 @@ static Mask glossy_moves(const Tracer *t, const RecordBatch *batch, int32_t *mov
     return moves | before;
 }
 
-static void glossy_sweep(const Tracer *t, const RecordBatch *batch, SurfaceSweep *s) {
-    Mask m = m_first_n(batch->count);
-    surface_load(t, batch, i_select(m, i_load(t->ws.records.slot + batch->first), i_set(0)), spec_zero(), s);
+// Of the rays of m that met hit, those whose points may matter: they move, or are seen from what does, and scatter, so that light's
+// path goes on from them.
+static Mask glance_matters(const Tracer *t, const Hit *hit, Mask moves, Mask m) {
+    m = m & mi_lt(i_set(-1), hit->shape);
+    Int group = SHAPE_FIELD(t->scene, i_select(m, hit->shape, i_set(0)), group);
+    moves = moves | mi_lt(i_set(0), i_gather(t->job->live, group) & LIVE_MOTION);
+    return m & moves & mi_eq(BSDF_FIELD(t->scene, GROUP_FIELD(t->scene, group, bsdf), spreads), i_set(1));
 }
 
-// Starts rays n... along the narrow lobes of a batch; ws.next: the records that they belong to, ws.order: whether these move.
+// Starts paths n... at what the vertices of a batch see along the middles of their narrow lobes, which their records note; returns
+// the number of paths.
 static int32_t glossy_push(Tracer *t, const RecordBatch *batch, int32_t n) {
-    Workspace *ws = &t->ws;
-    Paths *q = &ws->paths[0];
+    const Records *r = &t->ws.records;
     const int32_t at = batch->first;
-    i_store(ws->records.glance_shape + at, i_set(-1));
-    Mask moves = glossy_moves(t, batch, ws->next_light);
+    i_store(r->glance_shape + at, i_set(-1));
+    Mask moves = glossy_moves(t, batch, t->ws.next_light), m = m_first_n(batch->count);
     if (batch->ends || !t->scene->bsdfs[t->scene->groups[batch->group].bsdf].glossy) {
         return 0;
     }
     SurfaceSweep s;
-    glossy_sweep(t, batch, &s);
+    surface_load(t, batch, i_select(m, i_load(r->slot + at), i_set(0)), spec_zero(), &s);
     // Whether a vertex has a corner must not depend on w, as does whether that passes through the corner's lens.
-    Glossy g = glossy_find(t, &s, t->job->corner_at ? s.m & ~corner_near(t, batch).m : s.m);
+    Glossy g = glossy_find(t, &s, t->job->corner_at ? m & ~corner_near(t, batch).m : m);
     if (!m_any(g.m)) {
         return 0;
     }
     Float density = bsdf_pdf(&s.call, s.wi, g.local, i_set(LOBE_SMOOTH));
-    g.m = g.m & m_gt(density, f_set(NARROW)) & m_gt(density * g.reach, f_set(INSIDE));
-    Vec3 o = interaction_offset(&s.si, g.d);
-    v3_compress(q->ox + n, q->oy + n, q->oz + n, o, g.m);
-    v3_compress(q->dx + n, q->dy + n, q->dz + n, g.d, g.m);
-    i_compress(ws->next + n, i_iota() + at, g.m);
-    i_compress(ws->order + n, i_select(moves, i_set(1), i_set(0)), g.m);
-    return m_count(g.m);
-}
-
-// Traces them, and notes what they meet that may matter: the light's path goes on from surfaces that scatter.
-static void glossy_look(Tracer *t, int32_t n) {
-    Workspace *ws = &t->ws;
-    for (int32_t k = 0; k < n; k += LANES) {
-        Mask m = m_first_n(n - k);
-        Int record = i_select(m, i_load(ws->next + k), i_set(ws->next[k]));
-        Ray ray = path_ray(&ws->paths[0], k);
-        ray.tmax = f_set(INFINITY);
-        Hit hit = trace_media(t, &ray, m, false);
-        Mask met = m & mi_lt(i_set(-1), hit.shape);
-        Int shape = i_select(met, hit.shape, i_set(0)), group = SHAPE_FIELD(t->scene, shape, group);
-        Int live = i_gather(t->job->live, group) & LIVE_MOTION;
-        met = met & (mi_lt(i_set(0), live) | mi_eq(i_load(ws->order + k), i_set(1)));
-        Int bsdf = i_gather((const int32_t *)t->scene->groups, group * (int32_t)(sizeof(Group) / 4));
-        int32_t spreads = (int32_t)(offsetof(BsdfNode, spreads) / 4), size = (int32_t)(sizeof(BsdfNode) / 4);
-        met = met & mi_eq(i_gather((const int32_t *)t->scene->bsdfs, bsdf * size + spreads), i_set(1));
-        i_scatter(ws->records.glance_shape, record, i_select(met, hit.shape, i_set(-1)), m);
-        i_scatter(ws->records.glance_prim, record, hit.prim, m);
-        i_scatter(ws->records.glance_instance, record, hit.instance, m);
-        f_scatter(ws->records.glance_distance, record, v3_length(v3_sub(hit.p, ray.o)), m);
-    }
-    t->job->rays += n;
-}
-
-// What a record has noted.
-static Hit glance_hit(const Tracer *t, int32_t at, Vec3 from, Vec3 d, Mask m, Vec3 *n) {
-    const Records *r = &t->ws.records;
-    Vec3 p = v3_madd(from, f_load(r->glance_distance + at), d);
-    return point_hit(t->scene, i_select(m, i_load(r->glance_shape + at), i_set(-1)), i_load(r->glance_prim + at),
-                     i_load(r->glance_instance + at), p, n);
-}
-
-// Starts paths n... at what the vertices of a batch see so; notes in ws.next which vertices those are.
-static int32_t glossy_follow(Tracer *t, const RecordBatch *batch, int32_t n) {
-    const int32_t at = batch->first;
-    Mask m = m_first_n(batch->count) & mi_lt(i_set(-1), i_load(t->ws.records.glance_shape + at));
+    m = g.m & m_gt(density, f_set(NARROW)) & m_gt(density * g.reach, f_set(INSIDE));
     if (!m_any(m)) {
         return 0;
     }
-    SurfaceSweep s;
-    glossy_sweep(t, batch, &s);
-    Glossy g = glossy_find(t, &s, m);
-    Vec3 from = interaction_offset(&s.si, g.d), normal;
-    Hit hit = glance_hit(t, at, from, g.d, m, &normal);
+    Ray ray = {interaction_offset(&s.si, g.d), g.d, f_set(INFINITY)};
+    Hit hit = trace_media(t, &ray, m, false);
+    t->job->rays += m_count(m);
+    m = glance_matters(t, &hit, moves, m);
+    i_store(r->glance_shape + at, i_select(m, hit.shape, i_set(-1)));
+    i_store(r->glance_prim + at, hit.prim);
+    i_store(r->glance_instance + at, hit.instance);
+    f_store(r->glance_distance + at, v3_length(v3_sub(hit.p, ray.o)));
+    hit.shape = i_select(m, hit.shape, i_set(0));
     // Lights are weighted there as along w, so that what light samples bring is not subtracted.
-    Float density = bsdf_pdf(&s.call, s.wi, g.local, i_set(LOBE_SMOOTH));
-    return side_push(t, at, from, g.d, &hit, density, m, n);
-}
-
-// Finds it for all vertices of a chunk.
-static void glossy_stage(Tracer *t, int32_t *begin) {
-    const Tracer before = *t;
-    const RecordBatch *batches = before.ws.batches;
-    t->derivative = false;
-    for (int32_t b = 0, end; b < before.batch_count; b = end) {
-        int32_t n = 0, bounce = batches[b].bounce;
-        for (end = b; end < before.batch_count && batches[end].bounce == bounce; end++) {
-            n += batches[end].tag == VERTEX_SURFACE ? glossy_push(t, batches + end, n) : 0;
-        }
-        glossy_look(t, n);
-        n = 0;
-        for (int32_t i = b; i < end; i++) {
-            n += batches[i].tag == VERTEX_SURFACE ? glossy_follow(t, batches + i, n) : 0;
-        }
-        if (n > 0) {
-            side_paths_run(t, begin, n, bounce + 1);
-        }
-    }
-    *t = before;
+    return side_push(t, at, ray.o, g.d, &hit, density, m, n);
 }
 
 // ---- what is subtracted ------------------------------------------------------------------------------------------
@@ -193,6 +134,14 @@ static void glossy_stage(Tracer *t, int32_t *begin) {
 static Glossy glossy_load(const Tracer *t, const SurfaceSweep *s) {
     Mask m = s->m & mi_lt(i_set(-1), i_load(t->ws.records.glance_shape + s->at));
     return m_any(m) ? glossy_find(t, s, m) : (Glossy){.m = m_set(false)};
+}
+
+// What a record has noted.
+static Hit glance_hit(const Tracer *t, int32_t at, Vec3 from, Vec3 d, Mask m, Vec3 *n) {
+    const Records *r = &t->ws.records;
+    Vec3 p = v3_madd(from, f_load(r->glance_distance + at), d);
+    return point_hit(t->scene, i_select(m, i_load(r->glance_shape + at), i_set(-1)), i_load(r->glance_prim + at),
+                     i_load(r->glance_instance + at), p, n);
 }
 
 // Adds the adjoint a of the middle of the lobes to those of the direction and the frame that it follows from.

@@ -30,6 +30,12 @@ KFN TexCoord texcoord(Vec2 uv, const Hit *hit) { return (TexCoord){uv.x, uv.y, h
 #define SHAPE_FIELD(scene, id, field)                                                                                  \
     i_gather_shared((const int32_t *)(scene)->shapes, (id) * (int32_t)(sizeof(ShapeRecord) / 4) +                      \
                                                           (int32_t)(offsetof(ShapeRecord, field) / 4))
+#define GROUP_FIELD(scene, id, field)                                                                                  \
+    i_gather_shared((const int32_t *)(scene)->groups, (id) * (int32_t)(sizeof(Group) / 4) +                            \
+                                                          (int32_t)(offsetof(Group, field) / 4))
+#define BSDF_FIELD(scene, id, field)                                                                                   \
+    i_gather_shared((const int32_t *)(scene)->bsdfs, (id) * (int32_t)(sizeof(BsdfNode) / 4) +                          \
+                                                         (int32_t)(offsetof(BsdfNode, field) / 4))
 
 // A float among the numbers of shapes (the tests compile these headers with wider ones).
 #ifdef REAL_DOUBLE
