@@ -1,6 +1,8 @@
 // cases.c: random scenes for the kind tests.
 #include "cases.h"
 
+#include "base/parallel.h"
+
 #include <stdlib.h>
 
 Random case_random(int number) {
@@ -284,6 +286,10 @@ double chi_square_tail(double degrees, double value) {
         }
     }
     return scale * h;
+}
+
+int case_width_count(void) {
+    return rey_widest_lanes() >= 16 ? 3 : rey_widest_lanes() >= 8 ? 2 : 1;
 }
 
 double normal_tail(double z) {

@@ -64,6 +64,9 @@ bool case_turns(const KindCase *c);
 // Describes a failing case on standard error.
 void case_print(const KindCase *c, const Query *q);
 
+// How many of the widths 1, 8 and 16 the processor has.
+int case_width_count(void);
+
 // A unit vector on either side; a quarter of them grazing.
 void random_direction(Random *r, double v[3]);
 

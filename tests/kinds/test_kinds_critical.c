@@ -4,8 +4,6 @@
 // sampling as for derivatives adds less and less.
 #include "cases.h"
 
-#include "base/parallel.h"
-
 enum { DECADES = 5, STEPS = 24, AZIMUTHS = 24 };
 
 static const KindKernels *const exact = &kind_kernels_double;
@@ -124,7 +122,7 @@ static void test_digits(void **state) {
     case_set(&c, "alpha_v", 0.1);
     case_set(&c, "eta", eta);
     c.floor = floor;
-    const int width_count = rey_widest_lanes() >= 16 ? 3 : rey_widest_lanes() >= 8 ? 2 : 1;
+    const int width_count = case_width_count();
     for (int w = 0; w < width_count; w++) {
         int counted = 0;
         for (int i = 0; i < N; i++) {

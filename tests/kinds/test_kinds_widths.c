@@ -3,8 +3,6 @@
 // that is more (narrow lobes, cancellation).
 #include "cases.h"
 
-#include "base/parallel.h"
-
 enum { CASES = 300, N = 33, INPUTS = 8, NUMBERS = 13, NUDGES = 6, SHIFTS = 12 }; // N: no multiple of a width
 
 static const KindKernels *const exact = &kind_kernels_double;
@@ -217,7 +215,7 @@ static int check_samples(const KindCase *c, Random *r, int width_count) {
 
 static void test_every_kind(void **state) {
     UNUSED(state);
-    int failures = 0, width_count = rey_widest_lanes() >= 16 ? 3 : rey_widest_lanes() >= 8 ? 2 : 1;
+    int failures = 0, width_count = case_width_count();
     for (int kind = 0; kind < rey_bsdf_kind_count; kind++) {
         Random r = case_random(kind * 1000 + 3);
         int here = 0;

@@ -2,7 +2,6 @@
 // other.
 #include "sphere.h"
 
-#include "base/parallel.h"
 #include "emitter/table.h"
 
 #include <stdlib.h>
@@ -240,7 +239,7 @@ static void test_adjoints(void **state) {
 static void test_widths(void **state) {
     UNUSED(state);
     static const KindKernels *const widths[] = {&kind_kernels_w1, &kind_kernels_w8, &kind_kernels_w16};
-    int failures = 0, width_count = rey_widest_lanes() >= 16 ? 3 : rey_widest_lanes() >= 8 ? 2 : 1;
+    int failures = 0, width_count = case_width_count();
     for (int light = 0; light < LIGHT_COUNT; light++) {
         Random r = case_random(light * 1000 + 11);
         int different = 0, n = 33;
