@@ -161,6 +161,24 @@ static bool accepted(CheckResult r) {
     return fabs(r.worst_z) <= check_z_threshold(r.tests) && fabs(r.sum_z) < 3;
 }
 
+// A derivative of some size in every block where the difference is 0.
+static CheckResult unseen(double size, double rounding) {
+    static double derivative[CHECK_SETS * ROW], difference[CHECK_SETS * ROW];
+    Blocks blocks = check_blocks(SIZE, SIZE);
+    for (int i = 0; i < CHECK_SETS * ROW; i++) {
+        derivative[i] = size;
+    }
+    return check_compare(&blocks, derivative, difference, difference, rounding);
+}
+
+static void rounding_is_no_derivative(void **state) {
+    (void)state;
+    assert_int_equal(unseen(1.9e-7, 1e-7).tests, 0);
+    CheckResult more = unseen(5e-7, 1e-7), none = unseen(NAN, 1e-7);
+    assert_true(more.tests == 3 * SIZE && !accepted(more));
+    assert_true(none.tests == 3 * SIZE && !accepted(none));
+}
+
 static void statistics_accept_noise_and_refuse_errors(void **state) {
     (void)state;
     int rejected = 0;
@@ -404,6 +422,7 @@ int main(void) {
         cmocka_unit_test(long_steps_are_seen), cmocka_unit_test(statistics_accept_noise_and_refuse_errors),
         cmocka_unit_test(blocks_are_means), cmocka_unit_test(vanishing_derivatives_have_no_digits),
         cmocka_unit_test(noise_that_is_shared_is_told),
+        cmocka_unit_test(rounding_is_no_derivative),
         cmocka_unit_test(verdicts_know_noise), cmocka_unit_test(reasons_are_grouped),
         cmocka_unit_test_setup_teardown(additions_sum_up, open_scene, close_scene),
         cmocka_unit_test_setup_teardown(motions_of_control_points, open_scene, close_scene),
