@@ -70,7 +70,7 @@ static void test_refusals(void **state) {
          "the black body's colour has a channel of"},
         {POINT("<spectrum type='irregular' name='intensity'><string name='values' value='1, 2'/>"
                "<string name='wavelengths' value='400'/></spectrum>"),
-         "one for each of its ascending wavelengths"},
+         "a spectrum of 2 values at 1 wavelengths, expected two or more values, one for each of its ascending wavelengths"},
         {POINT("<spectrum type='irregular' name='intensity'><string name='values' value='1, x'/>"
                "<string name='wavelengths' value='400, 500'/></spectrum>"),
          "'values' must be numbers"},

@@ -126,7 +126,7 @@ static const struct {
     {"<emitter type='spot'><texture type='volume' name='texture'>" GRID("v", "smoke.vol", "") "</texture></emitter>",
      "'texture' of 'spot' cannot be a volume"},
     {HETERO(GRID("sigma_t", "no.vol", "")), "no.vol"},
-    {HETERO(GRID("sigma_t", "scene.xml", "")), "scene.xml: byte 0: not a VOL file"},
+    {HETERO(GRID("sigma_t", "scene.xml", "")), "scene.xml: byte 0: not a VOL file, nor NanoVDB or .npy"},
     {HETERO(GRID("sigma_t", "two.vol", "")), "the grid has 2 channels, expected 1, 3 or 6"},
     {HETERO(GRID("sigma_t", "flakes.vol", "")), "'sigma_t' has 6 channels, expected 1 or 3"},
     {HETERO(GRID("sigma_t", "smoke.vol", "<string name='filter_type' value='cubic'/>")), "'nearest', 'trilinear'"},

@@ -220,7 +220,10 @@ static rey_result build_record(Builder *b, rey_xml_node *node, int32_t shape, co
 
 static rey_result build_batch(Builder *b, rey_xml_node *node, const char *path, SensorRecord *s) {
     int n = rey_xml_count_children(node, REY_XML_BIT(REY_XML_SENSOR));
-    if (n == 0 || s->width % n != 0) {
+    if (n == 0) {
+        return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE, "a batch without sensors, expected one or more <sensor> in it");
+    }
+    if (s->width % n != 0) {
         return rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
                             "a batch of %d sensors has a film %d pixels wide, expected a multiple of their number", n,
                             (int)s->width);

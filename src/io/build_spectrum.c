@@ -98,7 +98,8 @@ static rey_result sampled_colour(Builder *b, rey_xml_node *node, rey_colour_use 
     }
     if (result == REY_OK && !good) {
         result = rey_xml_fail(b->ctx, node->at, REY_ERROR_SCENE,
-                              "a spectrum needs at least two values, one for each of its ascending wavelengths");
+                              "a spectrum of %zu values at %zu wavelengths, expected two or more values, one for each of its "
+                              "ascending wavelengths", values.count, wavelengths.count);
     }
     if (result == REY_OK) {
         rey_spectrum_to_rgb(&s, use, rgb);

@@ -201,13 +201,17 @@ static void test_saved(void **state) {
     assert_int_equal(folder_remove(folder), 0);
 }
 
+#define CAMERA "<sensor type=\"perspective\"/>"
+#define FIVE CAMERA CAMERA CAMERA CAMERA CAMERA
+
 static void test_refused(void **state) {
     static const char *const cases[][2] = {
         {"<sensor type=\"thinlens\"/>", "needs its aperture_radius"},
         {"<sensor type=\"perspective\"><transform name=\"to_world\"><scale value=\"2\"/></transform></sensor>", "not scale"},
         {"<sensor type=\"distant\"/>", "expected 1 x 1"},
         {"<sensor type=\"irradiancemeter\"/>", "inside of a shape"},
-        {"<sensor type=\"batch\"/>", "multiple of their number"},
+        {"<sensor type=\"batch\"/>", "a batch without sensors, expected one or more"},
+        {"<sensor type=\"batch\">" FIVE "</sensor>", "a batch of 5 sensors has a film 768 pixels wide, expected a multiple"},
         {"<sensor type=\"radiancemeter\"><vector name=\"direction\" x=\"0\" y=\"0\" z=\"0\"/></sensor>", "must not be 0"},
         {"<shape type=\"sphere\"><sensor type=\"perspective\"/></shape>", "must be an irradiancemeter"},
         {"<sensor type=\"perspectve\"/>", "perspective"}};
