@@ -62,7 +62,7 @@ fuzz:
 sanitize: setup
 	@cmake -S . -B build-asan -DREYNOLDS_SANITIZE=ON -DREYNOLDS_WIDEST=8 > /dev/null
 	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
-	@cd build-asan && REYNOLDS_TEST_EFFORT=0.25 ctest -j$(JOBS) --output-on-failure -LE 'slow|heavy'
+	@cd build-asan && REYNOLDS_TEST_EFFORT=0.25 ctest -j$(JOBS) --output-on-failure -LE 'slow|heavy|long'
 
 # Threads meet in the same places at every width.
 tsan: setup
