@@ -87,7 +87,7 @@ static rey_result read_header(rey_context *ctx, const unsigned char *head, size_
         out->format = GRID_NPY;
         return read_npy_header(ctx, head, head_size, size, out);
     }
-    if (head_size < 3 || memcmp(head, "VOL", 3) != 0) {
+    if (!rey_vol_known(head, head_size)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte 0: not a VOL file, nor NanoVDB or .npy, expected 'VOL', 'NanoVDB' or "
                         "'\\x93NUMPY'", out->path);
     }

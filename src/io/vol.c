@@ -35,10 +35,12 @@ static float load_half(const unsigned char *at) {
 
 size_t rey_vol_item(int encoding) { return encoding == VOL_FLOAT ? 4 : encoding == VOL_HALF ? 2 : 1; }
 
+bool rey_vol_known(const unsigned char *bytes, size_t size) { return size >= 3 && memcmp(bytes, "VOL", 3) == 0; }
+
 rey_result rey_vol_header(rey_context *ctx, const char *name, const unsigned char *header, size_t size, rey_vol *out,
                           int *encoding) {
     *out = (rey_vol){0};
-    if (size < VOL_HEADER || memcmp(header, "VOL", 3) != 0) {
+    if (size < VOL_HEADER || !rey_vol_known(header, size)) {
         return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte 0: not a VOL file, expected 'VOL' and a header of %d bytes", name,
                         VOL_HEADER);
     }

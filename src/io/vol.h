@@ -19,6 +19,7 @@ void rey_vol_free(rey_context *ctx, rey_vol *vol);
 enum { VOL_HEADER = 48 };
 enum { VOL_FLOAT = 1, VOL_HALF = 2, VOL_BYTE = 3 };
 
+bool rey_vol_known(const unsigned char *bytes, size_t size); // whether a file begins like one
 // The header, of a file of `size` bytes; out->data stays null.
 rey_result rey_vol_header(rey_context *ctx, const char *name, const unsigned char *header, size_t size, rey_vol *out,
                           int *encoding);
