@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-enum { ACROSS = 3, BLOCKS = 9, SEEDS = 10, SPP = 256, DIFFERENCE_SPP = 1024, MOST = 128 };
+enum { ACROSS = 3, BLOCKS = 9, SEEDS = 10, MOST = 128 };
 
 static bool begins_with(const char *s, const char *start) { return strncmp(s, start, strlen(start)) == 0; }
 // What moves among surfaces in media.
@@ -64,7 +64,8 @@ static void quotient(Room room, const Motion *m, int param, const float *start, 
                      double *blocks) {
     static float image[NUMBERS];
     char name[128];
-    snprintf(name, sizeof name, "%s %s %d %g %u %g", m->room, m->param, (int)m->sort, m->h, seed, sample_share());
+    snprintf(name, sizeof name, "%s %s %d %g %d %u %g", m->room, m->param, (int)m->sort, m->h, m->difference_spp, seed,
+             sample_share());
     if (kept(name, blocks, BLOCKS, false)) {
         return;
     }
@@ -75,8 +76,7 @@ static void quotient(Room room, const Motion *m, int param, const float *start, 
         for (int i = 0; i < n; i++) {
             values[i] = start[i] + (float)(sign * m->h) * tangent[i];
         }
-        const bool seen = begins_with(m->room, "seen_");
-        rey_render_def def = def_make(seen ? SPP : DIFFERENCE_SPP * (begins_with(m->room, "mirror_") ? 1 : m->effort), seed, 1);
+        rey_render_def def = def_make(m->difference_spp, seed, 1);
         ok(room, rey_param_set(room.scene, param, values, n));
         ok(room, rey_render(room.scene, &def, image, NULL));
         blocks_of(image, one);
@@ -90,7 +90,7 @@ static void quotient(Room room, const Motion *m, int param, const float *start, 
 
 static void derivative(Room room, const Motion *m, int param, const float *tangent, uint32_t seed, double *blocks) {
     static float image[NUMBERS];
-    rey_render_def def = def_make(SPP * m->effort, seed, 1);
+    rey_render_def def = def_make(m->spp, seed, 1);
     def.terms = 0; // all that it needs
     ok(room, rey_jvp(room.scene, &def, (rey_selection){&param, 1}, tangent, image, NULL, NULL));
     blocks_of(image, blocks);
