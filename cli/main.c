@@ -56,7 +56,7 @@ static const CommandRow command_rows[COMMAND_COUNT] = {
          "or\nsearch path, and its files lie in the folder OUT_data beside it.\n"},
     [COMMAND_COMPARE] =
         {"compare", cli_compare, "A B [--json]", "differences between two images; B is the reference",
-         "\nPictures are EXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY files.\n"
+         "\nPictures are EXR, PNG, JPEG, BMP, TGA, Radiance HDR, PFM, PGM, PPM or NPY files.\n"
          "psnr takes 1 as the peak; relative mse is the mean of (A-B)^2 / (B^2 + 1e-2). Numbers that are not finite in\n"
          "either are left out and counted, and make the exit status 1.\n"},
     [COMMAND_DOCTOR] = {"doctor", cli_doctor, "[options]", "examine this machine and this build", ""},

@@ -413,7 +413,7 @@ static void test_wrong_magic(void **state) {
     for (int sort = 0; sort < 5; sort++) {
         make_sort(sort);
         file.data[0] ^= 0x55;
-        expect_failure(ctx, "strange.picture", &file, file.count, "expected OpenEXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY");
+        expect_failure(ctx, "strange.picture", &file, file.count, "expected OpenEXR, PNG, JPEG, BMP, TGA, ");
     }
     rey_image image;
     assert_int_not_equal(rey_image_read(ctx, "/nowhere/at_all.exr", &image), REY_OK);

@@ -41,20 +41,26 @@ rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsig
     } formats[] = {{"\x76\x2f\x31\x01", 4, rey_exr_read}, {"\x89PNG", 4, rey_png_read},
                    {"\xff\xd8\xff", 3, rey_jpeg_read},     {"PF", 2, rey_pfm_read},
                    {"Pf", 2, rey_pfm_read},                {"BM", 2, rey_bmp_read},
-                   {"#?", 2, rey_rgbe_read},               {"\x93NUMPY", 6, rey_npy_read_image}};
+                   {"#?", 2, rey_rgbe_read},               {"\x93NUMPY", 6, rey_npy_read_image},
+                   {"P5", 2, rey_pnm_read},                {"P6", 2, rey_pnm_read}};
     *out = (rey_image){0};
+    rey_result (*read)(rey_context *, const char *, const unsigned char *, size_t, rey_image *) =
+        rey_tga_known(bytes, size) ? rey_tga_read : NULL;
     for (int i = 0; i < COUNT_OF(formats); i++) {
         if (size > formats[i].length && memcmp(bytes, formats[i].magic, formats[i].length) == 0) {
-            rey_result result = formats[i].read(ctx, name, bytes, size, out);
-            if (result != REY_OK) {
-                rey_image_free(ctx, out);
-            }
-            return result;
+            read = formats[i].read;
         }
     }
-    return rey_fail(ctx, REY_ERROR_FORMAT,
-                    "%s: not a picture that can be read, expected OpenEXR, PNG, JPEG, BMP, Radiance HDR, PFM or NPY",
-                    name);
+    if (!read) {
+        return rey_fail(ctx, REY_ERROR_FORMAT,
+                        "%s: not a picture that can be read, expected OpenEXR, PNG, JPEG, BMP, TGA, Radiance HDR, PFM, PGM or "
+                        "PPM (binary), or NPY", name);
+    }
+    rey_result result = read(ctx, name, bytes, size, out);
+    if (result != REY_OK) {
+        rey_image_free(ctx, out);
+    }
+    return result;
 }
 
 rey_result rey_image_read(rey_context *ctx, const char *path, rey_image *out) {

@@ -12,8 +12,9 @@ typedef struct rey_image {
     bool translucent;            // of a PNG with an alpha below 1 somewhere, by which its colours are divided
 } rey_image;
 
-// Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, BMP (uncompressed), Radiance
-// HDR, PFM, NPY (f4 or f8, 2 or 3 dimensions). The caller frees *out with rey_image_free, also after a failure.
+// Reads a file by its content: OpenEXR (scanlines or tiles, any compression), PNG, JPEG, BMP (uncompressed), TGA, Radiance
+// HDR, PFM, PGM and PPM (binary), NPY (f4 or f8, 2 or 3 dimensions). The caller frees *out with rey_image_free, also after a
+// failure.
 rey_result rey_image_read(rey_context *ctx, const char *path, rey_image *out);
 rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                                  rey_image *out);
@@ -36,6 +37,9 @@ rey_result rey_png_read(rey_context *ctx, const char *name, const unsigned char 
 rey_result rey_jpeg_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_bmp_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_rgbe_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+rey_result rey_tga_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
+bool rey_tga_known(const unsigned char *bytes, size_t size);
+rey_result rey_pnm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out);
 rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                               rey_image *out);

@@ -1,39 +1,10 @@
-// image_raw.c: PFM and NumPy arrays.
+// image_npy.c: pictures in NumPy arrays.
 #include "io/file.h"
 #include "io/image.h"
 #include "io/npy.h"
 
 #include <stdio.h>
 #include <string.h>
-
-rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    char header[128];
-    int width, height, used = 0;
-    float scale;
-    size_t n = size < sizeof header - 1 ? size : sizeof header - 1;
-    memcpy(header, bytes, n);
-    header[n] = 0;
-    int channels = bytes[1] == 'F' ? 3 : 1;
-    if (sscanf(header + 2, "%d %d %f%n", &width, &height, &scale, &used) != 3 || scale == 0) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: malformed PFM header, expected 'PF', width, height and scale", name);
-    }
-    if (scale > 0) {
-        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: big-endian PFM is not supported", name);
-    }
-    size_t at = 2 + (size_t)used + 1;
-    size_t row = (size_t)(width > 0 ? width : 0) * (size_t)channels * sizeof(float);
-    if (width > 0 && height > 0 && (at > size || row > (size - at) / (size_t)height)) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends before its %d x %d pixels", name, width, height);
-    }
-    rey_result result = rey_image_new(ctx, name, width, height, channels, out);
-    for (int y = 0; y < height && result == REY_OK; y++) { // rows from the bottom
-        memcpy(out->data + (size_t)(height - 1 - y) * row / sizeof(float), bytes + at + (size_t)y * row, row);
-    }
-    for (int64_t i = 0; i < (int64_t)width * height * channels && result == REY_OK && scale != -1; i++) {
-        out->data[i] *= -scale;
-    }
-    return result;
-}
 
 rey_result rey_npy_read_image(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size,
                               rey_image *out) {

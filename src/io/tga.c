@@ -1,0 +1,120 @@
+// tga.c: Truevision's pictures: grey, colours and palettes of 8 to 32 bits, plain and run-length encoded. Only files of version 2
+// have a mark, at their end; those of version 1 are known by a header without contradictions.
+#include "io/image.h"
+
+#include <string.h>
+
+enum { HEADER = 18, FOOTER = 26, PALETTE = 1, COLOUR = 2, GREY = 3, RUNS = 8 };
+
+typedef struct Tga {
+    rey_context *ctx;
+    const char *name;
+    const unsigned char *bytes, *palette;
+    size_t size, at;
+    int sort, bits, colour_bits; // of a pixel, and of a colour in it or in the palette
+    int64_t first, colours;      // of the palette
+    int left;                    // pixels of the packet that are still to come; 0 without packets
+    bool raw;                    // the packet has a value for each of its pixels, not one for all
+} Tga;
+
+static int word(const unsigned char *at) { return at[0] | at[1] << 8; }
+
+bool rey_tga_known(const unsigned char *bytes, size_t size) {
+    static const char mark[] = "TRUEVISION-XFILE.";
+    if (size < HEADER) {
+        return false;
+    }
+    if (size >= HEADER + FOOTER && memcmp(bytes + size - sizeof mark, mark, sizeof mark) == 0) {
+        return true;
+    }
+    const int sort = bytes[2] & ~RUNS, bits = bytes[16];
+    const bool mapped = sort == PALETTE && bytes[1] == 1 && bits == 8 && word(bytes + 5) > 0;
+    const bool grey = sort == GREY && bits == 8, colour = sort == COLOUR && (bits == 16 || bits == 24 || bits == 32);
+    const bool sort_known = mapped || (bytes[1] == 0 && (grey || colour));
+    return sort_known && (bytes[17] & 0xc0) == 0 && word(bytes + 12) > 0 && word(bytes + 14) > 0;
+}
+
+static rey_result fail(const Tga *t, const char *what) {
+    return rey_fail(t->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", t->name, t->at, what);
+}
+
+static rey_result read_header(Tga *t) {
+    const unsigned char *h = t->bytes;
+    t->sort = h[2] & ~RUNS;
+    t->bits = h[16];
+    const bool mapped = t->sort == PALETTE;
+    t->colour_bits = mapped ? h[7] : t->bits;
+    t->at = 2;
+    if (t->sort < PALETTE || t->sort > GREY || (mapped && h[1] != 1)) {
+        return fail(t, "expected a picture with a palette (1), of colours (2) or grey (3), or the same in runs (9, 10, 11)");
+    }
+    t->at = 16;
+    const bool colours = t->colour_bits == 15 || t->colour_bits == 16 || t->colour_bits == 24 || t->colour_bits == 32;
+    if (t->sort == GREY ? t->bits != 8 : !colours || (mapped && t->bits != 8)) {
+        return fail(t, "expected 8 bits for each pixel of grey and palettes, and 15, 16, 24 or 32 for each colour");
+    }
+    t->at = HEADER + (size_t)h[0];
+    if (h[1] == 1) { // a palette may be there unused
+        t->first = word(h + 3);
+        t->colours = word(h + 5);
+        t->palette = h + t->at;
+        t->at += (size_t)t->colours * (size_t)((h[7] + 7) / 8);
+    }
+    return t->at <= t->size ? REY_OK : fail(t, "the file ends in its header");
+}
+
+static void colour_of(const unsigned char *at, int bits, float rgb[3]) {
+    for (int c = 0; c < 3; c++) { // blue comes first
+        rgb[c] = bits > 16 ? (float)at[2 - c] / 255 : (float)(word(at) >> (10 - 5 * c) & 31) / 31;
+    }
+}
+
+// The next pixel, from its packet where the picture is in runs.
+static rey_result next_pixel(Tga *t, float rgb[3]) {
+    const size_t step = (size_t)(t->bits + 7) / 8;
+    const bool runs = t->bytes[2] & RUNS;
+    if (runs && t->left == 0 && t->at < t->size) {
+        t->left = (t->bytes[t->at] & 127) + 1;
+        t->raw = !(t->bytes[t->at++] & 128);
+    }
+    if (step > t->size - t->at) {
+        return fail(t, "the file ends before its pixels");
+    }
+    const unsigned char *pixel = t->bytes + t->at;
+    if (t->sort == GREY) {
+        rgb[0] = (float)pixel[0] / 255;
+    } else if (t->sort == PALETTE) {
+        const int64_t index = pixel[0] - t->first;
+        if (index < 0 || index >= t->colours) {
+            return fail(t, "a pixel is beyond the palette");
+        }
+        colour_of(t->palette + index * ((t->colour_bits + 7) / 8), t->colour_bits, rgb);
+    } else {
+        colour_of(pixel, t->bits, rgb);
+    }
+    t->left -= runs;
+    t->at += t->raw || t->left == 0 ? step : 0;
+    return REY_OK;
+}
+
+rey_result rey_tga_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
+    enum { FROM_RIGHT = 16, FROM_TOP = 32, MOST_RUN = 128 };
+    Tga t = {.ctx = ctx, .name = name, .bytes = bytes, .size = size};
+    const int64_t width = word(bytes + 12), height = word(bytes + 14);
+    rey_result result = read_header(&t);
+    if (result == REY_OK && (uint64_t)(width * height) / MOST_RUN > size) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: claims %lld x %lld pixels in %zu bytes", name, (long long)width,
+                        (long long)height, size);
+    }
+    const int channels = t.sort == GREY ? 1 : 3;
+    result = result != REY_OK ? result : rey_image_new(ctx, name, width, height, channels, out);
+    for (int64_t i = 0; i < width * height && result == REY_OK; i++) {
+        const int64_t x = bytes[17] & FROM_RIGHT ? width - 1 - i % width : i % width;
+        const int64_t y = bytes[17] & FROM_TOP ? i / width : height - 1 - i / width;
+        float rgb[3] = {0};
+        result = next_pixel(&t, rgb);
+        memcpy(out->data + (y * width + x) * channels, rgb, (size_t)channels * sizeof *rgb);
+    }
+    out->srgb = true;
+    return result;
+}
