@@ -27,6 +27,7 @@ typedef struct Work {
     size_t stride;                   // block means of one set
     double *derivative, *difference, *rough; // CHECK_SETS rows of block means
     double *fresh;                           // the same of the plain quotient, fresh paths minus replayed ones
+    double *rounding;                        // one row: what float pictures leave in differences
     float *image, *adjoint;
     float *original, *moved; // values of the direction's parameters
     uint32_t first_set;      // of the sample sets
@@ -150,8 +151,13 @@ static rey_result differences(Work *w, Check *check, const Step *step) {
     for (int i = 0; i < CHECK_POINTS && !result; i++) {
         result = render_point(w, check, step, i);
     }
-    double rounding = 3e-7 * mean_brightness(w) / step->h; // of float pictures, times the sum of |weights|
-    check->result = check_compare(&w->blocks, w->derivative, w->difference, w->rough, rounding);
+    const double rounding = 3e-7 * mean_brightness(w) / step->h; // of float pictures, times the sum of |weights|
+    memset(w->rounding, 0, w->stride * sizeof *w->rounding);
+    check_add_blocks(&w->blocks, w->image, 3e-7 / step->h, w->rounding);
+    for (size_t i = 0; i < w->stride; i++) { // bright blocks round more
+        w->rounding[i] = fmax(w->rounding[i], rounding);
+    }
+    check->result = check_compare(&w->blocks, w->derivative, w->difference, w->rough, w->rounding);
     check->fresh_z = check->replays ? check_mean_z(&w->blocks, w->fresh, rounding) : 0;
     check->reverse_error = check_reverse_error(check, rounding);
     return result;
@@ -299,7 +305,7 @@ static rey_result check_or_refuse(Work *w, Check *check, bool alone) {
 
 static void work_free(Work *w) {
     rey_context *ctx = w->session.ctx;
-    void *arrays[] = {w->derivative, w->difference, w->rough, w->fresh, w->image, w->adjoint, w->original, w->moved};
+    void *arrays[] = {w->derivative, w->difference, w->rough, w->fresh, w->rounding, w->image, w->adjoint, w->original, w->moved};
     for (int i = 0; i < COUNT_OF(arrays); i++) {
         rey_free(ctx, arrays[i]);
     }
@@ -316,11 +322,13 @@ static rey_result work_prepare(Work *w, int64_t largest) {
     w->difference = rey_alloc_array(s->ctx, w->stride, CHECK_SETS * sizeof *w->difference);
     w->rough = rey_alloc_array(s->ctx, w->stride, CHECK_SETS * sizeof *w->rough);
     w->fresh = rey_alloc_array(s->ctx, w->stride, CHECK_SETS * sizeof *w->fresh);
+    w->rounding = rey_alloc_array(s->ctx, w->stride, sizeof *w->rounding);
     w->image = rey_alloc_array(s->ctx, floats, sizeof *w->image);
     w->adjoint = rey_alloc_array(s->ctx, floats, sizeof *w->adjoint);
     w->original = rey_alloc_array(s->ctx, (size_t)largest, sizeof *w->original);
     w->moved = rey_alloc_array(s->ctx, (size_t)largest, sizeof *w->moved);
-    bool good = w->derivative && w->difference && w->rough && w->fresh && w->image && w->adjoint && w->original && w->moved;
+    bool good = w->derivative && w->difference && w->rough && w->fresh && w->rounding && w->image && w->adjoint &&
+                w->original && w->moved;
     const Options *o = s->options;
     rey_result (*load)(rey_context *, const char *, const rey_define *, int, rey_scene **) =
         o->lenient ? rey_scene_load_lenient : rey_scene_load;

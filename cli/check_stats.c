@@ -14,8 +14,8 @@ static const double relative_floor = 1e-3;
 static const double truncated = 0.25;
 // Share of the mean variance over all blocks in the variance of each.
 static const double pooled = 0.25;
-// Blocks brighter than the mean round more than `rounding` says (1.2 times where all texels of a bump move together).
-static const double brighter = 2;
+// Blocks that vanish up to this many times their rounding are blank: sets reach 1.2 times (all texels of a bump move together).
+static const double blank = 2;
 
 Blocks check_blocks(int width, int height) {
     return (Blocks){.width = width, .height = height, .nx = width < 8 ? width : 8, .ny = height < 8 ? height : 8};
@@ -50,7 +50,7 @@ static Sample sample_at(const double *derivative, const double *difference, size
         double a = derivative[k * stride + at], b = difference[k * stride + at];
         s.derivative += a / CHECK_SETS;
         s.difference += b / CHECK_SETS;
-        s.empty = s.empty && fabs(a) <= brighter * rounding && fabs(b) <= brighter * rounding;
+        s.empty = s.empty && fabs(a) <= blank * rounding && fabs(b) <= blank * rounding;
     }
     double squares = 0;
     for (size_t k = 0; k < CHECK_SETS; k++) {
@@ -72,10 +72,10 @@ typedef struct Squares {
     double signal[CHECK_SERIES], noise[CHECK_SERIES];
 } Squares;
 
-static Squares mean_squares(const double *derivative, const double *difference, size_t stride, double rounding) {
+static Squares mean_squares(const double *derivative, const double *difference, size_t stride, const double *rounding) {
     Squares q = {{0}, {0}};
     for (size_t at = 0; at < stride; at++) {
-        Sample s = sample_at(derivative, difference, stride, at, rounding);
+        Sample s = sample_at(derivative, difference, stride, at, rounding[at]);
         q.signal[at % CHECK_SERIES] += s.difference * s.difference * CHECK_SERIES / (double)stride;
         q.noise[at % CHECK_SERIES] += s.error * s.error * CHECK_SERIES / (double)stride;
     }
@@ -113,7 +113,7 @@ double check_gap(const Blocks *b, const double *derivative, const double *differ
 
 // How well the derivative itself is known, whatever noise the difference shares with it: of its mean over the sets' means,
 // and of its blocks as relative_error tells it.
-static void gradient_noise(const double *derivative, size_t stride, double rounding, CheckResult *r) {
+static void gradient_noise(const double *derivative, size_t stride, const double *rounding, CheckResult *r) {
     double deviations[CHECK_SETS] = {0}, variance = 0, signal = 0, noise = 0; // of the sets' means
     for (size_t at = 0; at < stride; at++) {
         double block = 0, squares = 0;
@@ -125,7 +125,7 @@ static void gradient_noise(const double *derivative, size_t stride, double round
             squares += d * d / (CHECK_SETS - 1) / CHECK_SETS;
             deviations[k] += at % CHECK_SERIES == 3 ? d * CHECK_SERIES / (double)stride : 0;
         }
-        signal += at % CHECK_SERIES == 3 ? 0 : fmax(block * block, rounding * rounding);
+        signal += at % CHECK_SERIES == 3 ? 0 : fmax(block * block, rounding[at] * rounding[at]);
         noise += at % CHECK_SERIES == 3 ? 0 : squares;
     }
     for (size_t k = 0; k < CHECK_SETS; k++) {
@@ -136,7 +136,7 @@ static void gradient_noise(const double *derivative, size_t stride, double round
 }
 
 CheckResult check_compare(const Blocks *b, const double *derivative, const double *difference, const double *rough,
-                          double rounding) {
+                          const double *rounding) {
     size_t count = (size_t)b->nx * (size_t)b->ny, stride = count * CHECK_SERIES;
     CheckResult r = {.step_matters = step_matters(difference, rough, stride)};
     Squares squares = mean_squares(derivative, difference, stride, rounding);
@@ -146,12 +146,12 @@ CheckResult check_compare(const Blocks *b, const double *derivative, const doubl
     double sum = 0, noise = 0, systematic = 0, variance = 0;
     for (size_t at = 0; at < stride; at++) {
         int series = (int)(at % CHECK_SERIES);
-        Sample s = sample_at(derivative, difference, stride, at, rounding);
+        Sample s = sample_at(derivative, difference, stride, at, rounding[at]);
         if (s.empty) {
             continue;
         }
         double gap = gap_at(difference, rough, stride, at);
-        double floor = relative_floor * sqrt(squares.signal[series]) + rounding + truncated * gap;
+        double floor = relative_floor * sqrt(squares.signal[series]) + rounding[at] + truncated * gap;
         // Sixteen sets may all miss a block's rare bright samples; the other blocks say how likely those are.
         double error2 = (1 - pooled) * s.error * s.error + pooled * squares.noise[series];
         double error = sqrt(error2 + floor * floor);

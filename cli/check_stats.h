@@ -29,9 +29,10 @@ typedef struct CheckResult {
 } CheckResult;
 
 // derivative, difference and rough (a difference of lower order) hold CHECK_SETS rows of ny * nx * CHECK_SERIES block
-// means, from the same sample sets. rounding: absolute error that float arithmetic leaves in a block's difference.
+// means, from the same sample sets. rounding: one such row of absolute errors that float arithmetic leaves in the blocks'
+// differences.
 CheckResult check_compare(const Blocks *blocks, const double *derivative, const double *difference, const double *rough,
-                          double rounding);
+                          const double *rounding);
 
 // How far derivative and difference lie apart in the block and channel that another comparison found the worst.
 double check_gap(const Blocks *blocks, const double *derivative, const double *difference, const CheckResult *worst);

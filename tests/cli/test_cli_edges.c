@@ -421,17 +421,21 @@ static void cancelling_texels_are_no_error(void **state) {
     Fixture *f = *state;
     write_pfm("heights.pfm", 4, 0.3F);
     write_words("bump.xml",
-                "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><transform name='to_world'>"
-                "<lookat origin='0,-1,3' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
-                "value='16'/><integer name='height' value='16'/></film></sensor><shape type='rectangle'><bsdf "
-                "type='bumpmap' id='b'><texture type='bitmap'><string name='filename' value='heights.pfm'/><boolean "
-                "name='raw' value='true'/></texture><bsdf type='diffuse'/></bsdf></shape><emitter type='point'>"
+                "<scene version='3.0.0'><default name='z' value='3'/><integrator type='path'/><sensor type='perspective'>"
+                "<transform name='to_world'><lookat origin='0,-1,$z' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+                "<integer name='width' value='16'/><integer name='height' value='16'/></film></sensor><shape "
+                "type='rectangle'><bsdf type='bumpmap' id='b'><texture type='bitmap'><string name='filename' value='heights.pfm'/>"
+                "<boolean name='raw' value='true'/></texture><bsdf type='diffuse'/></bsdf></shape><emitter type='point'>"
                 "<point name='position' x='1' y='0' z='2'/><rgb name='intensity' value='9'/></emitter></scene>");
-    JsonNode *node = run_json(f, 0, "check bump.xml --param b.nested_texture.data --terms interior --spp 32 --json");
-    const JsonNode *row = json_get(node, "directions")->first;
-    assert_string_equal(json_text(row, "verdict", ""), "no effect");
-    assert_true(json_value(row, "reverse_error", 1) < 1e-5);
-    json_free(node);
+    static const char *const views[] = {"check bump.xml --param b.nested_texture.data --terms interior --spp 32 --json",
+                                        "check bump.xml -D z=12 --param b.nested_texture.data --terms interior --spp 32 --json"};
+    for (int i = 0; i < 2; i++) { // in all blocks, and in the four of the middle, brighter than the mean
+        JsonNode *node = run_json(f, 0, views[i]);
+        const JsonNode *row = json_get(node, "directions")->first;
+        assert_string_equal(json_text(row, "verdict", ""), "no effect");
+        assert_true(json_value(row, "reverse_error", 1) < 1e-5);
+        json_free(node);
+    }
 }
 
 // A light so strong that its picture overflows: the samples are dropped, and that is said.
