@@ -218,7 +218,7 @@ static void pictures_in_runs(void **state) {
     memcpy(wrong, row, sizeof row);
     wrong[4] = 137; // a run of 9
     make_hdr(&file, HDR("-Y 1 +X 8"), wrong, sizeof wrong);
-    expect_failure(&file, file.count, "a run of bytes does not fit");
+    expect_failure(&file, file.count, "byte 72: a run of bytes does not fit");
     wrong[4] = 0; // a run of nothing
     make_hdr(&file, HDR("-Y 1 +X 8"), wrong, sizeof wrong);
     expect_failure(&file, file.count, "a run of bytes does not fit");

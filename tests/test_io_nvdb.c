@@ -256,7 +256,7 @@ static void test_refused(void **state) {
     assert_true(values[0] == 2 && values[NX * NY * NZ - 1] == 2);
     memcpy(plain + ROOT + 28, &strange, 4);
     assert_int_equal(read_bytes(*state, plain, size, values), REY_ERROR_FORMAT);
-    assert_string_equal(rey_error(*state), "v: a voxel is not finite");
+    assert_string_equal(rey_error(*state), "v: voxel -5, 120, 3 is not finite");
     free(plain);
 }
 

@@ -44,17 +44,19 @@ rey_result rey_npy_header(rey_context *ctx, const char *name, const unsigned cha
     size_t length = enough ? (size_t)head[8] | (size_t)head[9] << 8 : 0, begin = second ? 12 : 10;
     length |= second ? (size_t)head[10] << 16 | (size_t)head[11] << 24 : 0;
     if (!enough || length >= sizeof text || begin + length > head_size) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: malformed NPY header", name);
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %d: malformed NPY header, expected a dictionary of less than %zu bytes",
+                        name, enough ? 8 : 0, sizeof text);
     }
     memcpy(text, head + begin, length);
     text[length] = 0;
     if (!parse_header(text, out)) {
         return rey_fail(ctx, REY_ERROR_FORMAT,
-                        "%s: expected a C-ordered float32 or float64 array of up to %d dimensions", name, NPY_MOST_DIMS);
+                        "%s: byte %zu: expected a C-ordered float32 or float64 array ('<f4', '<f8') of up to %d dimensions", name,
+                        begin, NPY_MOST_DIMS);
     }
     out->data = begin + length;
     if ((uint64_t)out->count > (size - out->data) / (size_t)out->item) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the file ends before its array of %lld numbers", name,
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: byte %zu: the file ends before its array of %lld numbers", name, size,
                         (long long)out->count);
     }
     return REY_OK;

@@ -227,13 +227,17 @@ typedef struct Walk {
     const rey_nvdb *nvdb;
     pnanovdb_buf_t buf;
     float *values;
-    bool strange; // a value is not finite
+    bool strange;             // a value is not finite,
+    int64_t strange_voxel[3]; // first of this voxel
 } Walk;
 
 static void put(Walk *w, int64_t x, int64_t y, int64_t z, int channel, float value) {
     const rey_nvdb *v = w->nvdb;
     int64_t voxel = ((z - v->low[2]) * v->ny + y - v->low[1]) * v->nx + x - v->low[0];
-    w->strange = w->strange || !isfinite(value);
+    if (!isfinite(value) && !w->strange) {
+        w->strange = true;
+        memcpy(w->strange_voxel, (int64_t[]){x, y, z}, sizeof w->strange_voxel);
+    }
     w->values[voxel * v->channels + channel] = value;
 }
 
@@ -359,7 +363,9 @@ rey_result rey_nvdb_read(rey_context *ctx, const char *name, const rey_nvdb *nvd
     if (!outside) {
         read_node(&w, ROOT, root.address, &all);
     }
-    return outside     ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a node of the grid lies outside of the file", name)
-           : w.strange ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: a voxel is not finite", name)
-                       : REY_OK;
+    if (outside) {
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: a node of the grid lies outside of the file", name);
+    }
+    const long long x = w.strange_voxel[0], y = w.strange_voxel[1], z = w.strange_voxel[2];
+    return w.strange ? rey_fail(ctx, REY_ERROR_FORMAT, "%s: voxel %lld, %lld, %lld is not finite", name, x, y, z) : REY_OK;
 }

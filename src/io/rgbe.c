@@ -14,7 +14,7 @@ typedef struct Rgbe {
 } Rgbe;
 
 static rey_result fail(const Rgbe *r, const char *what) {
-    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: %s", r->name, what);
+    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", r->name, r->at, what);
 }
 
 // The next line of the header without its end; false when there is none.
@@ -72,6 +72,7 @@ static rey_result read_runs(Rgbe *r, unsigned char *row, int64_t width) {
             bool repeat = count > 128;
             count = repeat ? count - 128 : count;
             if (count == 0 || x + count > width || (!repeat && r->size - r->at < (size_t)count)) {
+                r->at--; // where the run begins
                 return fail(r, "a run of bytes does not fit its row or the file");
             }
             for (int i = 0; i < count; i++) {
@@ -102,6 +103,7 @@ static rey_result read_flat(Rgbe *r, unsigned char *row, int64_t width) {
         int64_t count = (int64_t)pixel[3] << shift;
         shift += 8;
         if (x == 0 || shift > 24 || count > width - x) {
+            r->at -= 4; // where the run stands
             return fail(r, "a run of pixels does not fit its row");
         }
         for (int64_t i = 0; i < count; i++, x++) {
