@@ -212,6 +212,7 @@ static void test_terms(void **state) {
     expect_terms(scene, "chequered.to_world", JUMPS, "the texture, which jumps");
     expect_terms(scene, "sun.to_world", MOVES, shadows);
     expect_terms(scene, "slide.to_world", JUMPS, "border of the picture");
+    expect_terms(scene, "slide.x_fov", JUMPS, "border of the picture");
     expect_terms(scene, "slide.scale", REY_TERM_INTERIOR, "");
     rey_scene_destroy(scene);
     rey_context_destroy(ctx);

@@ -44,7 +44,7 @@ KFN LightMove light_move_zero(void) { return (LightMove){v3_zero(), f_set(0), {f
 //   SPECTRUM  colour of intensity, radiance, irradiance, no picture
 //   EMISSION  colour texture of radiance, irradiance               COLOUR    colour texture that filters it
 //   REAL      constant number                                      FRACTION  the same; its default is relative to the row before
-//   IMAGE     environment picture from `filename`                  FOV       horizontal field of view of a camera; no parameter
+//   IMAGE     environment picture from `filename`                  FOV       horizontal field of view of a camera
 //   POSITION  three numbers: `position`, or from to_world          POSE      to_world, whose motion moves shadows
 //   AXIS      the same, or +z turned into `direction`              SKY       to_world of what lies beyond the scene
 // Each becomes a slot of the record: a texture, or where its numbers begin in theta.

@@ -21,8 +21,6 @@ static inline bool spot_follow(const SceneView *view, const EmitterRecord *e) {
     return light_pose_follow(view, e, SLOT(Spot, to_world));
 }
 
-#define TO_RADIANS 0.017453292519943295f
-
 // What arrives along a slope: the falloff, its derivatives, and where the texture is read.
 typedef struct SpotBeam {
     Float angle, cutoff, width, falloff, tangent, radius2;

@@ -9,6 +9,7 @@
 static const char *const pose_why = "moving a light moves its shadows";
 static const char *const beam_why = "without a soft edge the border of the beam is a jump";
 static const char *const picture_why = "moving a projector moves its shadows and the border of the picture, which is a jump";
+static const char *const fov_why = "the border of the picture, which is a jump, moves with the field of view";
 static const char *const texture_why = "moving a light moves its shadows and the texture, which jumps";
 
 static const char *emitter_word(void *user, int i) {
@@ -141,11 +142,19 @@ static rey_result pose_slot(Builder *b, rey_xml_node *node, const EmitterParam *
     return build_pose(b, matrix, path, p, out);
 }
 
-static rey_result fov_slot(Builder *b, rey_xml_node *node, int32_t picture, int32_t *out) {
+static rey_result fov_slot(Builder *b, rey_xml_node *node, const EmitterParam *row, Param p, int32_t picture, const char *path,
+                           int32_t *out) {
     const TextureNode *t = &ARRAY_AT(b->scene->build.textures, TextureNode, picture);
     double aspect = t->kind == TEXTURE_BITMAP ? (double)t->width / t->height : 1, fov;
     TRY(build_field_of_view(b, node, aspect, &fov));
-    return build_number(b, (float)fov, out);
+    TRY(build_number(b, (float)fov, out));
+    p.theta = ARRAY_AT(b->scene->build.textures, TextureNode, *out).theta;
+    p.count = 1;
+    p.low = row->low;
+    p.high = row->high;
+    p.unit = row->unit;
+    p.description = row->text;
+    return rey_scene_add_param(b->scene, path, p) < 0 ? REY_ERROR_MEMORY : REY_OK;
 }
 
 // ---- environment pictures ----------------------------------------------------------------------------------------
@@ -229,7 +238,9 @@ static rey_result build_rows(Builder *b, rey_xml_node *node, const EmitterKind *
             TRY(image_slot(b, node, row, name, slot));
             break;
         case EMITTER_PARAM_FOV:
-            TRY(fov_slot(b, node, e->slot[0], slot));
+            place.terms |= REY_TERM_PRIMARY;
+            place.why = fov_why;
+            TRY(fov_slot(b, node, row, place, e->slot[0], name, slot));
             break;
         case EMITTER_PARAM_POSITION:
             TRY(position_slot(b, node, row, place, name, slot));

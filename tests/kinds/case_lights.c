@@ -1,6 +1,7 @@
 // case_lights.c: random lights for the kind tests.
 #include "cases.h"
 
+#include "emitter/emitter.h"
 #include "emitter/table.h"
 #include "emitter/update.h"
 #include "math/colour.h"
@@ -142,6 +143,13 @@ void case_update_light(KindCase *c) {
             invert_pose(c->theta + e->slot[i], c->tables);
         }
     }
+    if (e->kind == EMITTER_PROJECTOR) {
+        const TextureNode *t = c->textures + e->slot[SLOT(Projector, irradiance)];
+        double x_fov = c->theta[c->textures[e->slot[SLOT(Projector, x_fov)]].theta];
+        double *extent = c->tables + PROJECTOR_EXTENT;
+        extent[0] = tan(x_fov * (3.14159265358979323846 / 360));
+        extent[1] = extent[0] * (t->kind == TEXTURE_BITMAP ? (double)t->height / t->width : 1);
+    }
 }
 
 static int32_t add_pose(KindCase *c, const double rotation[9], const double position[3]) {
@@ -223,7 +231,7 @@ static void add_rows(KindCase *c, Random *r, bool textured, const double rotatio
         case EMITTER_PARAM_FOV:
         case EMITTER_PARAM_REAL:
         case EMITTER_PARAM_FRACTION:
-            *slot = add_number(c, r, row, row->type == EMITTER_PARAM_FOV ? -1 : i);
+            *slot = add_number(c, r, row, i);
             break;
         case EMITTER_PARAM_POSITION:
             *slot = c->theta_count;

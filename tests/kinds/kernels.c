@@ -67,6 +67,9 @@ static void view_make(const KindCase *c, View *v) {
         v->emitter.slot[i] = e->slot[i];
         v->place_at[i] = e->places >> i & 1 ? e->slot[i] : -1;
     }
+    if (e->kind == EMITTER_PROJECTOR) {
+        v->place_at[SLOT(Projector, x_fov)] = c->textures[e->slot[SLOT(Projector, x_fov)]].theta;
+    }
     SceneView *s = &v->scene;
     s->theta = v->theta;
     s->tables = v->tables;

@@ -200,8 +200,8 @@ static int check_coverage(const KindCase *c, const Coverage *covered) {
     const EmitterKind *kind = rey_emitter_kinds + c->emitter.kind;
     int failures = 0;
     for (int i = 0; i < kind->param_count; i++) {
-        bool place = kind->params[i].type >= EMITTER_PARAM_POSITION, fixed = kind->params[i].type == EMITTER_PARAM_FOV;
-        if (!fixed && (place ? covered->place : covered->largest[i]) == 0) {
+        bool place = kind->params[i].type >= EMITTER_PARAM_POSITION;
+        if ((place ? covered->place : covered->largest[i]) == 0) {
             print_error("%s: the derivative by %s is never different from 0\n", kind->name, kind->params[i].name);
             failures++;
         }

@@ -114,6 +114,7 @@ static const Motion motions[] = {
     {"meeting_spot.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 256, 1024},
     {"meeting_beamer.xml", "beamer.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.02, 256, 1024},
     {"meeting_beamer.xml", "beamer.to_world", TURN, {0.3f, 1, 0.2f}, 0.3, 256, 1024},
+    {"meeting_beamer.xml", "beamer.x_fov", ADD, {0}, 0.3, 256, 1024},
     {"meeting_beamer.xml", "ball.to_world", SHIFT, {1, 0.2f, 0.5f}, 0.02, 768, 768},
     {"meeting_beamer.xml", "wall.to_world", SHIFT, {0.3f, 1, 0.2f}, 0.02, 256, 1024},
     {"meeting_beamer.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 256, 1024},

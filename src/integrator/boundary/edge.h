@@ -206,7 +206,8 @@ static void edge_of_mark(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->open = out->open & ~m;
 }
 
-// Adds the adjoint dp of points p of the borders of lights, which move with their poses: p = A q, q fixed.
+// Adds the adjoint dp of points p of the borders of lights, which move with their poses and projectors' fields of view: p = A q,
+// where q moves with the extent of the picture across the axis.
 static void borders_move_adj(const SceneView *scene, Int light, Vec3 p, Vec3 dp, Sink *sink, Mask m) {
     static const int kinds[2][2] = {{EMITTER_SPOT, SLOT(Spot, to_world)}, {EMITTER_PROJECTOR, SLOT(Projector, to_world)}};
     Float rows[3] = {dp.x, dp.y, dp.z};
@@ -222,6 +223,15 @@ static void borders_move_adj(const SceneView *scene, Int light, Vec3 p, Vec3 dp,
             light_place_adj(&of, kinds[i][1], 4 * k + 1, rows[k] * q.y, sink, mine);
             light_place_adj(&of, kinds[i][1], 4 * k + 2, rows[k] * q.z, sink, mine);
             light_place_adj(&of, kinds[i][1], 4 * k + 3, rows[k], sink, mine);
+        }
+        if (kinds[i][0] == EMITTER_PROJECTOR) {
+            Vec3 across = v3_zero();
+            for (int k = 0; k < 2; k++) {
+                Vec3 column = v3(light_place(scene, &of, kinds[i][1], k), light_place(scene, &of, kinds[i][1], 4 + k),
+                                 light_place(scene, &of, kinds[i][1], 8 + k));
+                across = v3_madd(across, k ? q.y : q.x, column);
+            }
+            projector_extent_adj(scene, &of, v3_dot(dp, across) / light_table(scene, &of, PROJECTOR_EXTENT), sink, mine);
         }
     }
 }
