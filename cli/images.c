@@ -28,7 +28,7 @@ ImageFormat cli_image_format(const char *path) {
 rey_result cli_read_image(rey_context *ctx, const char *path, int *width, int *height, float **rgb, ImageFile *file) {
     rey_image image = {0};
     rey_result result = rey_image_read(ctx, path, &image);
-    result = result ? result : rey_image_to_rgb(ctx, &image);
+    result = result ? result : rey_image_to_rgb(ctx, path, &image);
     if (!result) {
         if (file) {
             *file = (ImageFile){image.srgb, image.translucent};

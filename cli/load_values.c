@@ -16,7 +16,7 @@ static rey_result read_picture(rey_context *ctx, const char *path, const rey_par
     rey_image image = {0};
     rey_result result = rey_image_read(ctx, path, &image);
     if (result == REY_OK && info->dims == 3 && info->shape[2] == 3) {
-        result = rey_image_to_rgb(ctx, &image);
+        result = rey_image_to_rgb(ctx, path, &image);
     }
     if (result == REY_OK && image.srgb) {
         rey_image_decode_srgb(&image);

@@ -239,6 +239,8 @@ static void broken_radiance(void **state) {
     expect_failure(&file, file.count, "claims 60000 x 60000 pixels");
     make_hdr(&file, "#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n", first, sizeof first);
     expect_failure(&file, file.count, "32-bit_rle_xyze");
+    make_hdr(&file, "#?RADIANCE\nFORMAT=\033[31mred\n\n-Y 1 +X 1\n", first, sizeof first);
+    expect_failure(&file, file.count, "'?[31mred'"); // terminals take the first character as an order
     make_hdr(&file, HDR("-Y 0 +X 1"), first, sizeof first);
     expect_failure(&file, file.count, "0");
 }
@@ -268,11 +270,27 @@ static void names_of_channels(void **state) {
     for (int i = 0; i < COUNT_OF(components); i++) {
         expect_channels((const char *const[]){"A", "Y", "Z"}, components[i], 1, 2);
         expect_channels((const char *const[]){"Y", "u", "v"}, components[i], 1, 1);
-        expect_channels((const char *const[]){"Y", "RY", "BY"}, components[i], 1, 1);
         expect_channels((const char *const[]){"b", "g", "r"}, components[i], 3, 3);
         expect_channels((const char *const[]){"d.b", "d.g", "d.r"}, components[i], 3, 3);
         expect_channels((const char *const[]){"blue", "green", "red"}, components[i], 3, 3);
     }
+}
+
+// Grey would be read of what has colours, and the first of two channels may be anything.
+static void channels_that_are_no_colours(void **state) {
+    UNUSED(state);
+    static const char path[] = "test_io_chroma.exr", *const chroma[] = {"Y", "RY", "BY"}, *const two[] = {"G", "R"};
+    const float data[2 * 3] = {1, 2, 3, 4, 5, 6};
+    rey_image image;
+    assert_int_equal(rey_exr_write(ctx, path, data, 2, 1, 3, chroma), REY_OK);
+    assert_int_equal(rey_image_read(ctx, path, &image), REY_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(rey_error(ctx), "test_io_chroma.exr: luminance and chroma (Y, RY, BY) are not read"));
+    assert_int_equal(rey_exr_write(ctx, path, data, 3, 1, 2, two), REY_OK);
+    assert_int_equal(rey_image_read(ctx, path, &image), REY_OK);
+    assert_int_equal(rey_image_to_rgb(ctx, path, &image), REY_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(rey_error(ctx), "test_io_chroma.exr: two channels are no colour"));
+    rey_image_free(ctx, &image);
+    remove(path);
 }
 
 static void scales_and_records(void **state) {
@@ -297,6 +315,7 @@ int main(void) {
         cmocka_unit_test(broken_bitmaps),            cmocka_unit_test(flat_pictures),
         cmocka_unit_test(pictures_in_runs),          cmocka_unit_test(broken_radiance),
         cmocka_unit_test(names_of_channels),         cmocka_unit_test(scales_and_records),
+        cmocka_unit_test(channels_that_are_no_colours),
     };
     return cmocka_run_group_tests(tests, open_context, close_context);
 }

@@ -74,6 +74,9 @@ static void netpbm_of_bytes_and_words(void **state) {
     const float colours[] = {1, 0, 1 / 255.f, 2 / 255.f, 3 / 255.f, 4 / 255.f};
     expect_pixels(colour, sizeof colour - 1, 2, 1, 3, true, colours);
     expect_cuts(colour, sizeof colour - 1);
+    static const unsigned char lines[] = "P5\r\n1 1\r\n255\r\n\377", commented[] = "P5 1 1 255#all of it\n\377";
+    expect_pixels(lines, sizeof lines - 1, 1, 1, 1, true, (float[]){1});
+    expect_pixels(commented, sizeof commented - 1, 1, 1, 1, true, (float[]){1});
     static const unsigned char wide[] = "P6 1 1 65535 \377\377\1\0\0\2"; // most significant byte first
     const float words[] = {1, 256 / 65535.f, 2 / 65535.f};
     expect_pixels(wide, sizeof wide - 1, 1, 1, 3, true, words);
@@ -99,14 +102,16 @@ static void broken_netpbm(void **state) {
     } cases[] = {{"P5 x 2 255\n1234", "byte 3: expected the width in pixels"},
                  {"P5 2 -2 255\n1234", "byte 5: expected the height in pixels"},
                  {"P5 2 2 65536\n1234", "byte 7: expected the largest value, 1 to 65535"},
-                 {"P5 2 2 255#1234", "byte 10: expected a blank between the header and the pixels"},
+                 {"P5 2 2 255x1234", "byte 10: expected a blank between the header and the pixels"},
+                 {"P5 2 2 255#1234", "byte 15: expected a blank between the header and the pixels"},
                  {"P5 2 2 255\n123", "byte 14: the file ends before its 2 x 2 pixels"},
                  {"P5 2 2 50\n1233", "byte 12: a value is above the largest that the header names"},
-                 {"P6 999999999999999999 999999999999999999 255\n1", "expected up to 65536 along an edge"},
+                 {"P6 999999999999999999 999999999999999999 255\n1", "expected 1 to 65536 along an edge"},
                  {"P6 99999999999999999999 1 255\n1", "byte 3: expected the width in pixels"},
                  {"PF 1 1 0\n123412341234", "byte 7: expected the scale"},
                  {"PF 1 1 nan\n123412341234", "byte 7: expected the scale"},
                  {"PF 1 1 -1\n12341234123", "byte 21: the file ends before its 1 x 1 pixels"},
+                 {"PF4\n1 1\n-1\n1234123412341234", "byte 2: expected a blank behind"},
                  {"P3 1 1 255\n1 2 3", "expected OpenEXR, PNG, JPEG, BMP, TGA, Radiance HDR, PFM, PGM or PPM (binary), or NPY"}};
     for (int i = 0; i < COUNT_OF(cases); i++) {
         expect_failure(cases[i].text, strlen(cases[i].text), cases[i].words);
@@ -160,6 +165,12 @@ static void truevision_plain(void **state) {
     expect_pixels(file, count, 2, 1, 3, true, (float[]){1, 0, 1, 0, 1, 0});
     count = make_tga(file, 3, 0, 0, 2, 1, 8, FROM_TOP, (unsigned char[]){0, 255}, 2, false);
     expect_pixels(file, count, 2, 1, 1, true, (float[]){0, 1});
+    count = make_tga(file, 3, 0, 0, 2, 1, 16, FROM_TOP | 8, (unsigned char[]){0, 9, 255, 9}, 4, false); // and so with grey
+    expect_pixels(file, count, 2, 1, 1, true, (float[]){0, 1});
+    count = make_tga(file, 2, 1, 24, 1, 1, 24, FROM_TOP, (unsigned char[]){7, 7, 7, 3, 2, 1}, 6, false); // its palette is of no use
+    expect_pixels(file, count, 1, 1, 3, true, alpha);
+    count = make_tga(file, 1, 2, 24, 2, 1, 16, FROM_TOP, (unsigned char[]){0, 0, 255, 255, 0, 0, 1, 0, 0, 0}, 10, false);
+    expect_pixels(file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
     count = make_tga(file, 1, 2, 24, 2, 1, 8, FROM_TOP, (unsigned char[]){0, 0, 255, 255, 0, 0, 1, 0}, 8, false);
     expect_pixels(file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
     expect_cuts(file, count);
@@ -178,6 +189,9 @@ static void truevision_in_runs(void **state) {
     size_t count = make_tga(file, 10, 0, 0, 2, 3, 24, FROM_TOP, packets, sizeof packets, false);
     expect_pixels(file, count, 2, 3, 3, true, pixels);
     expect_cuts(file, count);
+    file[18] = 0x83; // a run of four where two pixels are left
+    file[14] = 1;
+    expect_failure(file, count, "the last run goes on behind the last pixel");
     static const unsigned char raw[] = {0x02, 10, 20, 30, 0x80, 40};
     count = make_tga(file, 11, 0, 0, 4, 1, 8, FROM_TOP, raw, sizeof raw, true);
     expect_pixels(file, count, 4, 1, 1, true, (float[]){10 / 255.f, 20 / 255.f, 30 / 255.f, 40 / 255.f});
@@ -194,7 +208,7 @@ static void broken_truevision(void **state) {
     count = make_tga(file, 32, 0, 0, 2, 2, 24, 0, "", 0, true);
     expect_failure(file, count, "byte 2: expected a picture with a palette (1), of colours (2) or grey (3)");
     count = make_tga(file, 2, 0, 0, 2, 2, 12, 0, "", 0, true);
-    expect_failure(file, count, "byte 16: expected 8 bits for each pixel of grey and palettes, and 15, 16, 24 or 32");
+    expect_failure(file, count, "byte 16: expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32");
     count = make_tga(file, 1, 0, 0, 2, 2, 8, 0, "", 0, true);
     expect_failure(file, count, "byte 2: expected a picture with a palette");
     count = make_tga(file, 1, 1, 24, 1, 1, 8, 0, "\1\2\3\7", 4, false);
@@ -204,7 +218,7 @@ static void broken_truevision(void **state) {
     count = make_tga(file, 10, 0, 0, 65535, 65535, 24, 0, "\377\1\2\3", 4, false);
     expect_failure(file, count, "claims 65535 x 65535 pixels in 22 bytes");
     count = make_tga(file, 2, 0, 0, 0, 4, 24, 0, "", 0, true);
-    expect_failure(file, count, "the picture is 0 x 4, expected up to 65536 along an edge");
+    expect_failure(file, count, "the picture is 0 x 4, expected 1 to 65536 along an edge");
 }
 
 int main(void) {

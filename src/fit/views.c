@@ -15,7 +15,8 @@ rey_result rey_view_picture(Fit *fit, JobPlace at, const FitView *view, const ch
         return rey_job_fail_at(&fit->job, at, REY_ERROR_FORMAT, "%s is %d x %d, but sensor %d delivers %d x %d", name,
                                image->width, image->height, view->sensor, view->width, view->height);
     }
-    return rey_image_to_rgb(fit->ctx, image);
+    result = rey_image_to_rgb(fit->ctx, name, image);
+    return result == REY_ERROR_UNSUPPORTED ? rey_job_fail_at(&fit->job, at, result, "%s", rey_error(fit->ctx)) : result;
 }
 
 rey_result rey_view_opaque(Fit *fit, JobPlace at, const FitView *view, const char *name, rey_image *image) {

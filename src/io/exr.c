@@ -17,6 +17,7 @@ typedef struct Stream {
     const unsigned char *in; // reading
     size_t size;
     bool whole;              // nothing is cut off, although something is wrong
+    bool no_memory;          // of our own; the core says so of damaged chunks, too
     float *dropped;          // where channels go that nobody asks for: the core's fast routines take no null for them
     int64_t dropped_room;
     Array out;               // writing
@@ -78,7 +79,10 @@ static int64_t on_write(exr_const_context_t file, void *user, const void *buffer
 static rey_result failed(Stream *s, exr_result_t code) {
     const char *message = s->message[0] ? s->message : exr_get_default_error_message(code);
     if (code == EXR_ERR_OUT_OF_MEMORY) {
-        return rey_fail(s->ctx, REY_ERROR_MEMORY, "%s: not enough memory for the picture", s->name);
+        return s->no_memory || !s->whole
+                   ? rey_fail(s->ctx, REY_ERROR_MEMORY, "%s: not enough memory for the picture", s->name)
+                   : rey_fail(s->ctx, REY_ERROR_FORMAT, "%s: damaged, or needs more memory than there is; expected an OpenEXR file",
+                              s->name);
     }
     if (code == EXR_ERR_FEATURE_NOT_IMPLEMENTED) {
         return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED, "%s: %s; expected channels of full resolution that are compressed "
@@ -204,6 +208,7 @@ static exr_result_t decode_chunk(Stream *s, exr_context_t file, const exr_chunk_
         exr_coding_channel_info_t *c = &pipeline->channels[i];
         if (choice->at[i] < 0) {
             if (!drop_channel(s, c)) {
+                s->no_memory = true;
                 return EXR_ERR_OUT_OF_MEMORY;
             }
             continue;
@@ -285,6 +290,13 @@ static rey_result read_part(Stream *s, exr_context_t file, rey_image *out) {
         (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)) {
         return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED, "%s: expected scanlines or tiles of 1 to %d channels", s->name,
                         EXR_MOST_CHANNELS);
+    }
+    for (int i = 0; i < list->num_channels; i++) {
+        const char *chroma = base_name(list->entries[i].name.str);
+        if (strcmp(chroma, "RY") == 0 || strcmp(chroma, "BY") == 0) {
+            return rey_fail(s->ctx, REY_ERROR_UNSUPPORTED,
+                            "%s: luminance and chroma (Y, RY, BY) are not read, expected R G B, X Y Z or Y alone", s->name);
+        }
     }
     ChannelChoice choice = choose_channels(list);
     int64_t width = (int64_t)window.max.x - window.min.x + 1, height = (int64_t)window.max.y - window.min.y + 1;

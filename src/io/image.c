@@ -14,7 +14,7 @@ void rey_image_free(rey_context *ctx, rey_image *image) {
 rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int64_t height, int channels,
                          rey_image *out) {
     if (width < 1 || height < 1 || width > IMAGE_LARGEST || height > IMAGE_LARGEST || width * height > INT32_MAX / 2) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the picture is %lld x %lld, expected up to %d along an edge", name,
+        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: the picture is %lld x %lld, expected 1 to %d along an edge", name,
                         (long long)width, (long long)height, IMAGE_LARGEST);
     }
     *out = (rey_image){.width = (int)width, .height = (int)height, .channels = channels};
@@ -75,9 +75,13 @@ rey_result rey_image_read(rey_context *ctx, const char *path, rey_image *out) {
     return result;
 }
 
-rey_result rey_image_to_rgb(rey_context *ctx, rey_image *image) {
+rey_result rey_image_to_rgb(rey_context *ctx, const char *name, rey_image *image) {
     if (image->channels == 3) {
         return REY_OK;
+    }
+    if (image->channels == 2) {
+        return rey_fail(ctx, REY_ERROR_UNSUPPORTED, "%s: two channels are no colour, expected one (grey), or red, green and blue",
+                        name);
     }
     int64_t pixels = (int64_t)image->width * image->height;
     float *rgb = rey_alloc_array(ctx, (size_t)pixels * 3, sizeof *rgb);

@@ -24,8 +24,8 @@ void rey_image_free(rey_context *ctx, rey_image *image);
 rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int64_t height, int channels, rey_image *out);
 // Refuses more pixels than any compression packs into `size` bytes, before memory is asked for.
 rey_result rey_image_check_claim(rey_context *ctx, const char *name, int64_t width, int64_t height, size_t size);
-// Three channels: grey is repeated, channels behind the third are dropped.
-rey_result rey_image_to_rgb(rey_context *ctx, rey_image *image);
+// Three channels: grey is repeated, channels behind the third are dropped, two are refused.
+rey_result rey_image_to_rgb(rey_context *ctx, const char *name, rey_image *image);
 
 float rey_srgb_decode(float encoded); // the exact piecewise curve
 float rey_srgb_encode(float linear);

@@ -187,7 +187,7 @@ static rey_result read_image(rey_context *ctx, const FileRequest *request, Loade
     bool sky = request->kind == FILE_ENVMAP;
     rey_result result = rey_image_read(ctx, request->path, image);
     if (result == REY_OK && (sky || image->channels != 1)) {
-        result = rey_image_to_rgb(ctx, image);
+        result = rey_image_to_rgb(ctx, request->path, image);
     }
     if (result == REY_OK && request->kind == FILE_BITMAP && !request->floats) {
         result = rey_image_pack(ctx, image, image->srgb && !request->raw, &out->packed);

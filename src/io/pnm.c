@@ -30,6 +30,9 @@ static const char *next_number(Pnm *p) {
 }
 
 static rey_result read_size(Pnm *p, int64_t size[2]) {
+    if (p->at < p->size && !rey_is_blank((char)p->bytes[p->at]) && p->bytes[p->at] != '#') {
+        return fail(p, "expected a blank behind 'P5', 'P6', 'Pf' or 'PF'");
+    }
     for (int k = 0; k < 2; k++) {
         const char *text = next_number(p), *end = rey_parse_int(text, (const char *)p->bytes + p->size, size + k);
         if (!end || size[k] < 1) {
@@ -40,14 +43,21 @@ static rey_result read_size(Pnm *p, int64_t size[2]) {
     return REY_OK;
 }
 
-// One blank ends the header; what follows must be all there.
+// One blank ends the header, or a comment; what follows must be all there. Where it fits, two blanks are the end of a line that a
+// text editor or a transfer made of one.
 static rey_result make_room(Pnm *p, const int64_t size[2], int channels, size_t sample, rey_image *out) {
+    const bool comment = p->at < p->size && p->bytes[p->at] == '#';
+    while (comment && p->at < p->size && p->bytes[p->at] != '\n') {
+        p->at++;
+    }
     if (p->at >= p->size || !rey_is_blank((char)p->bytes[p->at])) {
         return fail(p, "expected a blank between the header and the pixels");
     }
     p->at++;
-    if (size[0] <= IMAGE_LARGEST && size[1] <= IMAGE_LARGEST &&
-        (uint64_t)(size[0] * size[1]) > (p->size - p->at) / ((size_t)channels * sample)) {
+    const bool small = size[0] <= IMAGE_LARGEST && size[1] <= IMAGE_LARGEST, line = p->at < p->size && p->bytes[p->at] == '\n';
+    const uint64_t needed = small ? (uint64_t)(size[0] * size[1]) * (uint64_t)channels * sample : 0;
+    p->at += line && p->bytes[p->at - 1] == '\r' && p->size - p->at == needed + 1;
+    if (needed > p->size - p->at) {
         return rey_fail(p->ctx, REY_ERROR_FORMAT, "%s: byte %zu: the file ends before its %lld x %lld pixels", p->name, p->size,
                         (long long)size[0], (long long)size[1]);
     }

@@ -28,6 +28,9 @@ static bool next_line(Rgbe *r, char line[128]) {
     length = length < 127 ? length : 127;
     memcpy(line, start, length);
     line[length] = 0;
+    for (char *c = line; *c; c++) { // lines come into messages, and terminals take control characters as orders
+        *c = *c < ' ' || *c > '~' ? '?' : *c;
+    }
     return true;
 }
 

@@ -19,6 +19,8 @@ typedef struct Tga {
 
 static int word(const unsigned char *at) { return at[0] | at[1] << 8; }
 
+static bool colour_known(int bits) { return bits == 15 || bits == 16 || bits == 24 || bits == 32; }
+
 bool rey_tga_known(const unsigned char *bytes, size_t size) {
     static const char mark[] = "TRUEVISION-XFILE.";
     if (size < HEADER) {
@@ -28,9 +30,10 @@ bool rey_tga_known(const unsigned char *bytes, size_t size) {
         return true;
     }
     const int sort = bytes[2] & ~RUNS, bits = bytes[16];
-    const bool mapped = sort == PALETTE && bytes[1] == 1 && bits == 8 && word(bytes + 5) > 0;
-    const bool grey = sort == GREY && bits == 8, colour = sort == COLOUR && (bits == 16 || bits == 24 || bits == 32);
-    const bool sort_known = mapped || (bytes[1] == 0 && (grey || colour));
+    const bool mapped = sort == PALETTE && bytes[1] == 1 && (bits == 8 || bits == 16) && word(bytes + 5) > 0;
+    const bool grey = sort == GREY && (bits == 8 || bits == 16);
+    const bool palette = bytes[1] == 0 || (bytes[1] == 1 && colour_known(bytes[7])); // of no use to colours
+    const bool sort_known = mapped || (palette && (grey || (sort == COLOUR && colour_known(bits))));
     return sort_known && (bytes[17] & 0xc0) == 0 && word(bytes + 12) > 0 && word(bytes + 14) > 0;
 }
 
@@ -49,9 +52,9 @@ static rey_result read_header(Tga *t) {
         return fail(t, "expected a picture with a palette (1), of colours (2) or grey (3), or the same in runs (9, 10, 11)");
     }
     t->at = 16;
-    const bool colours = t->colour_bits == 15 || t->colour_bits == 16 || t->colour_bits == 24 || t->colour_bits == 32;
-    if (t->sort == GREY ? t->bits != 8 : !colours || (mapped && t->bits != 8)) {
-        return fail(t, "expected 8 bits for each pixel of grey and palettes, and 15, 16, 24 or 32 for each colour");
+    const bool narrow = t->bits == 8 || t->bits == 16; // grey with alpha, and large palettes, have 16 bits
+    if (t->sort == GREY ? !narrow : !colour_known(t->colour_bits) || (mapped && !narrow)) {
+        return fail(t, "expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32 for each colour");
     }
     t->at = HEADER + (size_t)h[0];
     if (h[1] == 1) { // a palette may be there unused
@@ -84,7 +87,7 @@ static rey_result next_pixel(Tga *t, float rgb[3]) {
     if (t->sort == GREY) {
         rgb[0] = (float)pixel[0] / 255;
     } else if (t->sort == PALETTE) {
-        const int64_t index = pixel[0] - t->first;
+        const int64_t index = (t->bits == 16 ? word(pixel) : pixel[0]) - t->first;
         if (index < 0 || index >= t->colours) {
             return fail(t, "a pixel is beyond the palette");
         }
@@ -116,5 +119,5 @@ rey_result rey_tga_read(rey_context *ctx, const char *name, const unsigned char 
         memcpy(out->data + (y * width + x) * channels, rgb, (size_t)channels * sizeof *rgb);
     }
     out->srgb = true;
-    return result;
+    return result == REY_OK && t.left > 0 ? fail(&t, "the last run goes on behind the last pixel") : result;
 }
