@@ -24,7 +24,7 @@ demo: $(BUILD)/CMakeCache.txt
 	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS) reynolds > /dev/null
 	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
-# Boundary terms in whole renders (heavy) take half an hour by themselves: `make test SKIP=slow` runs them, too, as CI does.
+# Boundary terms in whole renders (heavy) take an hour by themselves: `make test SKIP=slow` runs them, too, as CI does.
 SKIP ?= slow|heavy
 test: all
 	@cd $(BUILD) && ctest -j$(JOBS) --output-on-failure -LE '$(SKIP)'
