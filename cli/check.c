@@ -151,9 +151,10 @@ static rey_result differences(Work *w, Check *check, const Step *step) {
     for (int i = 0; i < CHECK_POINTS && !result; i++) {
         result = render_point(w, check, step, i);
     }
-    const double rounding = 3e-7 * mean_brightness(w) / step->h; // of float pictures, times the sum of |weights|
+    const double share = 3e-7 / step->h; // of float pictures, times the sum of |weights|
+    const double rounding = share * mean_brightness(w);
     memset(w->rounding, 0, w->stride * sizeof *w->rounding);
-    check_add_blocks(&w->blocks, w->image, 3e-7 / step->h, w->rounding);
+    check_add_blocks(&w->blocks, w->image, share, w->rounding);
     for (size_t i = 0; i < w->stride; i++) { // bright blocks round more
         w->rounding[i] = fmax(w->rounding[i], rounding);
     }

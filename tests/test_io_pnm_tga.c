@@ -1,13 +1,5 @@
 // test_io_pnm_tga.c: pictures of Netpbm (PGM, PPM, PFM) and Truevision (TGA): every sort that is read, and broken ones refused.
-#include "io/image.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "io_picture.h"
 
 static rey_context *ctx;
 
@@ -22,43 +14,10 @@ static int close_context(void **state) {
     return 0;
 }
 
-// Reads an exact copy on the heap, so that the sanitizer sees every access beyond the end.
-static rey_result read_bytes(const void *bytes, size_t count, rey_image *out) {
-    unsigned char *copy = malloc(count ? count : 1);
-    assert_non_null(copy);
-    memcpy(copy, bytes, count);
-    rey_result result = rey_image_read_memory(ctx, "test.picture", copy, count, out);
-    free(copy);
-    return result;
-}
-
-static void expect_pixels(const void *bytes, size_t count, int width, int height, int channels, bool srgb, const float *pixels) {
-    rey_image image;
-    if (read_bytes(bytes, count, &image)) {
-        fail_msg("%s", rey_error(ctx));
-    }
-    assert_int_equal(image.width, width);
-    assert_int_equal(image.height, height);
-    assert_int_equal(image.channels, channels);
-    assert_int_equal(image.srgb, srgb);
-    for (int i = 0; i < width * height * channels; i++) {
-        assert_float_equal((double)image.data[i], (double)pixels[i], 1e-6);
-    }
-    rey_image_free(ctx, &image);
-}
-
-static void expect_failure(const void *bytes, size_t count, const char *words) {
-    rey_image image;
-    rey_result result = read_bytes(bytes, count, &image);
-    if (result == REY_OK || image.data || !strstr(rey_error(ctx), words)) {
-        fail_msg("%zu bytes: result %d, '%s', expected '%s'", count, result, rey_error(ctx), words);
-    }
-}
-
 // Every file that is shorter is refused.
 static void expect_cuts(const unsigned char *bytes, size_t count) {
     for (size_t n = 0; n < count; n++) {
-        expect_failure(bytes, n, "test.picture: ");
+        expect_failure(ctx, "test.picture", bytes, n, "test.picture: ");
     }
 }
 
@@ -68,18 +27,18 @@ static void netpbm_of_bytes_and_words(void **state) {
     UNUSED(state);
     static const unsigned char grey[] = "P5\n# from a scanner\n3 2 200\n\0\144\310\1\2\3";
     const float greys[] = {0, 0.5f, 1, 0.005f, 0.01f, 0.015f};
-    expect_pixels(grey, sizeof grey - 1, 3, 2, 1, true, greys);
+    expect_pixels(ctx, grey, sizeof grey - 1, 3, 2, 1, true, greys);
     expect_cuts(grey, sizeof grey - 1);
     static const unsigned char colour[] = "P6 2#two columns\n1\r\n255\n\377\0\1\2\3\4";
     const float colours[] = {1, 0, 1 / 255.f, 2 / 255.f, 3 / 255.f, 4 / 255.f};
-    expect_pixels(colour, sizeof colour - 1, 2, 1, 3, true, colours);
+    expect_pixels(ctx, colour, sizeof colour - 1, 2, 1, 3, true, colours);
     expect_cuts(colour, sizeof colour - 1);
     static const unsigned char lines[] = "P5\r\n1 1\r\n255\r\n\377", commented[] = "P5 1 1 255#all of it\n\377";
-    expect_pixels(lines, sizeof lines - 1, 1, 1, 1, true, (float[]){1});
-    expect_pixels(commented, sizeof commented - 1, 1, 1, 1, true, (float[]){1});
+    expect_pixels(ctx, lines, sizeof lines - 1, 1, 1, 1, true, (float[]){1});
+    expect_pixels(ctx, commented, sizeof commented - 1, 1, 1, 1, true, (float[]){1});
     static const unsigned char wide[] = "P6 1 1 65535 \377\377\1\0\0\2"; // most significant byte first
     const float words[] = {1, 256 / 65535.f, 2 / 65535.f};
-    expect_pixels(wide, sizeof wide - 1, 1, 1, 3, true, words);
+    expect_pixels(ctx, wide, sizeof wide - 1, 1, 1, 3, true, words);
     expect_cuts(wide, sizeof wide - 1);
 }
 
@@ -88,11 +47,11 @@ static void floats_of_both_orders(void **state) {
     static const unsigned char little[] = "PF\n1 2\n-1.0\n\0\0\200\77\0\0\0\100\0\0\100\100\0\0\200\100\0\0\240\100\0\0\300\100";
     static const unsigned char big[] = "PF\n1 2\n1.0\n\77\200\0\0\100\0\0\0\100\100\0\0\100\200\0\0\100\240\0\0\100\300\0\0";
     const float pixels[] = {4, 5, 6, 1, 2, 3}; // rows from the bottom
-    expect_pixels(little, sizeof little - 1, 1, 2, 3, false, pixels);
-    expect_pixels(big, sizeof big - 1, 1, 2, 3, false, pixels);
+    expect_pixels(ctx, little, sizeof little - 1, 1, 2, 3, false, pixels);
+    expect_pixels(ctx, big, sizeof big - 1, 1, 2, 3, false, pixels);
     expect_cuts(little, sizeof little - 1);
     static const unsigned char scaled[] = "Pf\n1 1\n2.5e0\n\100\0\0\0";
-    expect_pixels(scaled, sizeof scaled - 1, 1, 1, 1, false, (float[]){5});
+    expect_pixels(ctx, scaled, sizeof scaled - 1, 1, 1, 1, false, (float[]){5});
 }
 
 static void broken_netpbm(void **state) {
@@ -114,7 +73,7 @@ static void broken_netpbm(void **state) {
                  {"PF4\n1 1\n-1\n1234123412341234", "byte 2: expected a blank behind"},
                  {"P3 1 1 255\n1 2 3", "expected OpenEXR, PNG, JPEG, BMP, TGA, Radiance HDR, PFM, PGM or PPM (binary), or NPY"}};
     for (int i = 0; i < COUNT_OF(cases); i++) {
-        expect_failure(cases[i].text, strlen(cases[i].text), cases[i].words);
+        expect_failure(ctx, "test.picture", cases[i].text, strlen(cases[i].text), cases[i].words);
     }
 }
 
@@ -152,27 +111,27 @@ static void truevision_plain(void **state) {
         turned[(1 - i / 3 % 2) * 3 + i % 3 + i / 6 * 6] = top[i];
     }
     size_t count = make_tga(file, 2, 0, 0, 2, 2, 24, FROM_TOP, pixels, sizeof pixels, false);
-    expect_pixels(file, count, 2, 2, 3, true, top);
+    expect_pixels(ctx, file, count, 2, 2, 3, true, top);
     expect_cuts(file, count);
     count = make_tga(file, 2, 0, 0, 2, 2, 24, 0, pixels, sizeof pixels, true);
-    expect_pixels(file, count, 2, 2, 3, true, bottom);
+    expect_pixels(ctx, file, count, 2, 2, 3, true, bottom);
     count = make_tga(file, 2, 0, 0, 2, 2, 24, FROM_TOP | FROM_RIGHT, pixels, sizeof pixels, true);
-    expect_pixels(file, count, 2, 2, 3, true, turned);
+    expect_pixels(ctx, file, count, 2, 2, 3, true, turned);
     const float alpha[] = {1 / 255.f, 2 / 255.f, 3 / 255.f};
     count = make_tga(file, 2, 0, 0, 1, 1, 32, FROM_TOP | 8, (unsigned char[]){3, 2, 1, 77}, 4, false); // alpha is dropped
-    expect_pixels(file, count, 1, 1, 3, true, alpha);
+    expect_pixels(ctx, file, count, 1, 1, 3, true, alpha);
     count = make_tga(file, 2, 0, 0, 2, 1, 16, FROM_TOP, (unsigned char[]){0x1f, 0x7c, 0xe0, 0x03}, 4, false);
-    expect_pixels(file, count, 2, 1, 3, true, (float[]){1, 0, 1, 0, 1, 0});
+    expect_pixels(ctx, file, count, 2, 1, 3, true, (float[]){1, 0, 1, 0, 1, 0});
     count = make_tga(file, 3, 0, 0, 2, 1, 8, FROM_TOP, (unsigned char[]){0, 255}, 2, false);
-    expect_pixels(file, count, 2, 1, 1, true, (float[]){0, 1});
+    expect_pixels(ctx, file, count, 2, 1, 1, true, (float[]){0, 1});
     count = make_tga(file, 3, 0, 0, 2, 1, 16, FROM_TOP | 8, (unsigned char[]){0, 9, 255, 9}, 4, false); // and so with grey
-    expect_pixels(file, count, 2, 1, 1, true, (float[]){0, 1});
+    expect_pixels(ctx, file, count, 2, 1, 1, true, (float[]){0, 1});
     count = make_tga(file, 2, 1, 24, 1, 1, 24, FROM_TOP, (unsigned char[]){7, 7, 7, 3, 2, 1}, 6, false); // its palette is of no use
-    expect_pixels(file, count, 1, 1, 3, true, alpha);
+    expect_pixels(ctx, file, count, 1, 1, 3, true, alpha);
     count = make_tga(file, 1, 2, 24, 2, 1, 16, FROM_TOP, (unsigned char[]){0, 0, 255, 255, 0, 0, 1, 0, 0, 0}, 10, false);
-    expect_pixels(file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
+    expect_pixels(ctx, file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
     count = make_tga(file, 1, 2, 24, 2, 1, 8, FROM_TOP, (unsigned char[]){0, 0, 255, 255, 0, 0, 1, 0}, 8, false);
-    expect_pixels(file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
+    expect_pixels(ctx, file, count, 2, 1, 3, true, (float[]){0, 0, 1, 1, 0, 0});
     expect_cuts(file, count);
 }
 
@@ -187,38 +146,41 @@ static void truevision_in_runs(void **state) {
         pixels[i] = colours[i] / 255;
     }
     size_t count = make_tga(file, 10, 0, 0, 2, 3, 24, FROM_TOP, packets, sizeof packets, false);
-    expect_pixels(file, count, 2, 3, 3, true, pixels);
+    expect_pixels(ctx, file, count, 2, 3, 3, true, pixels);
     expect_cuts(file, count);
     file[18] = 0x83; // a run of four where two pixels are left
     file[14] = 1;
-    expect_failure(file, count, "the last run goes on behind the last pixel");
+    expect_failure(ctx, "test.picture", file, count, "the last run goes on behind the last pixel");
     static const unsigned char raw[] = {0x02, 10, 20, 30, 0x80, 40};
     count = make_tga(file, 11, 0, 0, 4, 1, 8, FROM_TOP, raw, sizeof raw, true);
-    expect_pixels(file, count, 4, 1, 1, true, (float[]){10 / 255.f, 20 / 255.f, 30 / 255.f, 40 / 255.f});
+    expect_pixels(ctx, file, count, 4, 1, 1, true, (float[]){10 / 255.f, 20 / 255.f, 30 / 255.f, 40 / 255.f});
     static const unsigned char indices[] = {0, 0, 255, 255, 0, 0, 0x83, 1};
     count = make_tga(file, 9, 2, 24, 2, 2, 8, FROM_TOP, indices, sizeof indices, false);
-    expect_pixels(file, count, 2, 2, 3, true, (float[]){0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
+    expect_pixels(ctx, file, count, 2, 2, 3, true, (float[]){0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
 }
 
 static void broken_truevision(void **state) {
     UNUSED(state);
+    static const struct {
+        int sort, palette, width, height, bits;
+        const char *rest;
+        bool marked;
+        const char *words;
+    } cases[] = {{2, 0, 2, 2, 24, "12345678901", false, "byte 27: the file ends before its pixels"},
+                 {32, 0, 2, 2, 24, "", true, "byte 2: expected a picture with a palette (1), of colours (2) or grey (3)"},
+                 {2, 0, 2, 2, 12, "", true,
+                  "byte 16: expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32"},
+                 {1, 0, 2, 2, 8, "", true, "byte 2: expected a picture with a palette"},
+                 {1, 1, 1, 1, 8, "\1\2\3\7", false, "byte 21: a pixel is beyond the palette"},
+                 {1, 200, 1, 1, 8, "\1\2\3\7", false, "the file ends in its header"},
+                 {10, 0, 65535, 65535, 24, "\377\1\2\3", false, "claims 65535 x 65535 pixels in 22 bytes"},
+                 {2, 0, 0, 4, 24, "", true, "the picture is 0 x 4, expected 1 to 65536 along an edge"}};
     unsigned char file[128];
-    size_t count = make_tga(file, 2, 0, 0, 2, 2, 24, 0, "12345678901", 11, false);
-    expect_failure(file, count, "byte 27: the file ends before its pixels");
-    count = make_tga(file, 32, 0, 0, 2, 2, 24, 0, "", 0, true);
-    expect_failure(file, count, "byte 2: expected a picture with a palette (1), of colours (2) or grey (3)");
-    count = make_tga(file, 2, 0, 0, 2, 2, 12, 0, "", 0, true);
-    expect_failure(file, count, "byte 16: expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32");
-    count = make_tga(file, 1, 0, 0, 2, 2, 8, 0, "", 0, true);
-    expect_failure(file, count, "byte 2: expected a picture with a palette");
-    count = make_tga(file, 1, 1, 24, 1, 1, 8, 0, "\1\2\3\7", 4, false);
-    expect_failure(file, count, "byte 21: a pixel is beyond the palette");
-    count = make_tga(file, 1, 200, 24, 1, 1, 8, 0, "\1\2\3\7", 4, false);
-    expect_failure(file, count, "the file ends in its header");
-    count = make_tga(file, 10, 0, 0, 65535, 65535, 24, 0, "\377\1\2\3", 4, false);
-    expect_failure(file, count, "claims 65535 x 65535 pixels in 22 bytes");
-    count = make_tga(file, 2, 0, 0, 0, 4, 24, 0, "", 0, true);
-    expect_failure(file, count, "the picture is 0 x 4, expected 1 to 65536 along an edge");
+    for (int i = 0; i < COUNT_OF(cases); i++) {
+        size_t count = make_tga(file, cases[i].sort, cases[i].palette, cases[i].palette ? 24 : 0, cases[i].width, cases[i].height,
+                                cases[i].bits, 0, cases[i].rest, strlen(cases[i].rest), cases[i].marked);
+        expect_failure(ctx, "test.picture", file, count, cases[i].words);
+    }
 }
 
 int main(void) {

@@ -32,9 +32,7 @@ static void on_error(exr_const_context_t file, exr_result_t code, const char *me
         Stream *s = user;
         if (!s->message[0]) {
             snprintf(s->message, sizeof s->message, "%s", message);
-            for (char *c = s->message; *c; c++) { // names of a broken file
-                *c = *c < ' ' || *c > '~' ? '?' : *c;
-            }
+            rey_image_make_printable(s->message); // names of a broken file
         }
     }
 }

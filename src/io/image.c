@@ -11,6 +11,16 @@ void rey_image_free(rey_context *ctx, rey_image *image) {
     *image = (rey_image){0};
 }
 
+rey_result rey_image_fail(const ImageBytes *in, const char *what) {
+    return rey_fail(in->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", in->name, in->at, what);
+}
+
+void rey_image_make_printable(char *text) {
+    for (char *c = text; *c; c++) {
+        *c = *c < ' ' || *c > '~' ? '?' : *c;
+    }
+}
+
 rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int64_t height, int channels,
                          rey_image *out) {
     if (width < 1 || height < 1 || width > IMAGE_LARGEST || height > IMAGE_LARGEST || width * height > INT32_MAX / 2) {

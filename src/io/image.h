@@ -20,6 +20,19 @@ rey_result rey_image_read_memory(rey_context *ctx, const char *name, const unsig
                                  rey_image *out);
 void rey_image_free(rey_context *ctx, rey_image *image);
 
+// A file in memory that is read from front to back.
+typedef struct ImageBytes {
+    rey_context *ctx;
+    const char *name; // for messages
+    const unsigned char *bytes;
+    size_t size, at;
+} ImageBytes;
+
+// Fails with what is wrong at byte `at`.
+rey_result rey_image_fail(const ImageBytes *in, const char *what);
+// Text of a file that comes into messages: terminals take control characters as orders.
+void rey_image_make_printable(char *text);
+
 // Room for a picture; checks its size against IMAGE_LARGEST.
 rey_result rey_image_new(rey_context *ctx, const char *name, int64_t width, int64_t height, int channels, rey_image *out);
 // Refuses more pixels than any compression packs into `size` bytes, before memory is asked for.

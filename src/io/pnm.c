@@ -6,19 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct Pnm {
-    rey_context *ctx;
-    const char *name;
-    const unsigned char *bytes;
-    size_t size, at;
-} Pnm;
-
-static rey_result fail(const Pnm *p, const char *what) {
-    return rey_fail(p->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", p->name, p->at, what);
-}
-
 // The text of the next number of the header, behind blanks and comments.
-static const char *next_number(Pnm *p) {
+static const char *next_number(ImageBytes *p) {
     for (bool comment = false; p->at < p->size; p->at++) {
         const char c = (char)p->bytes[p->at];
         comment = (comment || c == '#') && c != '\n';
@@ -29,14 +18,14 @@ static const char *next_number(Pnm *p) {
     return (const char *)p->bytes + p->at;
 }
 
-static rey_result read_size(Pnm *p, int64_t size[2]) {
+static rey_result read_size(ImageBytes *p, int64_t size[2]) {
     if (p->at < p->size && !rey_is_blank((char)p->bytes[p->at]) && p->bytes[p->at] != '#') {
-        return fail(p, "expected a blank behind 'P5', 'P6', 'Pf' or 'PF'");
+        return rey_image_fail(p, "expected a blank behind 'P5', 'P6', 'Pf' or 'PF'");
     }
     for (int k = 0; k < 2; k++) {
         const char *text = next_number(p), *end = rey_parse_int(text, (const char *)p->bytes + p->size, size + k);
         if (!end || size[k] < 1) {
-            return fail(p, k ? "expected the height in pixels" : "expected the width in pixels");
+            return rey_image_fail(p, k ? "expected the height in pixels" : "expected the width in pixels");
         }
         p->at += (size_t)(end - text);
     }
@@ -45,13 +34,13 @@ static rey_result read_size(Pnm *p, int64_t size[2]) {
 
 // One blank ends the header, or a comment; what follows must be all there. Where it fits, two blanks are the end of a line that a
 // text editor or a transfer made of one.
-static rey_result make_room(Pnm *p, const int64_t size[2], int channels, size_t sample, rey_image *out) {
+static rey_result make_room(ImageBytes *p, const int64_t size[2], int channels, size_t sample, rey_image *out) {
     const bool comment = p->at < p->size && p->bytes[p->at] == '#';
     while (comment && p->at < p->size && p->bytes[p->at] != '\n') {
         p->at++;
     }
     if (p->at >= p->size || !rey_is_blank((char)p->bytes[p->at])) {
-        return fail(p, "expected a blank between the header and the pixels");
+        return rey_image_fail(p, "expected a blank between the header and the pixels");
     }
     p->at++;
     const bool small = size[0] <= IMAGE_LARGEST && size[1] <= IMAGE_LARGEST, line = p->at < p->size && p->bytes[p->at] == '\n';
@@ -65,7 +54,7 @@ static rey_result make_room(Pnm *p, const int64_t size[2], int channels, size_t 
 }
 
 rey_result rey_pnm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    Pnm p = {.ctx = ctx, .name = name, .bytes = bytes, .size = size, .at = 2};
+    ImageBytes p = {.ctx = ctx, .name = name, .bytes = bytes, .size = size, .at = 2};
     int64_t extent[2], most;
     const int channels = bytes[1] == '6' ? 3 : 1;
     rey_result result = read_size(&p, extent);
@@ -74,7 +63,7 @@ rey_result rey_pnm_read(rey_context *ctx, const char *name, const unsigned char 
     }
     const char *text = next_number(&p), *end = rey_parse_int(text, (const char *)bytes + size, &most);
     if (!end || most < 1 || most > 65535) {
-        return fail(&p, "expected the largest value, 1 to 65535");
+        return rey_image_fail(&p, "expected the largest value, 1 to 65535");
     }
     p.at += (size_t)(end - text);
     const size_t sample = most > 255 ? 2 : 1;
@@ -83,7 +72,7 @@ rey_result rey_pnm_read(rey_context *ctx, const char *name, const unsigned char 
     for (int64_t i = 0; i < count; i++, p.at += sample) {
         const int value = sample == 2 ? bytes[p.at] << 8 | bytes[p.at + 1] : bytes[p.at];
         if (value > most) {
-            return fail(&p, "a value is above the largest that the header names");
+            return rey_image_fail(&p, "a value is above the largest that the header names");
         }
         out->data[i] = (float)value / (float)most;
     }
@@ -92,7 +81,7 @@ rey_result rey_pnm_read(rey_context *ctx, const char *name, const unsigned char 
 }
 
 rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    Pnm p = {.ctx = ctx, .name = name, .bytes = bytes, .size = size, .at = 2};
+    ImageBytes p = {.ctx = ctx, .name = name, .bytes = bytes, .size = size, .at = 2};
     int64_t extent[2];
     float scale;
     const int channels = bytes[1] == 'F' ? 3 : 1;
@@ -102,7 +91,7 @@ rey_result rey_pfm_read(rey_context *ctx, const char *name, const unsigned char 
     }
     const char *text = next_number(&p), *end = rey_parse_float(text, (const char *)bytes + size, &scale);
     if (!end || scale == 0 || !isfinite(scale)) {
-        return fail(&p, "expected the scale: below 0 the floats are little-endian, above 0 big-endian");
+        return rey_image_fail(&p, "expected the scale: below 0 the floats are little-endian, above 0 big-endian");
     }
     p.at += (size_t)(end - text);
     result = make_room(&p, extent, channels, sizeof(float), out);

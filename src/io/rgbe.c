@@ -6,19 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-typedef struct Rgbe {
-    rey_context *ctx;
-    const char *name;
-    const unsigned char *bytes;
-    size_t size, at;
-} Rgbe;
-
-static rey_result fail(const Rgbe *r, const char *what) {
-    return rey_fail(r->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", r->name, r->at, what);
-}
-
 // The next line of the header without its end; false when there is none.
-static bool next_line(Rgbe *r, char line[128]) {
+static bool next_line(ImageBytes *r, char line[128]) {
     const unsigned char *start = r->bytes + r->at, *end = memchr(start, '\n', r->size - r->at);
     if (!end) {
         return false;
@@ -28,15 +17,13 @@ static bool next_line(Rgbe *r, char line[128]) {
     length = length < 127 ? length : 127;
     memcpy(line, start, length);
     line[length] = 0;
-    for (char *c = line; *c; c++) { // lines come into messages, and terminals take control characters as orders
-        *c = *c < ' ' || *c > '~' ? '?' : *c;
-    }
+    rey_image_make_printable(line);
     return true;
 }
 
 // Lines up to an empty one, then the size; rows from the top, pixels from the left. What EXPOSURE says of the camera is
 // left alone: pixels are what the file holds.
-static rey_result read_header(Rgbe *r, int64_t *width, int64_t *height) {
+static rey_result read_header(ImageBytes *r, int64_t *width, int64_t *height) {
     char line[128];
     while (next_line(r, line) && line[0]) {
         if (!strncmp(line, "FORMAT=", 7) && strcmp(line + 7, "32-bit_rle_rgbe") != 0) {
@@ -47,10 +34,10 @@ static rey_result read_header(Rgbe *r, int64_t *width, int64_t *height) {
     long long w = 0, h = 0;
     int used = 0;
     if (!next_line(r, line)) {
-        return fail(r, "the file ends in its header");
+        return rey_image_fail(r, "the file ends in its header");
     }
     if (sscanf(line, "-Y %7lld +X %7lld%n", &h, &w, &used) != 2 || line[used]) {
-        return fail(r, "malformed Radiance header, expected its size as '-Y HEIGHT +X WIDTH'");
+        return rey_image_fail(r, "malformed Radiance header, expected its size as '-Y HEIGHT +X WIDTH'");
     }
     *width = w;
     *height = h;
@@ -65,18 +52,18 @@ static void decode(const unsigned char in[4], float out[3]) {
 }
 
 // One channel after the other, each in runs: a count above 128 repeats a byte, another copies bytes.
-static rey_result read_runs(Rgbe *r, unsigned char *row, int64_t width) {
+static rey_result read_runs(ImageBytes *r, unsigned char *row, int64_t width) {
     for (int channel = 0; channel < 4; channel++) {
         for (int64_t x = 0; x < width;) {
             if (r->at + 2 > r->size) {
-                return fail(r, "the file ends before its pixels");
+                return rey_image_fail(r, "the file ends before its pixels");
             }
             int count = r->bytes[r->at++];
             bool repeat = count > 128;
             count = repeat ? count - 128 : count;
             if (count == 0 || x + count > width || (!repeat && r->size - r->at < (size_t)count)) {
                 r->at--; // where the run begins
-                return fail(r, "a run of bytes does not fit its row or the file");
+                return rey_image_fail(r, "a run of bytes does not fit its row or the file");
             }
             for (int i = 0; i < count; i++) {
                 row[4 * (x + i) + channel] = r->bytes[repeat ? r->at : r->at + (size_t)i];
@@ -89,11 +76,11 @@ static rey_result read_runs(Rgbe *r, unsigned char *row, int64_t width) {
 }
 
 // Pixels of four bytes; 1 1 1 N repeats the pixel before, N times, and N x 256 times right after another such.
-static rey_result read_flat(Rgbe *r, unsigned char *row, int64_t width) {
+static rey_result read_flat(ImageBytes *r, unsigned char *row, int64_t width) {
     int shift = 0;
     for (int64_t x = 0; x < width;) {
         if (r->size - r->at < 4) {
-            return fail(r, "the file ends before its pixels");
+            return rey_image_fail(r, "the file ends before its pixels");
         }
         const unsigned char *pixel = r->bytes + r->at;
         r->at += 4;
@@ -107,7 +94,7 @@ static rey_result read_flat(Rgbe *r, unsigned char *row, int64_t width) {
         shift += 8;
         if (x == 0 || shift > 24 || count > width - x) {
             r->at -= 4; // where the run stands
-            return fail(r, "a run of pixels does not fit its row");
+            return rey_image_fail(r, "a run of pixels does not fit its row");
         }
         for (int64_t i = 0; i < count; i++, x++) {
             memcpy(row + 4 * x, row + 4 * (x - 1), 4);
@@ -116,21 +103,21 @@ static rey_result read_flat(Rgbe *r, unsigned char *row, int64_t width) {
     return REY_OK;
 }
 
-static rey_result read_row(Rgbe *r, unsigned char *row, int64_t width) {
+static rey_result read_row(ImageBytes *r, unsigned char *row, int64_t width) {
     const unsigned char *head = r->bytes + r->at;
     bool runs = r->size - r->at >= 4 && width >= 8 && width < 32768 && head[0] == 2 && head[1] == 2 && head[2] < 128;
     if (!runs) {
         return read_flat(r, row, width);
     }
     if ((head[2] << 8 | head[3]) != width) {
-        return fail(r, "a row's width is not the picture's");
+        return rey_image_fail(r, "a row's width is not the picture's");
     }
     r->at += 4;
     return read_runs(r, row, width);
 }
 
 rey_result rey_rgbe_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    Rgbe r = {.ctx = ctx, .name = name, .bytes = bytes, .size = size};
+    ImageBytes r = {.ctx = ctx, .name = name, .bytes = bytes, .size = size};
     int64_t width = 0, height = 0;
     rey_result result = read_header(&r, &width, &height);
     if (result == REY_OK) {

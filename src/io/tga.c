@@ -7,10 +7,8 @@
 enum { HEADER = 18, FOOTER = 26, PALETTE = 1, COLOUR = 2, GREY = 3, RUNS = 8 };
 
 typedef struct Tga {
-    rey_context *ctx;
-    const char *name;
-    const unsigned char *bytes, *palette;
-    size_t size, at;
+    ImageBytes in;
+    const unsigned char *palette;
     int sort, bits, colour_bits; // of a pixel, and of a colour in it or in the palette
     int64_t first, colours;      // of the palette
     int left;                    // pixels of the packet that are still to come; 0 without packets
@@ -37,33 +35,31 @@ bool rey_tga_known(const unsigned char *bytes, size_t size) {
     return sort_known && (bytes[17] & 0xc0) == 0 && word(bytes + 12) > 0 && word(bytes + 14) > 0;
 }
 
-static rey_result fail(const Tga *t, const char *what) {
-    return rey_fail(t->ctx, REY_ERROR_FORMAT, "%s: byte %zu: %s", t->name, t->at, what);
-}
-
 static rey_result read_header(Tga *t) {
-    const unsigned char *h = t->bytes;
+    const unsigned char *h = t->in.bytes;
     t->sort = h[2] & ~RUNS;
     t->bits = h[16];
     const bool mapped = t->sort == PALETTE;
     t->colour_bits = mapped ? h[7] : t->bits;
-    t->at = 2;
+    t->in.at = 2;
     if (t->sort < PALETTE || t->sort > GREY || (mapped && h[1] != 1)) {
-        return fail(t, "expected a picture with a palette (1), of colours (2) or grey (3), or the same in runs (9, 10, 11)");
+        return rey_image_fail(&t->in, "expected a picture with a palette (1), of colours (2) or grey (3), or the same in runs "
+                                       "(9, 10, 11)");
     }
-    t->at = 16;
+    t->in.at = 16;
     const bool narrow = t->bits == 8 || t->bits == 16; // grey with alpha, and large palettes, have 16 bits
     if (t->sort == GREY ? !narrow : !colour_known(t->colour_bits) || (mapped && !narrow)) {
-        return fail(t, "expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32 for each colour");
+        return rey_image_fail(&t->in, "expected 8 or 16 bits for each pixel of grey and palettes, and 15, 16, 24 or 32 for each "
+                                       "colour");
     }
-    t->at = HEADER + (size_t)h[0];
+    t->in.at = HEADER + (size_t)h[0];
     if (h[1] == 1) { // a palette may be there unused
         t->first = word(h + 3);
         t->colours = word(h + 5);
-        t->palette = h + t->at;
-        t->at += (size_t)t->colours * (size_t)((h[7] + 7) / 8);
+        t->palette = h + t->in.at;
+        t->in.at += (size_t)t->colours * (size_t)((h[7] + 7) / 8);
     }
-    return t->at <= t->size ? REY_OK : fail(t, "the file ends in its header");
+    return t->in.at <= t->in.size ? REY_OK : rey_image_fail(&t->in, "the file ends in its header");
 }
 
 static void colour_of(const unsigned char *at, int bits, float rgb[3]) {
@@ -75,41 +71,38 @@ static void colour_of(const unsigned char *at, int bits, float rgb[3]) {
 // The next pixel, from its packet where the picture is in runs.
 static rey_result next_pixel(Tga *t, float rgb[3]) {
     const size_t step = (size_t)(t->bits + 7) / 8;
-    const bool runs = t->bytes[2] & RUNS;
-    if (runs && t->left == 0 && t->at < t->size) {
-        t->left = (t->bytes[t->at] & 127) + 1;
-        t->raw = !(t->bytes[t->at++] & 128);
+    const bool runs = t->in.bytes[2] & RUNS;
+    if (runs && t->left == 0 && t->in.at < t->in.size) {
+        t->left = (t->in.bytes[t->in.at] & 127) + 1;
+        t->raw = !(t->in.bytes[t->in.at++] & 128);
     }
-    if (step > t->size - t->at) {
-        return fail(t, "the file ends before its pixels");
+    if (step > t->in.size - t->in.at) {
+        return rey_image_fail(&t->in, "the file ends before its pixels");
     }
-    const unsigned char *pixel = t->bytes + t->at;
+    const unsigned char *pixel = t->in.bytes + t->in.at;
     if (t->sort == GREY) {
         rgb[0] = (float)pixel[0] / 255;
     } else if (t->sort == PALETTE) {
         const int64_t index = (t->bits == 16 ? word(pixel) : pixel[0]) - t->first;
         if (index < 0 || index >= t->colours) {
-            return fail(t, "a pixel is beyond the palette");
+            return rey_image_fail(&t->in, "a pixel is beyond the palette");
         }
         colour_of(t->palette + index * ((t->colour_bits + 7) / 8), t->colour_bits, rgb);
     } else {
         colour_of(pixel, t->bits, rgb);
     }
     t->left -= runs;
-    t->at += t->raw || t->left == 0 ? step : 0;
+    t->in.at += t->raw || t->left == 0 ? step : 0;
     return REY_OK;
 }
 
 rey_result rey_tga_read(rey_context *ctx, const char *name, const unsigned char *bytes, size_t size, rey_image *out) {
-    enum { FROM_RIGHT = 16, FROM_TOP = 32, MOST_RUN = 128 };
-    Tga t = {.ctx = ctx, .name = name, .bytes = bytes, .size = size};
+    enum { FROM_RIGHT = 16, FROM_TOP = 32 };
+    Tga t = {.in = {.ctx = ctx, .name = name, .bytes = bytes, .size = size}};
     const int64_t width = word(bytes + 12), height = word(bytes + 14);
     rey_result result = read_header(&t);
-    if (result == REY_OK && (uint64_t)(width * height) / MOST_RUN > size) {
-        return rey_fail(ctx, REY_ERROR_FORMAT, "%s: claims %lld x %lld pixels in %zu bytes", name, (long long)width,
-                        (long long)height, size);
-    }
     const int channels = t.sort == GREY ? 1 : 3;
+    result = result != REY_OK ? result : rey_image_check_claim(ctx, name, width, height, size);
     result = result != REY_OK ? result : rey_image_new(ctx, name, width, height, channels, out);
     for (int64_t i = 0; i < width * height && result == REY_OK; i++) {
         const int64_t x = bytes[17] & FROM_RIGHT ? width - 1 - i % width : i % width;
@@ -119,5 +112,5 @@ rey_result rey_tga_read(rey_context *ctx, const char *name, const unsigned char 
         memcpy(out->data + (y * width + x) * channels, rgb, (size_t)channels * sizeof *rgb);
     }
     out->srgb = true;
-    return result == REY_OK && t.left > 0 ? fail(&t, "the last run goes on behind the last pixel") : result;
+    return result == REY_OK && t.left > 0 ? rey_image_fail(&t.in, "the last run goes on behind the last pixel") : result;
 }
