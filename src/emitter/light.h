@@ -149,6 +149,11 @@ KFN void light_place_adj(const Light *l, int slot, int32_t i, Float d, Sink *sin
 
 // ---- poses: the table begins with the rows of the inverse of to_world (12) --------------------------------------
 
+// Columns of to_world: the axes of the light's space, and its place.
+KFN Vec3 light_pose_column(const SceneView *scene, const Light *l, int slot, int32_t k) {
+    return v3(light_place(scene, l, slot, k), light_place(scene, l, slot, 4 + k), light_place(scene, l, slot, 8 + k));
+}
+
 KFN Vec3 light_to_local(const SceneView *scene, const Light *l, Vec3 p) {
     Float r[3];
     for (int k = 0; k < 3; k++) {
@@ -227,8 +232,7 @@ KFN Vec3 light_at_point_adj(Vec3 d, Float distance, const LightMove *move) {
 
 // A light at the origin of its pose that shines along z; uv is the slope (x, y) / z of the direction to ref.
 KFN LightSample light_along_slope(const SceneView *scene, const Light *l, int slot, Vec3 ref) {
-    LightSample s = light_at_point(ref, v3(light_place(scene, l, slot, 3), light_place(scene, l, slot, 7),
-                                           light_place(scene, l, slot, 11)));
+    LightSample s = light_at_point(ref, light_pose_column(scene, l, slot, 3));
     Vec3 local = light_to_local(scene, l, ref);
     Mask front = m_gt(local.z, f_set(0));
     Float rcp = f_safe_rcp(local.z);

@@ -40,11 +40,6 @@ static NOINLINE ParticleStart start_surface(const SceneView *scene, const Emitte
     return s;
 }
 
-// Columns of a place's pose.
-KFN Vec3 start_column(const SceneView *scene, const Light *l, int slot, int32_t k) {
-    return v3(light_place(scene, l, slot, k), light_place(scene, l, slot, 4 + k), light_place(scene, l, slot, 8 + k));
-}
-
 static NOINLINE ParticleStart start_point(const SceneView *scene, const EmitterRecord *e, Vec2 u) {
     Light l = light_alone(e, i_set(0));
     const int slot = SLOT(Point, position);
@@ -73,12 +68,13 @@ static NOINLINE ParticleStart start_beam(const SceneView *scene, const EmitterRe
         local = v3_normalize(q);
         angle = 4.0f * x * y / (r2 * f_sqrt(r2));
     }
-    Vec3 a = start_column(scene, &l, slot, 0), b = start_column(scene, &l, slot, 1), c = start_column(scene, &l, slot, 2);
+    Vec3 a = light_pose_column(scene, &l, slot, 0), b = light_pose_column(scene, &l, slot, 1);
+    Vec3 c = light_pose_column(scene, &l, slot, 2);
     Vec3 w = v3_madd(v3_madd(v3_scale(a, local.x), local.y, b), local.z, c);
     Float length = v3_length(w), det = f_abs(v3_dot(v3_cross(a, b), c));
     ParticleStart s = {.prim = i_set(0), .valid = m_gt(local.z, f_set(0))};
     s.uv = (Vec2){local.x * f_safe_rcp(local.z), local.y * f_safe_rcp(local.z)};
-    s.o = start_column(scene, &l, slot, 3);
+    s.o = light_pose_column(scene, &l, slot, 3);
     s.d = v3_scale(w, f_safe_rcp(length));
     // dw = |det M| / |M l|^3 dw_local
     s.factor = angle * det * f_safe_rcp(length * length * length);

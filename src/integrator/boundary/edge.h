@@ -225,12 +225,8 @@ static void borders_move_adj(const SceneView *scene, Int light, Vec3 p, Vec3 dp,
             light_place_adj(&of, kinds[i][1], 4 * k + 3, rows[k], sink, mine);
         }
         if (kinds[i][0] == EMITTER_PROJECTOR) {
-            Vec3 across = v3_zero();
-            for (int k = 0; k < 2; k++) {
-                Vec3 column = v3(light_place(scene, &of, kinds[i][1], k), light_place(scene, &of, kinds[i][1], 4 + k),
-                                 light_place(scene, &of, kinds[i][1], 8 + k));
-                across = v3_madd(across, k ? q.y : q.x, column);
-            }
+            Vec3 across = v3_madd(v3_scale(light_pose_column(scene, &of, kinds[i][1], 0), q.x), q.y,
+                                  light_pose_column(scene, &of, kinds[i][1], 1));
             projector_extent_adj(scene, &of, v3_dot(dp, across) / light_table(scene, &of, PROJECTOR_EXTENT), sink, mine);
         }
     }
