@@ -7,7 +7,7 @@
 #include "shape/shape.h"
 
 // Uniform over the area of a shape. Spheres seen from their centre are sampled so.
-KFN Interaction sensor_shape_point(const SceneView *scene, int32_t id, Vec2 u) {
+static NOINLINE Interaction sensor_shape_point(const SceneView *scene, int32_t id, Vec2 u) {
     const ShapeRecord *shape = scene->shapes + id;
     const float *t = scene->tables + (shape->kind == SHAPE_SPHERE ? shape->table : 0);
     Vec3 centre = shape->kind == SHAPE_SPHERE ? v3(f_set(t[0]), f_set(t[1]), f_set(t[2])) : v3_zero();

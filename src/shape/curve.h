@@ -143,7 +143,7 @@ KFN Float bspline_distance(const SceneView *scene, Hit *hit, Vec3 x, Vec3 *gradi
 }
 
 // Swept circle p = c + r e, e perpendicular to T = c' / |c'|: n is parallel to e - T r' / (|c'| - r (c'' . e) / |c'|).
-KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction bspline_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     CurvePoint p = bspline_point(scene, hit);
     Float speed = v3_length(p.c1);
     Vec3 tangent = v3_scale(p.c1, f_safe_rcp(speed)), away = v3_sub(hit->p, p.c);
@@ -160,7 +160,7 @@ KFN Interaction bspline_interaction(const SceneView *scene, int32_t flags, const
 
 // Cone that touches the spheres at both ends, and those spheres: the normal points away from the sphere of the family
 // between them that touches the surface at p.
-KFN Interaction linear_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction linear_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Float b[2] = {1.0f - hit->u, hit->u}, b1[2] = {f_set(-1), f_set(1)}, b2[2] = {f_set(0), f_set(0)};
     CurvePoint p = curve_sum(scene, hit, LINEAR_POINTS, b, b1, b2);
     Float length2 = v3_dot(p.c1, p.c1);

@@ -95,8 +95,8 @@ KFN CurveAxes bspline_axes(const SceneView *scene, const Hit *hit, const CurveWe
     return curve_axes(curve_sum(scene, hit, BSPLINE_POINTS, w->b, w->b1, w->b2), hit->p);
 }
 
-KFN void bspline_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
-                          const SurfaceAdj *d, Sink *sink, Mask m) {
+static NOINLINE void bspline_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                                      const SurfaceAdj *d, Sink *sink, Mask m) {
     CurveWeights w = bspline_weights(hit->u);
     CurveAxes c = bspline_axes(scene, hit, &w);
     const CurvePoint *p = &c.p;
@@ -141,7 +141,7 @@ KFN Float curve_twist(const CurveAxes *c, Vec3 dtangent) {
     return v3_dot(by, dtangent);
 }
 
-KFN void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     CurveWeights w = bspline_weights(hit->u);
     CurveAxes c = bspline_axes(scene, hit, &w);
     CurvePoint p = c.p, higher = curve_sum(scene, hit, BSPLINE_POINTS, w.b2, w.b3, w.b2);
@@ -173,7 +173,7 @@ KFN void bspline_slide(const SceneView *scene, int32_t flags, const Hit *hit, co
 
 // Cones and the spheres at their ends: where v is along dp_du, or in the plane of the normal and the axis, dn = v / r on spheres,
 // and on cones, whose normals are the same along their lines, for the former alone.
-KFN void linear_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void linear_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     Float b[2] = {1.0f - hit->u, hit->u}, b1[2] = {f_set(-1), f_set(1)}, b2[2] = {f_set(0), f_set(0)};
     CurveAxes c = curve_axes(curve_sum(scene, hit, LINEAR_POINTS, b, b1, b2), hit->p);
     Float n = f_from_i(SHAPE_FIELD(scene, hit->shape, segment_count)), sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);

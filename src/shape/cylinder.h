@@ -79,7 +79,7 @@ static inline float cylinder_meet(const Surface *surface, unsigned prim, const d
     return -1;
 }
 
-KFN Interaction cylinder_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction cylinder_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     Vec3 local = pose_to_local(scene, at, hit->p);

@@ -37,7 +37,7 @@ static inline float disk_meet(const Surface *surface, unsigned prim, const doubl
     return at > near && at < far && x * x + y * y <= 1 ? (float)at : -1;
 }
 
-KFN Interaction disk_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction disk_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     Vec3 local;

@@ -16,7 +16,7 @@ KFN void affine_move_adj(const SceneView *scene, const Hit *hit, const Interacti
 
 // ---- disks: p = o + r (cos phi x + sin phi y), uv = (r, phi / 2 pi) ----------------------------------------------
 
-KFN void disk_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void disk_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     Int pose = SHAPE_FIELD(scene, hit->shape, to_world);
     UNUSED(flags);
     out[0] = slide_along(si->dp_du, f_set(1), f_set(0));
@@ -25,15 +25,15 @@ KFN void disk_slide(const SceneView *scene, int32_t flags, const Hit *hit, const
     out[1].dp_dv = v3_scale(v3_sub(si->p, pose_theta_column(scene, pose, 3)), f_set(-TWO_PI * TWO_PI));
 }
 
-KFN void disk_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, const SurfaceAdj *d,
-                       Sink *sink, Mask m) {
+static NOINLINE void disk_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                                   const SurfaceAdj *d, Sink *sink, Mask m) {
     UNUSED(flags);
     affine_move_adj(scene, hit, si, d, sink, m);
 }
 
 // ---- cylinders: p = o + cos phi x + sin phi y + v z, uv = (phi / 2 pi, v) ----------------------------------------
 
-KFN void cylinder_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void cylinder_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     Int pose = SHAPE_FIELD(scene, hit->shape, to_world), at = SHAPE_FIELD(scene, hit->shape, table);
     Float sine, cosine;
     f_sincos(TWO_PI * si->uv.x, &sine, &cosine);
@@ -47,15 +47,15 @@ KFN void cylinder_slide(const SceneView *scene, int32_t flags, const Hit *hit, c
     out[0].dp_du = v3_scale(v3_madd(v3_scale(x, cosine), sine, y), f_set(-TWO_PI * TWO_PI));
 }
 
-KFN void cylinder_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
-                           const SurfaceAdj *d, Sink *sink, Mask m) {
+static NOINLINE void cylinder_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                                       const SurfaceAdj *d, Sink *sink, Mask m) {
     UNUSED(flags);
     affine_move_adj(scene, hit, si, d, sink, m);
 }
 
 // ---- spheres: p = c + r n, uv = (phi / 2 pi, theta / pi) ---------------------------------------------------------
 
-KFN void sphere_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void sphere_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     Vec3 away = v3_sub(si->p, table_v3(scene, at)), pole = table_v3(scene, at + 10);
     Float radius = table_at(scene, at + 3), rcp = f_safe_rcp(radius);
@@ -78,8 +78,8 @@ KFN void sphere_slide(const SceneView *scene, int32_t flags, const Hit *hit, con
 // turn,
 //   w . (e_1 x e_2) = e_2 . da_1 / r,   w . (e_1 x e_3) = e_3 . da_1 / r,
 //   w . (e_2 x e_3) = e_3 . (da_2 - da_1 (e_1 . a_2) / r) / s,   s = e_2 . a_2.
-KFN void sphere_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
-                         const SurfaceAdj *d, Sink *sink, Mask m) {
+static NOINLINE void sphere_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                                     const SurfaceAdj *d, Sink *sink, Mask m) {
     Int at = SHAPE_FIELD(scene, hit->shape, table), pose = SHAPE_FIELD(scene, hit->shape, to_world);
     Float radius = table_at(scene, at + 3), rcp = f_safe_rcp(radius), sign = f_set(flags & SHAPE_FLIP_NORMALS ? -1 : 1);
     Vec3 n = v3_scale(si->ng, sign), e1 = table_v3(scene, at + 4), e2 = table_v3(scene, at + 7), e3 = table_v3(scene, at + 10);

@@ -182,7 +182,7 @@ KFN SdfPoint sdfgrid_point(const SceneView *scene, const Hit *hit) {
     return p;
 }
 
-KFN Interaction sdfgrid_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction sdfgrid_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     SdfPoint point = sdfgrid_point(scene, hit);

@@ -55,7 +55,7 @@ KFN Vec3 sdfgrid_across(const SceneView *scene, Int at, Vec3 g) {
     return v3_madd(v3_madd(v3_scale(table_v3(scene, at + 12), g.x), g.y, table_v3(scene, at + 16)), g.z, table_v3(scene, at + 20));
 }
 
-KFN void sdfgrid_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
+static NOINLINE void sdfgrid_slide(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, Slide out[2]) {
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     SdfPoint p = sdfgrid_point(scene, hit);
     Int x = sdfgrid_cell(p.q.x, p.nodes.nx), y = sdfgrid_cell(p.q.y, p.nodes.ny), z = sdfgrid_cell(p.q.z, p.nodes.nz);
@@ -79,8 +79,8 @@ KFN void sdfgrid_slide(const SceneView *scene, int32_t flags, const Hit *hit, co
     }
 }
 
-KFN void sdfgrid_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si, const SurfaceAdj *d,
-                          Sink *sink, Mask m) {
+static NOINLINE void sdfgrid_move_adj(const SceneView *scene, int32_t flags, const Hit *hit, const Interaction *si,
+                                      const SurfaceAdj *d, Sink *sink, Mask m) {
     SurfaceAdj own = *d;
     UNUSED(flags);
     v3_acc(&own.n, frame_slide_adj(si->sh.n, d->dp_du, d->dp_dv));

@@ -52,7 +52,7 @@ static inline bool sphere_follow(const float m[16], float *t, float *area) {
     return true;
 }
 
-KFN Interaction sphere_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
+static NOINLINE Interaction sphere_interaction(const SceneView *scene, int32_t flags, const Hit *hit) {
     Interaction si;
     Int at = SHAPE_FIELD(scene, hit->shape, table);
     Vec3 centre = table_v3(scene, at);
