@@ -64,7 +64,8 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
             find_surface(scene, group, &h, &surface, &dp_dv);
             call.surface = &surface;
         }
-        if (sightline_ends_at_normals(scene, group)) {
+        // Of open tubes, and spheres that clip planes cut, the inside is seen next to the outside.
+        if (group->shape_kind != SHAPE_MESH || sightline_ends_at_normals(scene, group)) {
             s->behind[i] = i_select(mine & m_lt(wi.z, f_set(0)), i_set(1), s->behind[i]);
         }
         BsdfSample b = bsdf_sample(&call, wi, u, at);
