@@ -22,6 +22,16 @@ KFN Int medium_behind(const Group *group, Vec3 ng, Vec3 d, Int medium) {
     return i_select(m_gt(v3_dot(ng, d), f_set(0)), i_set(group->exterior), i_set(group->interior));
 }
 
+// Counts borders of media that rays along d met, and those of them that name another medium than `medium`, which the rays came
+// through, on that side: where surfaces do not agree about what lies between them, or media overlap, the medium at a point depends
+// on the way there. Faces that lie in others are not asked: medium_touching knows them.
+KFN void borders_watch(const Tracer *t, const Group *group, Vec3 ng, Vec3 d, Int medium, Mask m) {
+    if ((group->interior >= 0 || group->exterior >= 0) && !t->scene->borders_touch) {
+        t->job->borders += m_count(m);
+        t->job->astray += m_count(m & ~mi_eq(medium_behind(group, ng, v3_neg(d), medium), medium));
+    }
+}
+
 // The medium behind borders that rays along d pass at a hit, `far` by the hit alone: of two in one place (touch.h), the ray
 // crosses first the one whose near side is the medium that it comes from.
 static NOINLINE Int medium_touching(const Tracer *t, const Hit *hit, Vec3 d, Int medium, Int far, Mask m) {

@@ -82,6 +82,7 @@ typedef struct PathJob {
     size_t workspace_bytes;
     // Results, added to.
     int64_t paths, rays, nonfinite;
+    int64_t borders, astray;      // borders of media that paths met, and those that expected another medium on their side
     int32_t faces;                // FACES_ bits of scene/sink.h
     double trace_seconds;
 } PathJob;

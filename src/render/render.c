@@ -159,7 +159,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     job->workspace = r->workspaces[worker];
     job->go_on = go_on;
     job->user = r;
-    job->paths = job->rays = job->nonfinite = 0;
+    job->paths = job->rays = job->nonfinite = job->borders = job->astray = 0;
     job->trace_seconds = 0;
     job->faces = 0;
     double start = rey_thread_seconds(), clock = rey_seconds();
@@ -175,10 +175,7 @@ bool rey_render_run(Render *r, PathJob *job, UnitOfWork unit, int worker) {
     r->stats.paths += job->paths;
     r->stats.rays += job->rays;
     r->stats.nonfinite += job->nonfinite;
-    r->faces |= job->faces;
-    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH || (r->faces & FACES_INWARD);
-    bool mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
-    r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
+    rey_terms_note(r, job, !unit.particles && !unit.boundary);
     r->stats.trace_seconds += passed > 0 ? job->trace_seconds * seconds / passed : 0; // what the thread worked of it
     r->stats.thread_seconds += seconds;
     r->done += 1;

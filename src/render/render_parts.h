@@ -61,6 +61,7 @@ typedef struct Render {
     Array marks;           // curves along which textures jump (shape/marks.h)
     BoundaryPlan boundary[BOUNDARY_KINDS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
+    int64_t borders, astray; // as in PathJob, of paths from the sensor
     rey_stats stats;
     double done, total;    // progress
     int part, parts;       // this call is number `part` of `parts` equal ones

@@ -355,6 +355,19 @@ static bool hidden_lights_move(const Render *r) {
     return moves;
 }
 
+void rey_terms_note(Render *r, const PathJob *job, bool of_film) {
+    r->faces |= job->faces;
+    r->borders += of_film ? job->borders : 0;
+    r->astray += of_film ? job->astray : 0;
+    bool turned = (r->faces & FACES_BOTH) == FACES_BOTH || (r->faces & FACES_INWARD);
+    bool mirrored = (r->faces & CAMERA_MIRRORED) && !(r->terms & REY_TERM_SPECULAR);
+    r->stats.missing_terms = (turned ? REY_TERM_TERMINATOR : 0) | (mirrored ? REY_TERM_SPECULAR : 0);
+}
+
+// Rays slip through between faces, and past borders that are nearer than their steps: of borders that agree, fewer than one in so
+// many, and these come by chance.
+enum { BORDERS_PER_SLIP = 200, CHANCE_SLIPS = 10 };
+
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection) {
     if (result == REY_OK && (r->faces & LIGHT_HIDDEN) && hidden_lights_move(r)) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
@@ -367,6 +380,14 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "that move beside them, does not exist yet here: points next to a light, from which its light is "
                         "scattered, must move as it does. Known are lights that hang free in a homogeneous medium, in scenes "
                         "without smooth mirrors, glass and normals of their own (docs/media.md)");
+    }
+    if (result == REY_OK && r->astray > CHANCE_SLIPS + r->borders / BORDERS_PER_SLIP &&
+        (selection_moves(r, selection) || r->job.live_borders)) {
+        return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                        "the gradient of what moves does not exist where media overlap or their borders do not agree: of %lld "
+                        "borders that paths met, %lld name another medium on that side than the paths came through. A shape "
+                        "within a medium names it with <ref name=\"exterior\" id=\"...\"/>, a sensor with <ref id=\"...\"/>",
+                        (long long)r->borders, (long long)r->astray);
     }
     int missing = r->stats.missing_terms & REY_TERM_TERMINATOR, bit = missing & -missing;
     if (result != REY_OK || r->def.terms || !missing) {

@@ -6,6 +6,9 @@
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
 rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_selection selection, int *needed);
 
+// Notes what the paths of a job met; of_film: they began at the sensor.
+void rey_terms_note(Render *r, const PathJob *job, bool of_film);
+
 // `result`, unless all went well but paths met what no term covers: then refuses the gradient.
 rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selection);
 

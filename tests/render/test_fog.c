@@ -329,11 +329,39 @@ static void test_refusals(void **state) {
     room_close(room);
 }
 
+// Where media overlap, or the borders around them do not agree, the medium at a point depends on the way there, and what moves
+// jumps in more places than are known. What does not move has its derivative.
+static void test_overlap(void **state) {
+    UNUSED(state);
+    static const char *const params[] = {"second.to_world", "floor.to_world", "camera.to_world", "dense.sigma_t.value.value"};
+    static float image[3 * 8 * 8];
+    for (int i = 0; i < 2 * COUNT_OF(params); i++) {
+        const rey_define define = {"x", i % 2 ? "0.7" : "0.1"};
+        const bool moves = i / 2 < COUNT_OF(params) - 1;
+        const float along[16] = {[3] = 1, [0] = moves ? 0 : 1};
+        Room room;
+        assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
+        ok(room, rey_scene_load(room.ctx, RENDER_DIR "/fog_overlap.xml", &define, 1, &room.scene));
+        int id = rey_param_find(room.scene, params[i / 2]);
+        rey_render_def def = def_make(64, 1, 1);
+        def.terms = 0;
+        rey_result result = rey_jvp(room.scene, &def, (rey_selection){&id, 1}, along, image, NULL, NULL);
+        if (i % 2 && moves) {
+            assert_int_equal(result, REY_ERROR_INCOMPLETE);
+            assert_non_null(strstr(rey_error(room.ctx), "where media overlap or their borders do not agree"));
+        } else {
+            ok(room, result);
+        }
+        room_close(room);
+    }
+}
+
 // Arguments: what the names of tests begin with.
 int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_overlap),
                                        cmocka_unit_test(test_far_plane),
                                        cmocka_unit_test(test_score),         cmocka_unit_test(test_flakes),
                                        cmocka_unit_test(test_growing_flakes), cmocka_unit_test(test_turned_flakes),
