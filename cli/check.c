@@ -184,6 +184,7 @@ static rey_result try_short_steps(Work *w, Check *check, bool central) {
         h /= 8;
         Step step = central ? check_central_step(h) : check_one_sided_step(h, check->step.offsets[1] > 0 ? 1 : -1);
         result = differences(w, check, &step);
+        check->doubtful |= agrees(&check->result);
         stands = agrees(&check->result) &&
                  (check->result.relative_error <= CHECK_WEAK ||
                   check_gap(&w->blocks, w->derivative, w->difference, &first) < 0.25 * gap);
@@ -233,6 +234,7 @@ static rey_result attempt(Work *w, Check *check) {
     memset(w->derivative, 0, CHECK_SETS * w->stride * sizeof *w->derivative);
     rey_result result = derivatives(w, check);
     bool central = check->step.offsets[0] != 0;
+    check->doubtful = false;
     if (!result) {
         result = differences(w, check, &check->step);
     }
@@ -251,19 +253,23 @@ static rey_result attempt(Work *w, Check *check) {
 }
 
 // Sixteen sets that miss rare bright samples are alike, and wrong alike: what would be called wrong is looked at again
-// with other sets and four times the samples. An error stays.
+// with other sets and four times the samples, and with sixteen times where short steps agree in what noise they have. An error
+// stays.
 static rey_result try_again(Work *w, Check *check) {
-    int spp = w->session.def.spp;
-    double reverse_error = check->reverse_error;
-    if ((agrees(&check->result) && fabs(check->fresh_z) <= CHECK_FRESH_Z) || spp > MOST_SPP / 4) {
-        return REY_OK;
+    const int spp = w->session.def.spp;
+    rey_result result = REY_OK;
+    for (int more = 4; more <= 16 && spp <= MOST_SPP / more && !result; more *= 4) {
+        double reverse_error = check->reverse_error;
+        if ((agrees(&check->result) && fabs(check->fresh_z) <= CHECK_FRESH_Z) || (more > 4 && !check->doubtful)) {
+            break;
+        }
+        w->first_set += CHECK_SETS;
+        w->session.def.spp = more * spp;
+        result = attempt(w, check);
+        check->reverse_error = fmax(check->reverse_error, reverse_error);
     }
-    w->first_set = CHECK_SETS;
-    w->session.def.spp = 4 * spp;
-    rey_result result = attempt(w, check);
     w->first_set = 0;
     w->session.def.spp = spp;
-    check->reverse_error = fmax(check->reverse_error, reverse_error);
     return result;
 }
 

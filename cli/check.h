@@ -31,6 +31,7 @@ typedef struct Check { // one direction
     bool replays;         // the difference is taken along the derivative's own paths
     CheckResult result;
     bool kink;            // the difference is that of one side
+    bool doubtful;        // differences of a shorter step agreed, as far as their noise tells
     double fresh_z;       // of that against the plain quotient of fresh paths; 0 where nothing is replayed
     double reverse_gap, reverse_scale; // |reverse - forward| on the first set, and what is summed up
     double reverse_error;              // the one over the other, see check_reverse_error
