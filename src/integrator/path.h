@@ -221,7 +221,7 @@ static int32_t surface_batch(Tracer *t, const Group *group, int32_t group_id, co
         si.uv.y = si.uv.y + real_gather(t->nudge[1], v.slot);
     }
     vertex_spare(t, group_id, &v);
-    if (scene->has_media) {
+    if (scene->has_media && t->derivative) {
         borders_watch(t, group, si.ng, v.d, v.medium, v.m);
     }
     const bool wanted = m_any(v.wanted);

@@ -20,10 +20,11 @@ typedef struct Sightline {
     int32_t last;            // levels that are filled
 } Sightline;
 
-// Whether what a surface sends out jumps where its shading normal is at right angles to a line. Smooth glass mirrors all of the
-// light there, from both sides and into the same direction.
-KFN bool sightline_ends_at_normals(const SceneView *scene, const Group *group) {
-    return scene->bsdfs[group->bsdf].kind != BSDF_DIELECTRIC || group->emitter >= 0;
+// Whether lines that meet a surface from both sides part there. What it sends out jumps where its shading normal is at right angles
+// to a line, unless it is smooth glass: that mirrors all of the light there, from both sides and into the same direction. Of open
+// tubes, and spheres that clip planes cut, the inside is seen next to the outside; on meshes, these are other triangles.
+KFN bool sightline_minds_sides(const SceneView *scene, const Group *group) {
+    return group->shape_kind != SHAPE_MESH || scene->bsdfs[group->bsdf].kind != BSDF_DIELECTRIC || group->emitter >= 0;
 }
 
 // The numbers that decide what the vertices of a bounce make of a ray.
@@ -64,8 +65,7 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
             find_surface(scene, group, &h, &surface, &dp_dv);
             call.surface = &surface;
         }
-        // Of open tubes, and spheres that clip planes cut, the inside is seen next to the outside.
-        if (group->shape_kind != SHAPE_MESH || sightline_ends_at_normals(scene, group)) {
+        if (sightline_minds_sides(scene, group)) {
             s->behind[i] = i_select(mine & m_lt(wi.z, f_set(0)), i_set(1), s->behind[i]);
         }
         BsdfSample b = bsdf_sample(&call, wi, u, at);
