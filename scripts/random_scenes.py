@@ -14,19 +14,14 @@ import re
 import struct
 import subprocess
 import sys
-import zlib
 
 
 # ---- files that the scenes share -----------------------------------------------------------------------------------
 
-def write_png(path, rows):
-    """rows: of (r, g, b), 0 to 255."""
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-    pixels = b"".join(b"\0" + bytes(v for pixel in row for v in pixel) for row in rows)
+def write_ppm(path, pixels):
+    """8 x 8 pixels (r, g, b), 0 to 255."""
     with open(path, "wb") as f:
-        f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0)) +
-                chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b""))
+        f.write(b"P6 8 8 255\n" + bytes(v for pixel in pixels for v in pixel))
 
 
 def write_vol(path, size, values):
@@ -74,9 +69,8 @@ def write_rope(path, rng):
 def write_files(folder):
     rng = random.Random(3)
     os.makedirs(folder, exist_ok=True)
-    write_png(os.path.join(folder, "picture.png"), [[[rng.randrange(40, 230) for _ in range(3)] for _ in range(8)] for _ in range(8)])
-    write_png(os.path.join(folder, "normals.png"), [[[rng.randrange(110, 146), rng.randrange(110, 146), 252] for _ in range(8)]
-                                                    for _ in range(8)])
+    write_ppm(os.path.join(folder, "picture.ppm"), [[rng.randrange(40, 230) for _ in range(3)] for _ in range(64)])
+    write_ppm(os.path.join(folder, "normals.ppm"), [[rng.randrange(110, 146), rng.randrange(110, 146), 252] for _ in range(64)])
     with open(os.path.join(folder, "sky.pfm"), "wb") as f:
         f.write(b"PF\n16 8\n-1\n" + struct.pack("<384f", *(rng.uniform(0.2, 1.5) for _ in range(384))))
     write_vol(os.path.join(folder, "smoke.vol"), 6, [rng.random() * (rng.random() > 0.3) for _ in range(216)])
@@ -90,9 +84,8 @@ def number(name, value):
     return '<float name="%s" value="%.4g"/>' % (name, value)
 
 
-def from_file(kind, name, file, more=""):
-    return '<%s name="%s"><string name="filename" value="%s"/>%s</%s>' % (
-        kind if kind != "texture" else 'texture type="bitmap"', name, file, more, kind)
+def bitmap(name, file, more=""):
+    return '<texture type="bitmap" name="%s"><string name="filename" value="%s"/>%s</texture>' % (name, file, more)
 
 
 RAW = '<boolean name="raw" value="true"/>'
@@ -122,7 +115,7 @@ class Scene:
         if kind < 0.75:
             return '<texture type="checkerboard" name="%s">%s%s<transform name="to_uv"><scale value="%g"/></transform></texture>' % (
                 name, self.rgb("color0"), self.rgb("color1"), self.rng.choice([1, 2, 3.3]))
-        return from_file("texture", name, "picture.png", '<string name="filter_type" value="%s"/>' %
+        return bitmap(name, "picture.ppm", '<string name="filter_type" value="%s"/>' %
                          self.rng.choice(["bilinear", "bilinear", "nearest"]))
 
     def bsdf(self, nested=False):
@@ -141,10 +134,10 @@ class Scene:
             number("metallic", self.rng.random()),
             "blendbsdf": lambda: number("weight", self.rng.random()) + self.bsdf(True) + self.bsdf(True),
             "mask": lambda: (number("opacity", self.rng.uniform(0.3, 0.9)) if self.rng.random() < 0.6
-                             else from_file("texture", "opacity", "picture.png", RAW)) + self.bsdf(True),
+                             else bitmap("opacity", "picture.ppm", RAW)) + self.bsdf(True),
             "twosided": lambda: '<bsdf type="diffuse">%s</bsdf>' % self.texture("reflectance"),
-            "normalmap": lambda: from_file("texture", "normalmap", "normals.png", RAW) + '<bsdf type="diffuse"/>',
-            "bumpmap": lambda: from_file("texture", "bump", "picture.png", RAW) + number("scale", 0.1) + '<bsdf type="diffuse"/>',
+            "normalmap": lambda: bitmap("normalmap", "normals.ppm", RAW) + '<bsdf type="diffuse"/>',
+            "bumpmap": lambda: bitmap("bump", "picture.ppm", RAW) + number("scale", 0.1) + '<bsdf type="diffuse"/>',
         }
         return '<bsdf type="%s">%s</bsdf>' % (kind, inside.get(kind, str)())
 
@@ -191,7 +184,7 @@ class Scene:
         look = '<lookat origin="%.4g, %.4g, %.4g" target="%.3g, %.3g, 0" up="0, 1, 0.1"/>' % (
             *at, self.rng.uniform(-0.3, 0.3), self.rng.uniform(-0.3, 0.3))
         if kind == "area":
-            radiance = self.rgb("radiance", 3, 9) if self.rng.random() < 0.8 else from_file("texture", "radiance", "picture.png")
+            radiance = self.rgb("radiance", 3, 9) if self.rng.random() < 0.8 else bitmap("radiance", "picture.ppm")
             return '<shape type="%s" id="%s"><transform name="to_world"><scale value="%.4g"/>%s</transform><emitter type="area">%s' \
                    '</emitter></shape>' % (self.rng.choice(["rectangle", "disk", "sphere", "cylinder", "cube"]), name,
                                            self.rng.uniform(0.2, 0.6), look, radiance)
@@ -203,7 +196,7 @@ class Scene:
                 self.rng.uniform(-1, 1), self.rng.uniform(-1, 1)) + self.rgb("irradiance", 1, 3),
             "constant": lambda: self.rgb("radiance", 0.3, 1),
             "envmap": lambda: '<string name="filename" value="sky.pfm"/>',
-            "projector": lambda: pose + from_file("texture", "irradiance", "picture.png") + number("scale", 20) +
+            "projector": lambda: pose + bitmap("irradiance", "picture.ppm") + number("scale", 20) +
             number("fov", self.rng.uniform(20, 50)),
         }
         return '<emitter type="%s" id="%s">%s</emitter>' % (kind, name, inside[kind]())
