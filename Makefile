@@ -24,7 +24,7 @@ demo: $(BUILD)/CMakeCache.txt
 	@$(MAKE) --no-print-directory -C $(BUILD) -j$(JOBS) reynolds > /dev/null
 	$(BUILD)/bin/reynolds fit examples/cornell/job.yaml --overwrite
 
-# Boundary terms in whole renders (heavy) take a quarter of an hour by themselves: `make test SKIP=slow` runs them, too, as CI does.
+# Boundary terms in whole renders (heavy) take some twenty minutes by themselves: `make test SKIP=slow` runs them, too, as CI does.
 # Tests know the noise of a quarter of their samples; with all of them (EFFORT=1) they see smaller errors and take two to four
 # times as long.
 SKIP ?= slow|heavy
