@@ -46,7 +46,7 @@ static rey_result check(const Fit *fit) {
         }
         if (!rey_can_replay(fit->scene, p->param)) {
             return refuse(fit, p, "decides where paths go or what they can see, so that they cannot be reused when it changes; "
-                                  "expected numbers of materials, media and lights that move nothing");
+                                  "expected numbers of materials, media and lights that move nothing, nor ends of refraction");
         }
         if (may_vanish(fit->scene, p)) {
             return refuse(fit, p, "may become 0, where no path collides; expected 'parameterisation: log', or bounds above 0");

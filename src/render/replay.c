@@ -5,13 +5,15 @@
 #include "math/rng.h"
 #include "render/particles.h"
 #include "render/render_parts.h"
+#include "render/rims.h"
 #include "render/update.h"
 
 #include <string.h>
 
 bool rey_can_replay(const rey_scene *scene, int param) {
     const Param *p = &ARRAY_AT(scene->params, Param, param);
-    return p->terms == REY_TERM_INTERIOR && (p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0);
+    const bool material = p->terms == REY_TERM_INTERIOR && (p->texture >= 0 || p->to_uv >= 0 || p->attribute >= 0);
+    return material && !rey_rims_moved_by(scene, p);
 }
 
 void rey_replay_make_room(rey_scene *scene, float room) {

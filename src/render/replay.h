@@ -10,7 +10,8 @@ typedef struct ReplayWeights {
     double all, within;       // sums of both, over all vertices and over those whose weight is within the range
 } ReplayWeights;
 
-// Whether pictures at other values of the parameter can be replayed: nothing moves, and no light sample does.
+// Whether pictures at other values of the parameter can be replayed: nothing moves, no light sample does, nor where rough
+// refraction ends (bsdf/rim.h), which recorded paths do not cross.
 bool rey_can_replay(const rey_scene *scene, int param);
 
 // Makes the bounds of a scene's extinctions `room` times as large as they need be (1 or more). Where other scenes that are replayed
