@@ -187,7 +187,7 @@ static NOINLINE void ride_add(const Tracer *t, const RecordBatch *batch, int cha
     first_ride_adj(t, batch, slot, all->ref, &first, sink, m);
     rows_scatter(&ws->drag, channel, slot, v3_add(rows_gather(&ws->drag, channel, slot), all->position), m);
     Int next = i_gather(ws->next, slot);
-    Mask still = mi_eq(next, i_set(NEXT_STILL)), slides = ~still & mi_eq(i_load(ws->records.slides + batch->first), i_set(1));
+    Mask still = mi_eq(next, i_set(NEXT_STILL)), slides = ~still & records_slide(t, batch->first);
     Mask attached = m & ~slides & (still | mi_lt(i_set(-1), next));
     Vec3 turn = v3_select(slides, all->turn, end->turn);
     rows_scatter(&ws->turn, channel, slot, v3_add(rows_gather(&ws->turn, channel, slot), turn), (m & slides) | attached);

@@ -96,8 +96,8 @@ KFN void record_flight(Tracer *t, const Flights *f, int32_t count, int32_t bounc
     f_store(r->dz + at, f->d.z);
     if (t->job->rides) {
         const Paths *p = &t->ws.paths[t->current];
-        Mask slides = m_lt(real_gather(p->pdf, f->at), f_set(0)) | mi_eq(i_gather(p->flies, f->at), i_set(1));
-        i_store(r->slides + at, i_select(slides, i_set(1), i_set(0)));
+        Int begins = i_gather(p->begins, f->at), depth = i_gather(p->depth, f->at);
+        i_store(r->slides + at, record_slides(t, real_gather(p->pdf, f->at), begins, depth));
     }
     f_store(r->ldist + at, f->flight.t);
     f_store(r->sw + at, f->tmax);
@@ -234,7 +234,8 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
 static int32_t collision_scatter(Tracer *t, const Vertex *v, const Collision *c, const SampleKey *key, int32_t bounce, Mask m,
                                  int32_t record, int32_t next_count) {
     const Paths *p = &t->ws.paths[t->current];
-    Onward w = {.m = m, .passed = m_set(false), .collides = true, .depth = v->depth + 1, .eta2 = real_gather(p->eta2, v->at)};
+    Onward w = {.m = m, .passed = m_set(false), .begins = i_set(BEGINS_IN_AIR), .depth = v->depth + 1,
+                .eta2 = real_gather(p->eta2, v->at)};
     w.d = phase_sample(&c->call, c->wi, rng_1d(key, dimension(bounce, PURPOSE_LOBE)),
                        rng_2d(key, dimension(bounce, PURPOSE_DIRECTION)));
     w.sample.lobe = i_set(LOBE_SMOOTH);

@@ -77,7 +77,7 @@ static Mask glossy_moves(const Tracer *t, const RecordBatch *batch, int32_t *mov
     const Records *r = &t->ws.records;
     Mask m = m_first_n(batch->count);
     Int slot = i_select(m, i_load(r->slot + batch->first), i_set(0));
-    Mask slides = mi_eq(i_load(r->slides + batch->first), i_set(1)) & m_set(t->job->any_camera || batch->bounce > 0);
+    Mask slides = records_slide(t, batch->first) & m_set(t->job->any_camera || batch->bounce > 0);
     Mask moves = m_set(t->job->live[batch->group] & LIVE_MOTION) | slides;
     Mask before = batch->bounce > 0 ? mi_eq(i_gather(moved, slot), i_set(1)) : m_set(false);
     i_scatter(moved, slot, i_select(moves, i_set(1), i_set(0)), m);

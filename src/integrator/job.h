@@ -58,6 +58,7 @@ typedef struct PathJob {
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
     bool rides;                   // surfaces move in media, and collisions with them (ride.h)
+    bool veils;                   // shadow rays end at masks and thin glass, behind which light is met by chance (walk.h)
     const Beacon *beacons;        // null: lights at a point within media are not known beside what moves
     int32_t beacon_count;
     int32_t seen_x, seen_y, seen_width, seen_height; // what of the film is sampled, in pixels (beacon_view.h)

@@ -178,7 +178,7 @@ KFN Spec particle_value(const Landing *at, const BsdfSample *s, Float *factor) {
 static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, int32_t record, int32_t next_count) {
     const Paths *p = &t->ws.paths[t->current];
     SampleKey key = slot_key(t, at->v.slot);
-    Onward w = {.collides = false};
+    Onward w = {.begins = i_set(BEGINS_AT_SURFACE)};
     w.sample = bsdf_sample(&at->call, at->wl, rng_1d(&key, dimension(bounce + 1, PURPOSE_LOBE)),
                            rng_2d(&key, dimension(bounce + 1, PURPOSE_DIRECTION)));
     w.eta2 = real_gather(p->eta2, at->v.at) * f_safe_rcp(w.sample.eta * w.sample.eta);
@@ -208,14 +208,16 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
     }
     Paths *next = &t->ws.paths[1 - t->current];
     Vec3 o = interaction_offset(&at->si, w.d);
+    const Mask passed = lobe_is(w.sample.lobe, LOBE_NULL);
+    if (t->scene->through) {
+        i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
+    }
     if (t->scene->has_media) {
-        Mask passed = lobe_is(w.sample.lobe, LOBE_NULL);
         o = v3_select(passed, interaction_behind(&at->si, w.d), o);
         Int medium = medium_behind(at->group, at->si.ng, w.d, at->v.medium), through = medium;
         through = medium_passed(t, at->group, &at->si, &at->v.hit, w.d, at->v.medium, m & passed);
         i_compress(next->medium + next_count, i_select(passed, through, medium), m);
         f_compress(next->skip + next_count, v3_dot(v3_sub(o, at->si.p), w.d), m);
-        i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
     }
     return particle_append(next, next_count, o, w.d, w.beta, w.eta2, w.roulette, at->v.slot, m);
 }

@@ -146,7 +146,8 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
         scatter_key.sample = split.scatter_sample;
         key = &scatter_key;
     }
-    Onward w = {.collides = false};
+    const bool veil = group_is_veil(t, group);
+    Onward w = {.begins = i_set(BEGINS_AT_SURFACE), .same = !veil};
     surface_sample(t, group, v, si, call, wi, key, bounce, &w);
     w.rcp = f_safe_rcp(w.pdf);
     w.m = v->m;
@@ -162,6 +163,7 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     if (scene->through && scene->max_depth >= 0) {
         w.m = w.m & mi_lt(w.depth, i_set(scene->max_depth));
     }
+    w.begins = i_select(w.passed, veil ? i_set(BEGINS_AT_VEIL) : v->begins, w.begins);
     onward_weigh(t, v, &w);
     play_roulette(t, key, bounce, &w);
     w.pdf = picture_pdf(call, wi, w.sample.wo, w.sample.lobe, w.pdf);
@@ -320,6 +322,34 @@ static void rung_store(Tracer *t, int32_t rung) {
     }
 }
 
+// The same where vertices that let paths pass are no segments' ends: what the paths have brought since the last call, with `more`
+// segments than led to their vertices.
+static void rungs_add(Tracer *t, int32_t more) {
+    const Paths *p = &t->ws.paths[t->current];
+    t->rungs_kept = t->rung_count;
+    for (int32_t k = 0; k < t->active; k++) {
+        const int32_t slot = p->slot[k];
+        for (int c = 0; c < SPEC_N; c++) {
+            const real more_light = t->ws.radiance[c][slot] - t->brought[c][slot];
+            t->brought[c][slot] = t->ws.radiance[c][slot];
+            for (int32_t r = p->depth[k] + more; r < t->rung_count && more_light != 0; r++) {
+                t->rungs[r * SPEC_N + c][slot] += more_light;
+            }
+        }
+    }
+}
+
+static void rungs_keep(Tracer *t, int32_t rung) {
+    for (int c = 0; c < SPEC_N && rung == 0; c++) {
+        memcpy(t->sent[c], t->ws.radiance[c], CHUNK * sizeof(real));
+    }
+    if (t->job->veils) {
+        rungs_add(t, 0);
+    } else {
+        rung_store(t, rung);
+    }
+}
+
 // After their first vertices: what the paths have brought, and which of the `count` that go on are chains.
 static void fork_store(Tracer *t, int32_t count) {
     const Paths *next = &t->ws.paths[1 - t->current];
@@ -403,9 +433,12 @@ static void path_forward(Tracer *t, int32_t *begin) {
             }
         }
         if (t->rungs) {
-            rung_store(t, bounce - t->first_bounce);
+            rungs_keep(t, bounce - t->first_bounce);
         }
         shadow_stage(t, bounce);
+        if (t->rungs && t->job->veils) {
+            rungs_add(t, 1);
+        }
         if (t->fork && bounce == t->first_bounce) {
             fork_store(t, next_count);
         }

@@ -223,7 +223,7 @@ static Spec attached_keep(Tracer *t, const RecordBatch *batch, Int slot, Spec su
     const Records *r = &t->ws.records;
     int32_t at = batch->first;
     Spec next = spec_gather(t->ws.attached, slot);
-    Mask chained = chain_lanes(t, i_load(r->lobe + at), mi_eq(i_load(r->slides + at), i_set(1)));
+    Mask chained = chain_lanes(t, i_load(r->lobe + at), records_slide(t, at));
     Spec onward = spec_zero_unless(~chained, spec_mul(spec_load(r->weight, at), suffix));
     spec_scatter(t->ws.attached, slot, spec_add(spec_load(r->local, at), onward), m);
     return next;

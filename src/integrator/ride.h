@@ -74,7 +74,7 @@ static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec ra
         return;
     }
     BorderSurface s = border_surface(t, batch);
-    Mask slides = mi_eq(i_load(t->ws.records.slides + batch->first), i_set(1));
+    Mask slides = records_slide(t, batch->first);
     Spec gain = spec_zero(), extinction = gain, lost;
     Spec attached = spec_zero_unless(~slides, spec_gather(t->ws.attached, s.slot));
     for (Mask left = s.m & mi_lt(i_set(-1), s.medium[0]), mine; m_any(left); left = left & ~mine) {

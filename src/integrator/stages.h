@@ -48,6 +48,7 @@ typedef struct Tracer {
     int32_t first_bounce;    // 0, but for paths that do not begin at the camera
     real **rungs;            // radiance by number of segments: rows of a colour per number; or null
     int32_t rung_count, rungs_kept;
+    real **sent, **brought;  // of those: what came to the first vertices without their scattering any; what was kept last
     Fork *fork;              // or null
     int32_t *lobes;          // per slot, of the last vertex of a particle; or null
     bool placed;             // the paths' first vertices are known
@@ -120,7 +121,7 @@ KFN void path_begin(Tracer *t, int32_t i, Int slot, const Ray *ray, Float weight
     i_store(p->slot + i, slot);
     i_store(p->medium + i, i_set(t->sensor->medium));
     i_store(p->depth + i, i_set(0));
-    i_store(p->flies + i, i_set(0));
+    i_store(p->begins + i, i_set(BEGINS_AT_SURFACE));
     spec_store(t->ws.radiance, i, spec_zero());
     spec_store(t->ws.suffix, i, spec_zero());
     f_store(t->ws.reached + i, f_set(0));

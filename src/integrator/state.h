@@ -13,12 +13,13 @@ enum {
 };
 
 // A path on its way: ray, throughput, roulette state, density of the direction (-1: camera or delta), slot, and depth
-// where that is not the bounce (scene->through). In media, skip: how far before its origin the ray left its surface; flies: whether
-// it begins at a collision, and not at a surface.
+// where that is not the bounce (scene->through). In media, skip: how far before its origin the ray left its surface; begins: what
+// it begins at (BEGINS_).
 #define PATH_FLOATS(F)                                                                                                 \
     F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax) F(eta2) F(roulette) F(pdf) F(px) F(py) F(pz) F(skip)
 #define PATH_SPECS(S) S(beta)
-#define PATH_INTS(I) I(slot) I(medium) I(depth) I(flies)
+#define PATH_INTS(I) I(slot) I(medium) I(depth) I(begins)
+enum { BEGINS_AT_SURFACE, BEGINS_IN_AIR, BEGINS_AT_VEIL };
 
 // A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom.
 #define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)
@@ -28,16 +29,19 @@ enum {
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
 // the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the
 // scattering function),
-// the sampled direction (world) and 1 / (density x survival), and whether the vertex slides: it lies where a ray from the
-// camera or a collision, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local + weight x
-// radiance arriving along the sampled direction. side: see corner.h and glossy.h, glance_: the latter; keep, slope, met and the
-// density of the light sample: see kept.h.
+// the sampled direction (world) and 1 / (density x survival), and whether the vertex slides (SLIDES_): it lies where a ray from
+// the camera or a collision, or one that was mirrored or refracted, meets its surface. Radiance leaving the vertex is local +
+// weight x radiance arriving along the sampled direction. side: see corner.h and glossy.h, glance_: the latter; keep, slope, met
+// and the density of the light sample: see kept.h.
 #define RECORD_FLOATS(F)                                                                                               \
     F(u) F(v) F(px) F(py) F(pz) F(dx) F(dy) F(dz) F(mis) F(ldx) F(ldy) F(ldz) F(lu) F(lv) F(ldist) F(wox) F(woy) F(woz)  \
     F(sw) F(keep) F(slope) F(light_pdf) F(glance_distance)
 #define RECORD_SPECS(S) S(beta) S(light_weight) S(light_f) S(local) S(weight) S(side) S(met)
 #define RECORD_INTS(I) I(shape) I(prim) I(instance) I(slot) I(light) I(lprim) I(lobe) I(slides) I(medium) I(depth)  \
     I(glance_shape) I(glance_prim) I(glance_instance)
+
+// Vertices are attached to the one before, or slide; in media SLIDES_SEEN where the ray is the sensor's own.
+enum { SLIDES_NOT, SLIDES_ALONG, SLIDES_SEEN };
 
 // Of a camera sample: where it lies on the film, its alpha, and whether it has met what a derivative is asked for (vertex.h).
 #define SAMPLE_FLOATS(F) F(film_x) F(film_y) F(coverage) F(reached)

@@ -53,8 +53,11 @@ typedef struct SurfaceSweep {
 // Lanes whose path goes on along a direction that follows from how it came. Where shadow rays pass surfaces, so does
 // the segment between two vertices that scatter.
 KFN Mask chain_lanes(const Tracer *t, Int lobe, Mask slides) {
-    return lobe_turns(lobe) | (lobe_is(lobe, LOBE_NULL) & (slides | m_set(!t->scene->through)));
+    return lobe_turns(lobe) | (lobe_is(lobe, LOBE_NULL) & (slides | m_set(!t->scene->through || t->job->veils)));
 }
+
+// Lanes of a batch that slide.
+KFN Mask records_slide(const Tracer *t, int32_t at) { return mi_lt(i_set(SLIDES_NOT), i_load(t->ws.records.slides + at)); }
 
 KFN Hit surface_hit(const Records *r, int32_t at) {
     return (Hit){i_load(r->shape + at), i_load(r->prim + at), f_load(r->u + at), f_load(r->v + at),
@@ -104,7 +107,7 @@ KFN void surface_load(const Tracer *t, const RecordBatch *batch, Int slot, Spec 
         s->wl = s->light_d;
         s->wo = s->wo_d;
     } else {
-        s->slides = s->m & mi_eq(i_load(r->slides + at), i_set(1));
+        s->slides = s->m & records_slide(t, at);
         s->chained = chain_lanes(t, s->lobe, s->slides);
         s->si = shape_interaction(t->scene, s->group->shape_kind, s->group->shape_flags, &s->hit);
         s->wi = frame_to_local(&s->si.sh, back);

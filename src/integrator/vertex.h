@@ -17,7 +17,7 @@ typedef struct Vertex {
     Float pdf;
     Int depth;       // path segments behind it; the bounce, unless scene->through
     Int medium;      // that the ray came through
-    Mask flies;      // lanes whose ray begins at a collision
+    Int begins;      // what the ray begins at
     Mask wanted;     // lanes of which what they bring is asked for
     bool live;       // and their derivatives are
     bool local;      // see RecordBatch
@@ -60,7 +60,7 @@ KFN Vertex vertex_load(const Tracer *t, const int32_t *order, int32_t count, int
     v.pdf = entries_f(p->pdf, e);
     v.depth = t->scene->through ? entries_i(p->depth, e) : i_set(bounce);
     v.medium = t->scene->has_media ? entries_i(p->medium, e) : i_set(-1);
-    v.flies = t->scene->has_media ? mi_eq(entries_i(p->flies, e), i_set(1)) : m_set(false);
+    v.begins = t->scene->has_media ? entries_i(p->begins, e) : i_set(BEGINS_AT_SURFACE);
     v.wanted = v.m;
     v.live = true;
     v.local = false;
@@ -102,6 +102,13 @@ KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count, i
     return first;
 }
 
+// Whether what a ray meets slides along it, by the density of its direction, what it begins at and its depth.
+KFN Int record_slides(const Tracer *t, Float pdf, Int begins, Int depth) {
+    Int slides = i_select(m_lt(pdf, f_set(0)) | mi_lt(i_set(BEGINS_AT_SURFACE), begins), i_set(SLIDES_ALONG), i_set(SLIDES_NOT));
+    Mask seen = m_set(t->scene->has_media) & mi_eq(depth, i_set(0)) & ~mi_eq(begins, i_set(BEGINS_AT_VEIL));
+    return i_select(seen, i_set(SLIDES_SEEN), slides);
+}
+
 KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec emission) {
     Records *r = &t->ws.records;
     i_store(r->slot + at, v->slot);
@@ -127,7 +134,7 @@ KFN void record_vertex(Tracer *t, int32_t at, const Vertex *v, Float mis, Spec e
     i_store(r->instance + at, v->hit.instance);
     i_store(r->medium + at, v->medium);
     i_store(r->depth + at, v->depth);
-    i_store(r->slides + at, i_select(m_lt(v->pdf, f_set(0)) | v->flies, i_set(1), i_set(0)));
+    i_store(r->slides + at, record_slides(t, v->pdf, v->begins, v->depth));
     f_store(r->px + at, v->hit.p.x);
     f_store(r->py + at, v->hit.p.y);
     f_store(r->pz + at, v->hit.p.z);
@@ -206,7 +213,8 @@ typedef struct Onward {
     Float pdf, rcp, eta2, roulette;          // density; 1 / (density x survival)
     Int depth;
     Mask m, passed;                          // lanes that go on; that went through a surface undeviated
-    bool collides;                           // from collisions
+    Int begins;                              // where the paths go on
+    bool same;                               // rays that passed are still those that came
 } Onward;
 
 // Throughput and roulette of sampled directions, by value, density and 1 / density.
@@ -254,8 +262,9 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
         density = f_select(absent, f_set(PDF_VIEWED), density);
     }
     if (t->scene->through) {
-        origin = v3_select(w->passed, v->origin, p);
-        density = f_select(w->passed, v->pdf, density);
+        Mask same = w->passed & m_set(w->same);
+        origin = v3_select(same, v->origin, p);
+        density = f_select(same, v->pdf, density);
         i_compress(next->depth + at, w->depth, w->m);
     }
     v3_compress(next->ox + at, next->oy + at, next->oz + at, o, w->m);
@@ -269,8 +278,7 @@ KFN void append_paths(Tracer *t, const Vertex *v, Vec3 p, Vec3 o, const Onward *
     i_compress(next->slot + at, v->slot, w->m);
     if (t->scene->has_media) {
         i_compress(next->medium + at, medium, w->m);
-        Mask flies = w->collides ? m_set(true) : w->passed & v->flies;
-        i_compress(next->flies + at, i_select(flies, i_set(1), i_set(0)), w->m);
+        i_compress(next->begins + at, w->begins, w->m);
         f_compress(next->skip + at, v3_dot(v3_sub(o, p), w->d), w->m);
     }
 }

@@ -19,6 +19,12 @@ typedef struct Walk {
     Spec clear;                        // what the media let through
 } Walk;
 
+// Whether a surface lets light pass that shadow rays do not bring (PathJob.veils): paths that go on through it count as chains do.
+KFN bool group_is_veil(const Tracer *t, const Group *group) {
+    const BsdfNode *bsdf = t->scene->bsdfs + group->bsdf;
+    return t->job->veils && bsdf->transmits && !(t->scene->has_media && bsdf->kind == BSDF_NULL);
+}
+
 // The hit, with a shape of this group also in the lanes that hit another one.
 KFN Hit walk_hit(const Hit *hit, Mask mine) {
     int lane = m_first(mine);
@@ -127,7 +133,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         Mask mine = left & mi_eq(groups, i_set(id));
         const Group *group = scene->groups + id;
         left = left & ~mine;
-        if (!scene->bsdfs[group->bsdf].transmits) {
+        if (!scene->bsdfs[group->bsdf].transmits || group_is_veil(t, group)) {
             continue;
         }
         Hit safe = walk_hit(hit, mine);

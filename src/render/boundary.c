@@ -55,7 +55,8 @@ int rey_boundary_term(int32_t kind) {
 }
 
 bool rey_boundary_chained(const SceneView *view) {
-    return rey_bsdfs_used(view, view->has_media ? rey_bsdf_mirrors : rey_bsdf_bends);
+    return view->has_media ? rey_bsdfs_used(view, rey_bsdf_mirrors) || rey_boundary_veiled(view)
+                           : rey_bsdfs_used(view, rey_bsdf_bends);
 }
 
 bool rey_boundary_veiled(const SceneView *view) {
@@ -68,12 +69,23 @@ bool rey_boundary_veiled(const SceneView *view) {
     return false;
 }
 
+const char *rey_veils_gap(const SceneView *view) {
+    bool sharp = false; // such lights are never met by chance
+    for (int64_t i = 0; i < view->emitters_count; i++) {
+        int32_t kind = view->emitters[i].kind;
+        sharp |= rey_emitter_kinds[kind].form == EMITTER_IS_DELTA || kind == EMITTER_DIRECTIONALAREA;
+    }
+    return sharp && view->through && rey_boundary_veiled(view)
+               ? "the shadow rays of 'volpath', which pass masks and thin glass to lights at a point or with one direction"
+               : NULL;
+}
+
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const bool passed = view->through && rey_boundary_veiled(view);
+    const char *passed = rey_veils_gap(view);
     const char *what = !rey_boundary_sees(sensor)    ? "this sensor"
-                       : passed                      ? "the integrator 'volpath', whose shadow rays pass masks and thin glass"
+                       : passed                      ? passed
                        : step                        ? step
                        : !rey_boundary_chained(view) ? "functions that let light pass"
                                                      : NULL;
@@ -321,7 +333,8 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
         edge_count = lit && (deep || kind == BOUNDARY_RIM_VIEW) && !r->scene->view.has_media;
         edge_count = chained && !(moves && rey_boundary_chained(&r->scene->view)) ? 0 : edge_count;
     }
-    if (kind != BOUNDARY_PRIMARY && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
+    const bool passes = kind == BOUNDARY_MIRRORED && r->job.veils; // what the sensor meets may be behind them
+    if (kind != BOUNDARY_PRIMARY && !passes && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface
         edge_count = 0;
     }
     plan->samples = sample_count(r, kind);

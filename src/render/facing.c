@@ -32,8 +32,8 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
     if (view->drops) {
         return "where 'path' with hide_emitters drops rays that only pass";
     }
-    if (view->through && rey_boundary_veiled(view)) {
-        return "beside masks and thin glass with 'volpath', whose shadow rays pass them";
+    if (rey_veils_gap(view)) {
+        return "beside masks and thin glass that the shadow rays of 'volpath' pass to lights at a point or with one direction";
     }
     if (rey_boundary_chained(view) && !rey_chains_known(view, sensor)) {
         return "beside these smooth mirrors and glass";

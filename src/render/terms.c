@@ -117,10 +117,10 @@ const char *rey_rides_gap(const SceneView *view) {
         if (passes && shape->emitter >= 0) {
             return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
         }
-        if (!passes && rey_bsdf_holds(view, shape->bsdf, rey_bsdf_opens)) {
-            return "in scenes with participating media, what moves changes the ways through masks and thin glass. Known are "
-                   "volumes, lights, and what moves among surfaces of other kinds";
-        }
+    }
+    if (rey_veils_gap(view)) {
+        return "in scenes with participating media, what moves changes the ways through masks and thin glass, past which shadow "
+               "rays lead to lights at a point or with one direction. It is known where all lights are surfaces or environments";
     }
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";

@@ -4,6 +4,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "emitter/table.h"
+#include "render/boundary.h"
 #include "shape/shape.h"
 
 #include <math.h>
@@ -20,7 +21,7 @@ static bool texture_jumps(const SceneView *view, int32_t id) {
 
 const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture) {
     // Vertices move over their surfaces where the sensor sees them, and along chains; others are attached to them.
-    const bool film = term != REY_TERM_INDIRECT;
+    const bool film = term != REY_TERM_INDIRECT, passed = rey_veils_gap(view) != NULL;
     for (int32_t i = 0; i < (int32_t)view->textures_count && film; i++) {
         if (view->textures[i].kind == TEXTURE_VOLUME && jumps_itself(view->textures + i)) {
             *texture = i;
@@ -28,7 +29,7 @@ const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *t
         }
     }
     for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        for (int k = 0; k < MAX_SLOTS && view->through && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
+        for (int k = 0; k < MAX_SLOTS && passed && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
             *texture = view->bsdfs[i].slot[k];
             if (texture_jumps(view, *texture)) {
                 return "the jumps of opacities that shadow rays pass";

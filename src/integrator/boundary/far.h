@@ -79,6 +79,12 @@ static void far_paths(Indirect *in, int32_t *begin) {
     for (int32_t i = 0; i < MOST_RUNGS * SPEC_N; i++) {
         memset(q->rungs[i], 0, (size_t)(t->placed || boundary_is_paired(kind) ? 2 * far_half(q) : q->count) * sizeof(real));
     }
+    t->sent = q->sent;
+    t->brought = q->brought;
+    for (int c = 0; c < SPEC_N; c++) {
+        memset(q->sent[c], 0, CHUNK * sizeof(real));
+        memset(q->brought[c], 0, CHUNK * sizeof(real));
+    }
     t->job->paths += t->active;
     if (in->upstream) {
         t->fork = &q->fork;
@@ -96,81 +102,94 @@ static void far_paths(Indirect *in, int32_t *begin) {
     t->rungs = NULL;
 }
 
-// The number of segments that paths may have that are continued by particles that reach the sensor after `bounce` further
+// The number of segments that paths may have that are continued by particles that reach the sensor after `depth` further
 // vertices, less 1; -1: all that there are.
-KFN int32_t far_rung(const Indirect *in, int32_t bounce) {
-    int32_t depth = in->t->scene->max_depth, rung = depth - 2 - bounce;
-    return depth > 0 && depth <= MOST_RUNGS && rung < in->t->rungs_kept ? rung : -1; // paths that have ended bring no more
+KFN Int far_rung(const Indirect *in, Int depth) {
+    const int32_t most = in->t->scene->max_depth;
+    Int rung = i_set(most - 2) - depth;
+    Mask kept = m_set(most > 0 && most <= MOST_RUNGS) & mi_lt(rung, i_set(in->t->rungs_kept)); // ended paths bring no more
+    return i_select(kept & mi_lt(i_set(-1), rung), rung, i_set(-1));
 }
 
 // What the paths in the slots brought.
-KFN Spec far_reflected(const Indirect *in, Int slot, int32_t bounce) {
-    int32_t rung = far_rung(in, bounce);
-    return rung < 0 ? spec_gather(in->t->ws.radiance, slot) : spec_gather(in->q.rungs + rung * SPEC_N, slot);
+KFN Spec far_reflected(const Indirect *in, Int slot, Int depth) {
+    Int rung = far_rung(in, depth);
+    Spec l = spec_gather(in->t->ws.radiance, slot);
+    for (Mask left = mi_lt(i_set(-1), rung), mine; m_any(left); left = left & ~mine) {
+        int32_t one = i_lane(rung, m_first(left));
+        mine = left & mi_eq(rung, i_set(one));
+        l = spec_select(mine, spec_gather(in->q.rungs + one * SPEC_N, slot), l);
+    }
+    return l;
 }
 
 // What they brought along chains that begin at their first vertices; in media, what is scattered or sent out before the
 // first surface.
-KFN Spec far_chain(const Indirect *in, Int slot, int32_t bounce) {
+KFN Spec far_chain(const Indirect *in, Int slot, Int depth) {
     const Fork *fork = &in->q.fork;
     Int way = i_gather(fork->way, slot);
-    Mask more = m_set(far_rung(in, bounce) != 0), chained = more & mi_eq(way, i_set(FORK_CHAIN));
-    Spec all = far_reflected(in, slot, bounce);
-    Spec chain = spec_zero_unless(chained, spec_sub(all, spec_gather(fork->first, slot)));
-    return spec_select(more & mi_eq(way, i_set(FORK_AIR)), all, spec_add(spec_gather(fork->air, slot), chain));
+    Mask single = mi_eq(far_rung(in, depth), i_set(0)); // of which only what lets them pass makes chains
+    Spec all = far_reflected(in, slot, depth);
+    Spec first = spec_select(single, spec_gather(in->q.sent, slot), spec_gather(fork->first, slot));
+    Spec chain = spec_zero_unless(mi_eq(way, i_set(FORK_CHAIN)), spec_sub(all, first));
+    return spec_select(mi_eq(way, i_set(FORK_AIR)), all, spec_add(spec_gather(fork->air, slot), chain));
 }
 
 // What the surfaces that they meet first emit: what they brought with one segment, less what media sent out.
 KFN Spec far_emitted(const Indirect *in, Int slot) {
-    Spec first = spec_gather(in->q.rungs, slot);
+    Spec first = spec_gather(in->q.sent, slot);
     return in->upstream && in->t->scene->has_media ? spec_sub(first, spec_gather(in->q.fork.air, slot)) : first;
+}
+
+// Lanes in which paths may have so many segments.
+KFN Mask far_reaches(const Indirect *in, Int segments) {
+    const int32_t most = in->t->scene->max_depth;
+    return m_set(most < 0) | mi_lt(segments, i_set(most + 1));
 }
 
 // What jumps at an edge along a chain: everything, if the near point is part of it. What far points on the lit side emit is
 // for segments that end on lights.
-KFN Spec far_jump(const Indirect *in, Int slot, int32_t bounce) {
+KFN Spec far_jump(const Indirect *in, Int slot, Int depth) {
     const Segments *q = &in->q;
     Int other = slot + far_half(q);
     Int kind = i_gather(q->lit, slot);
     Mask lit = mi_eq(kind, i_set(1)), full = mi_eq(i_gather(q->full, slot), i_set(1));
     Spec l = spec_gather(q->light, slot), emitted = spec_zero_unless(mi_eq(kind, i_set(0)), far_emitted(in, slot));
-    Spec all = spec_sub(far_reflected(in, slot, bounce), emitted), chain = far_chain(in, slot, bounce);
+    Spec all = spec_sub(far_reflected(in, slot, depth), emitted), chain = far_chain(in, slot, depth);
     if (!boundary_is_horizon(in->b->kind)) { // whose samples are of one side
-        all = spec_sub(all, far_reflected(in, other, bounce));
-        chain = spec_sub(chain, far_chain(in, other, bounce));
+        all = spec_sub(all, far_reflected(in, other, depth));
+        chain = spec_sub(chain, far_chain(in, other, depth));
     }
     Spec jump = spec_mul(l, spec_select(full, all, chain));
     // Collisions beside lights are a segment more.
-    const int32_t depth = in->t->scene->max_depth;
     Mask beside = mi_eq(kind, i_set(SEGMENT_BESIDE));
-    jump = spec_select(beside, spec_zero_unless(m_set(depth < 0 || depth > bounce + 2), l), jump);
+    jump = spec_select(beside, spec_zero_unless(far_reaches(in, depth + 3), l), jump);
     return spec_select(lit, spec_zero_unless(full, l), jump);
 }
 
-// Radiance along the segments of such particles. Silhouettes leave out what the far points emit: that is for segments that end
-// on lights.
-KFN Spec far_radiance(const Indirect *in, Int slot, int32_t bounce) {
+// Radiance along the segments of particles that reach the sensor after `depth` further vertices. Silhouettes leave out what the far
+// points emit: that is for segments that end on lights.
+KFN Spec far_radiance(const Indirect *in, Int slot, Int depth) {
     const Segments *q = &in->q;
-    Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, bounce);
+    Spec l = spec_gather(q->light, slot), reflected = far_reflected(in, slot, depth);
     Int other = slot + far_half(q);
     if (boundary_is_rim(in->b->kind)) { // which has a segment more
-        bool ends = in->t->scene->max_depth >= 0 && bounce + 3 > in->t->scene->max_depth;
         Mask full = mi_eq(i_gather(q->full, slot), i_set(1)) | m_set(in->b->kind == BOUNDARY_RIM);
-        return spec_zero_unless(full & m_set(!ends), l);
+        return spec_zero_unless(full & far_reaches(in, depth + 3), l);
     }
     if (boundary_is_chained(in->b->kind)) {
-        return far_jump(in, slot, bounce);
+        return far_jump(in, slot, depth);
     }
     if (in->upstream) { // what comes along chains is for those
-        reflected = spec_sub(reflected, far_chain(in, slot, bounce));
+        reflected = spec_sub(reflected, far_chain(in, slot, depth));
     }
     switch (in->b->kind) {
     case BOUNDARY_TERMINATOR:
     case BOUNDARY_FACING:
-        reflected = in->upstream ? spec_add(reflected, far_chain(in, other, bounce)) : reflected;
-        return spec_sub(reflected, far_reflected(in, other, bounce));
+        reflected = in->upstream ? spec_add(reflected, far_chain(in, other, depth)) : reflected;
+        return spec_sub(reflected, far_reflected(in, other, depth));
     case BOUNDARY_LINES:
-        return spec_sub(reflected, far_reflected(in, other, bounce));
+        return spec_sub(reflected, far_reflected(in, other, depth));
     case BOUNDARY_HORIZON:
     case BOUNDARY_CUT:
     case BOUNDARY_MEETING:

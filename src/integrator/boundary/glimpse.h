@@ -143,7 +143,7 @@ static Float glimpse_again(const Indirect *in, const SampleKey *key, Vec2 lens, 
 // A vertex of a particle that lines of sight are to lead to: on a surface, or a collision.
 typedef struct Glimpsed {
     const Hit *hit;
-    Int slot;
+    Int slot, depth;
     Vec3 p;
     bool air;
 } Glimpsed;
@@ -208,14 +208,12 @@ static void glimpse_book(Indirect *in, const Glimpse *g, const Glimpsed *at, Spe
 }
 
 // What reaches vertices along segments, where lines of sight with so many further vertices lead to them.
-static Spec glimpse_radiance(const Indirect *in, Int slot, const Glimpse *g, int32_t bounce) {
+static Spec glimpse_radiance(const Indirect *in, const Glimpsed *at, const Glimpse *g) {
     Spec l = spec_zero();
-    int32_t depth = in->t->scene->max_depth;
     for (int32_t i = 1; i < g->line.last; i++) {
-        Mask mine = g->m & mi_eq(g->turns, i_set(i));
-        if (m_any(mine) && (depth < 0 || bounce + i + 2 <= depth)) {
-            l = spec_select(mine, far_radiance(in, slot, bounce + i), l);
-        }
+        Int depth = at->depth + g->line.depth[i];
+        Mask mine = g->m & mi_eq(g->turns, i_set(i)) & far_reaches(in, depth + 2);
+        l = m_any(mine) ? spec_select(mine, far_radiance(in, at->slot, depth), l) : l;
     }
     return l;
 }
@@ -257,7 +255,7 @@ static void glimpse_bring(Indirect *in, const SampleKey *key, Glimpse *g, const 
                           Vec2 lens, Sink *still, int32_t bounce) {
     Tracer *t = in->t;
     Spec l = spec_scale(spec_mul(f, glimpse_through(g)), g->density);
-    l = spec_mul(l, glimpse_radiance(in, at->slot, g, bounce));
+    l = spec_mul(l, glimpse_radiance(in, at, g));
     g->m = g->m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (!m_any(g->m)) {
         return;
@@ -289,7 +287,7 @@ static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens,
     }
     SampleKey key = glimpse_key(t, at->v.slot, bounce);
     Sink still = sink_of(in->b->still);
-    const Glimpsed seen = {&at->v.hit, at->v.slot, at->si.p, false};
+    const Glimpsed seen = {&at->v.hit, at->v.slot, at->v.depth, at->si.p, false};
     Glimpse g;
     Vec3 d;
     Float length = glimpse_find(in, &key, &seen, lens, &still, at->v.m & m_gt(at->cosine, f_set(0)), &g, &d);
@@ -308,7 +306,7 @@ static NOINLINE void glimpse_connect(Indirect *in, const Landing *at, Vec2 lens,
 static NOINLINE void glimpse_connect_air(Indirect *in, const Vertex *v, const Collision *c, Vec2 lens, int32_t bounce) {
     SampleKey key = glimpse_key(in->t, v->slot, bounce);
     Sink still = sink_of(in->b->still);
-    const Glimpsed seen = {&v->hit, v->slot, v->hit.p, true};
+    const Glimpsed seen = {&v->hit, v->slot, v->depth, v->hit.p, true};
     Glimpse g;
     Vec3 d;
     Float length = glimpse_find(in, &key, &seen, lens, &still, v->m, &g, &d);

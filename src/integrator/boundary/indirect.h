@@ -5,7 +5,6 @@
 // surface, because the film position is fixed.
 // Edges along chains of smooth mirrors and glass (chained.h), and as collisions see them (riding.h), take the same way.
 // What the camera sees of this in mirrors and through glass: glimpse.h.
-// NOT differentiated: edges of surfaces that shadow rays pass (volpath).
 #pragma once
 
 #include "integrator/boundary/segments_move.h"
@@ -40,7 +39,7 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
     }
 }
 
-// Lanes of vertices in scenes with media from which paths to the sensor are not too deep.
+// Lanes of vertices in scenes where some of them are no ends of segments, from which paths to the sensor are not too deep.
 KFN Mask near_reaches(const Tracer *t, const Vertex *v) {
     int32_t depth = t->scene->max_depth;
     return depth < 0 ? v->m : v->m & mi_lt(v->depth + 1, i_set(depth));
@@ -60,7 +59,7 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     Vec3 d = v3_select(m, sight.d, v3_neg(at->v.d));
     Spec f = bsdf_eval(&at->call, frame_to_local(&at->si.sh, d), at->wl, i_set(LOBE_SMOOTH));
     Float weight = f_abs(v3_dot(at->si.ng, d)) * f_safe_rcp(at->cosine) * sight.density;
-    Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, bounce));
+    Spec l = spec_mul(spec_scale(spec_mul(at->v.beta, f), weight), far_radiance(in, at->v.slot, at->v.depth));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (t->scene->has_media) {
         Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - SHADOW_SHORT)};
@@ -95,7 +94,7 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Vec3 d = v3_select(m, sight.d, v3_neg(v.d));
     c.backwards = true;
     Spec f = spec_scale(c.albedo, collision_phase(&c, d) * sight.density);
-    Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, bounce));
+    Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, v.depth));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {v.hit.p, d, sight.length * (1.0f - SHADOW_SHORT)};
     m = near_clear(in->t, &ray, v.medium, v.slot, bounce, true, m, &l);
@@ -122,7 +121,7 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
             at.wl.z = f_copysign(f_set(1e-6f), real_gather(in->q.along, at.v.slot));
         }
     }
-    if (scene->has_media) {
+    if (scene->through) {
         at.v.m = near_reaches(in->t, &at.v);
     }
     if (!scene->hide_emitters || group->emitter < 0) {
@@ -131,7 +130,7 @@ static int32_t near_batch(Indirect *in, const Group *group, const int32_t *order
     if (in->glimpses && m_any(at.v.m)) {
         glimpse_connect(in, &at, near_lens(in, at.v.slot), bounce);
     }
-    if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth && !scene->has_media) {
+    if (scene->max_depth >= 0 && bounce + 3 > scene->max_depth && !scene->through) {
         return next_count;
     }
     next_count = particle_scatter(in->t, &at, bounce, -1, next_count);

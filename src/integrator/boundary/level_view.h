@@ -106,10 +106,12 @@ static NOINLINE void level_look(Tracer *t, const BoundaryJob *b, Int slot, Float
     v->x.hit = end.hit[0];
     v->x.d = end.d[0];
     v->through = v->line.through[0];
+    Int before = i_set(0);
     for (int32_t i = 1; i < v->line.last; i++) {
         v->through = spec_select(mi_eq(v->level, i_set(i)), v->line.through[i], v->through);
+        before = i_select(mi_eq(v->level, i_set(i)), v->line.depth[i], before);
     }
-    m = m & mi_lt(i_set(-1), v->x.hit.shape) & (m_set(depth < 0) | mi_lt(v->level + 1, i_set(depth)));
+    m = m & mi_lt(i_set(-1), v->x.hit.shape) & (m_set(depth < 0) | mi_lt(before + 1, i_set(depth)));
     m = turned ? m : level_light(t, m, v);
     Float u = rng_1d(&own, DIMENSION_TURNING_SIDE);
     for (Mask left = m; m_any(left);) {

@@ -57,6 +57,7 @@ typedef struct Segments {
     SEGMENT_FLOATS(DECLARE_FLOAT) SEGMENT_INTS(DECLARE_INT) SEGMENT_SPECS(DECLARE_SPEC)
     WAY_FLOATS(DECLARE_FLOAT) WAY_INTS(DECLARE_INT)
     real *rungs[MOST_RUNGS * SPEC_N];
+    SpecRows sent, brought;
     Upstream up[MOST_UPSTREAM];
     Fork fork;
     int32_t levels; // of `up` that are in use
@@ -74,6 +75,8 @@ static inline size_t segments_layout(Segments *q, char *block) {
     for (int i = 0; i < MOST_RUNGS * SPEC_N; i++) {
         CARVE(q->rungs[i], n)
     }
+    CARVE_SPEC(q->sent, n)
+    CARVE_SPEC(q->brought, n)
 #define CARVE_UPSTREAM(name) CARVE(q->up[i].name, n)
     for (int i = 0; i < MOST_UPSTREAM; i++) {
         UPSTREAM_FLOATS(CARVE_UPSTREAM)
@@ -110,7 +113,7 @@ typedef struct SegmentTurn {
 
 static SegmentTurn segment_turn(const Tracer *t, int32_t kind, int64_t number) {
     const SceneView *scene = t->scene;
-    const int32_t shown = kind == BOUNDARY_RIDING ? 1 : 2; // collisions see what a light's own edge shows, too
+    const int32_t shown = (kind == BOUNDARY_RIDING ? 1 : 2) - t->job->veils; // collisions see what a light's own edge shows, too
     SegmentTurn r = {.direct = scene->emitters_count > 0, .indirect = scene->max_depth < 0 || scene->max_depth > shown};
     r.indirect = r.indirect && (!scene->has_media || t->job->rides); // else only lights move there
     const int32_t riding = t->job->beacons ? 3 : 2, ways = kind == BOUNDARY_RIDING && r.indirect ? riding : r.indirect;

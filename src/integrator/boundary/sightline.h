@@ -15,6 +15,7 @@ typedef struct Sightline {
     Vec3 o[MOST_SIGHT + 1];  // and where it begins behind the vertex before
     Vec2 uv[MOST_SIGHT + 1]; // of the surfaces
     Int lobe[MOST_SIGHT + 1], behind[MOST_SIGHT + 1]; // LOBE_SMOOTH at its end; whether a surface is met from behind
+    Int depth[MOST_SIGHT + 1]; // segments that count before them
     Int turns;               // how many of them mirror, refract or let pass
     Spec through[MOST_SIGHT + 1]; // what the vertices before let through, over the probability of their lobes
     int32_t last;            // levels that are filled
@@ -47,9 +48,10 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
     Float u;
     Vec2 at;
     sightline_numbers(key, bounce, m, &u, &at);
-    bool ends = scene->max_depth >= 0 && i + 1 >= scene->max_depth;
+    Mask ends = m_set(scene->max_depth >= 0) & ~mi_lt(s->depth[i] + 1, i_set(scene->max_depth));
     Mask turned = m_set(false);
     s->through[i + 1] = spec_zero();
+    s->depth[i + 1] = s->depth[i];
     for (Mask left = m; m_any(left);) {
         int32_t id;
         Hit h;
@@ -71,12 +73,18 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         BsdfSample b = bsdf_sample(&call, wi, u, at);
         Float pdf;
         Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
-        Mask turns = mine & lobe_follows(b.lobe) & m_set(!ends);
+        Mask passes = m_set(scene->through) & lobe_is(b.lobe, LOBE_NULL);
+        Mask turns = mine & lobe_follows(b.lobe) & (passes | ~ends);
         turns = turns & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0));
         Vec3 wo = frame_to_world(&si.sh, b.wo);
         s->lobe[i] = i_select(turns, b.lobe, s->lobe[i]);
+        s->depth[i + 1] = i_select(turns & ~passes, s->depth[i] + 1, s->depth[i + 1]);
         s->through[i + 1] = spec_select(turns, spec_scale(spec_mul(s->through[i], f), f_safe_rcp(pdf)), s->through[i + 1]);
-        ray->o = v3_select(turns, interaction_offset(&si, wo), ray->o);
+        Vec3 o = interaction_offset(&si, wo);
+        if (scene->has_media) { // in which paths that pass stay on their line
+            o = v3_select(lobe_is(b.lobe, LOBE_NULL), interaction_behind(&si, wo), o);
+        }
+        ray->o = v3_select(turns, o, ray->o);
         ray->d = v3_select(turns, wo, ray->d);
         turned = turned | turns;
     }
@@ -97,6 +105,7 @@ static NOINLINE void sightline_trace(Tracer *t, const SampleKey *key, Vec2 lens,
     Int bounce = i_set(0);
     s->turns = i_set(0);
     s->through[0] = spec_set(start.weight);
+    s->depth[0] = i_set(0);
     s->last = 0;
     for (int32_t i = 0; i <= MOST_SIGHT && m_any(m); i++) {
         Hit hit = trace_solid(t, &ray, i == 0, m, &bounce);
@@ -125,6 +134,7 @@ static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
             to->behind[i] = from->behind[i];
             to->uv[i] = from->uv[i];
             to->through[i] = from->through[i];
+            to->depth[i] = from->depth[i];
             continue;
         }
         to->hit[i] = hit_select(m, from->hit + i, to->hit + i);
@@ -134,6 +144,7 @@ static void sightline_take(Sightline *to, const Sightline *from, Mask m) {
         to->behind[i] = i_select(m, from->behind[i], to->behind[i]);
         to->uv[i] = (Vec2){f_select(m, from->uv[i].x, to->uv[i].x), f_select(m, from->uv[i].y, to->uv[i].y)};
         to->through[i] = spec_select(m, from->through[i], to->through[i]);
+        to->depth[i] = i_select(m, from->depth[i], to->depth[i]);
     }
     to->turns = i_select(m, from->turns, to->turns);
     to->last = from->last > to->last ? from->last : to->last;
