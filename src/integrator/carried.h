@@ -27,7 +27,7 @@ KFN void next_point(const Tracer *t, Int slot, Vec3 p, Mask m) {
 
 // The lanes of a batch's records that lie on the sensor's ray, or at its end, where surfaces move in media.
 KFN Mask records_first(const Tracer *t, const RecordBatch *batch, Mask m) {
-    return m & mi_eq(i_load(t->ws.records.slides + batch->first), i_set(SLIDES_SEEN));
+    return m & records_seen(t, batch->first);
 }
 
 // What they ask of the sensor: the adjoint c of the ray's position at p, and of its direction.

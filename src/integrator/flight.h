@@ -272,7 +272,7 @@ static int32_t collision_batch(Tracer *t, int32_t medium, const int32_t *order, 
     if (keeps_coverage(t)) {
         cover(t, v.slot, v.m);
     }
-    Mask m = scene->max_depth < 0 ? v.m : v.m & mi_lt(v.depth + 1, i_set(scene->max_depth));
+    Mask m = v.m & depth_allows(scene, v.depth + 2);
     if (!m_any(m)) {
         return next_count;
     }

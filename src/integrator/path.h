@@ -88,8 +88,8 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
         pdf = pdf * f_safe_rcp(split.light_weight);
         drawn = drawn & split.light;
     }
-    if (scene->through && scene->max_depth >= 0) {
-        drawn = drawn & mi_lt(v->depth + 1, i_set(scene->max_depth));
+    if (scene->through) {
+        drawn = drawn & depth_allows(scene, v->depth + 2);
     }
     Float mis = f_select(light_is_delta(scene, light), f_set(1), power_heuristic(own_pdf, other_pdf));
     Float weight = mis * f_safe_rcp(pdf);
@@ -160,8 +160,8 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     w.eta2 = real_gather(p->eta2, v->at) * w.sample.eta * w.sample.eta;
     w.passed = m_set(scene->through) & lobe_is(w.sample.lobe, LOBE_NULL);
     w.depth = v->depth + i_select(w.passed, i_set(0), i_set(1));
-    if (scene->through && scene->max_depth >= 0) {
-        w.m = w.m & mi_lt(w.depth, i_set(scene->max_depth));
+    if (scene->through) {
+        w.m = w.m & depth_allows(scene, w.depth + 1);
     }
     w.begins = i_select(w.passed, veil ? i_set(BEGINS_AT_VEIL) : v->begins, w.begins);
     onward_weigh(t, v, &w);
@@ -314,15 +314,7 @@ static void shadow_stage(Tracer *t, int32_t bounce) {
     t->job->trace_seconds += stage_seconds() - start;
 }
 
-// Keeps what paths of up to rung + 1 segments have brought.
-static void rung_store(Tracer *t, int32_t rung) {
-    for (int c = 0; c < SPEC_N && rung < t->rung_count; c++) {
-        memcpy(t->rungs[rung * SPEC_N + c], t->ws.radiance[c], CHUNK * sizeof(real));
-        t->rungs_kept = rung + 1;
-    }
-}
-
-// The same where vertices that let paths pass are no segments' ends: what the paths have brought since the last call, with `more`
+// Where vertices that let paths pass are no segments' ends: keeps what the paths have brought since the last call, with `more`
 // segments than led to their vertices.
 static void rungs_add(Tracer *t, int32_t more) {
     const Paths *p = &t->ws.paths[t->current];
@@ -339,14 +331,18 @@ static void rungs_add(Tracer *t, int32_t more) {
     }
 }
 
+// Keeps what paths of up to rung + 1 segments have brought.
 static void rungs_keep(Tracer *t, int32_t rung) {
     for (int c = 0; c < SPEC_N && rung == 0; c++) {
         memcpy(t->sent[c], t->ws.radiance[c], CHUNK * sizeof(real));
     }
     if (t->job->veils) {
         rungs_add(t, 0);
-    } else {
-        rung_store(t, rung);
+        return;
+    }
+    for (int c = 0; c < SPEC_N && rung < t->rung_count; c++) {
+        memcpy(t->rungs[rung * SPEC_N + c], t->ws.radiance[c], CHUNK * sizeof(real));
+        t->rungs_kept = rung + 1;
     }
 }
 

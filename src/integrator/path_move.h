@@ -303,7 +303,7 @@ static NOINLINE void vertex_move_adj(const Tracer *t, const SurfaceSweep *s, Ver
     }
     const bool rides = t->job->rides;
     if (sink->any_camera && (s->first || rides)) { // borders may lie before what the sensor sees
-        Mask seen = rides ? s->m & mi_eq(i_load(t->ws.records.slides + s->at), i_set(SLIDES_SEEN)) : s->m;
+        Mask seen = rides ? s->m & records_seen(t, s->at) : s->m;
         camera_move_adj(t, s->slot, s->si.p, &carried, sink, seen);
     }
     if (s->first) {

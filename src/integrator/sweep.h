@@ -58,6 +58,8 @@ KFN Mask chain_lanes(const Tracer *t, Int lobe, Mask slides) {
 
 // Lanes of a batch that slide.
 KFN Mask records_slide(const Tracer *t, int32_t at) { return mi_lt(i_set(SLIDES_NOT), i_load(t->ws.records.slides + at)); }
+// In media, those on the sensor's ray.
+KFN Mask records_seen(const Tracer *t, int32_t at) { return mi_eq(i_load(t->ws.records.slides + at), i_set(SLIDES_SEEN)); }
 
 KFN Hit surface_hit(const Records *r, int32_t at) {
     return (Hit){i_load(r->shape + at), i_load(r->prim + at), f_load(r->u + at), f_load(r->v + at),

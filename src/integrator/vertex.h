@@ -90,6 +90,11 @@ KFN Int light_choose(const SceneView *scene, const SampleKey *key, int32_t bounc
     return emitter_choose(scene, u, probability);
 }
 
+// Lanes in which paths may have so many segments.
+KFN Mask depth_allows(const SceneView *scene, Int segments) {
+    return m_set(scene->max_depth < 0) | mi_lt(segments, i_set(scene->max_depth + 1));
+}
+
 // Claims LANES record entries for a batch; -1 when there is no room.
 KFN int32_t record_claim(Tracer *t, int32_t tag, int32_t group, int32_t count, int32_t bounce) {
     if (t->record_count + LANES > t->ws.record_capacity || t->batch_count == t->ws.batch_capacity) {

@@ -141,12 +141,6 @@ KFN Spec far_emitted(const Indirect *in, Int slot) {
     return in->upstream && in->t->scene->has_media ? spec_sub(first, spec_gather(in->q.fork.air, slot)) : first;
 }
 
-// Lanes in which paths may have so many segments.
-KFN Mask far_reaches(const Indirect *in, Int segments) {
-    const int32_t most = in->t->scene->max_depth;
-    return m_set(most < 0) | mi_lt(segments, i_set(most + 1));
-}
-
 // What jumps at an edge along a chain: everything, if the near point is part of it. What far points on the lit side emit is
 // for segments that end on lights.
 KFN Spec far_jump(const Indirect *in, Int slot, Int depth) {
@@ -163,7 +157,7 @@ KFN Spec far_jump(const Indirect *in, Int slot, Int depth) {
     Spec jump = spec_mul(l, spec_select(full, all, chain));
     // Collisions beside lights are a segment more.
     Mask beside = mi_eq(kind, i_set(SEGMENT_BESIDE));
-    jump = spec_select(beside, spec_zero_unless(far_reaches(in, depth + 3), l), jump);
+    jump = spec_select(beside, spec_zero_unless(depth_allows(in->t->scene, depth + 3), l), jump);
     return spec_select(lit, spec_zero_unless(full, l), jump);
 }
 
@@ -175,7 +169,7 @@ KFN Spec far_radiance(const Indirect *in, Int slot, Int depth) {
     Int other = slot + far_half(q);
     if (boundary_is_rim(in->b->kind)) { // which has a segment more
         Mask full = mi_eq(i_gather(q->full, slot), i_set(1)) | m_set(in->b->kind == BOUNDARY_RIM);
-        return spec_zero_unless(full & far_reaches(in, depth + 3), l);
+        return spec_zero_unless(full & depth_allows(in->t->scene, depth + 3), l);
     }
     if (boundary_is_chained(in->b->kind)) {
         return far_jump(in, slot, depth);

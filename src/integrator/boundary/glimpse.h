@@ -212,7 +212,7 @@ static Spec glimpse_radiance(const Indirect *in, const Glimpsed *at, const Glimp
     Spec l = spec_zero();
     for (int32_t i = 1; i < g->line.last; i++) {
         Int depth = at->depth + g->line.depth[i];
-        Mask mine = g->m & mi_eq(g->turns, i_set(i)) & far_reaches(in, depth + 2);
+        Mask mine = g->m & mi_eq(g->turns, i_set(i)) & depth_allows(in->t->scene, depth + 2);
         l = m_any(mine) ? spec_select(mine, far_radiance(in, at->slot, depth), l) : l;
     }
     return l;

@@ -41,8 +41,7 @@ static void near_book(Indirect *in, const Sight *sight, Spec l, Int slot, int32_
 
 // Lanes of vertices in scenes where some of them are no ends of segments, from which paths to the sensor are not too deep.
 KFN Mask near_reaches(const Tracer *t, const Vertex *v) {
-    int32_t depth = t->scene->max_depth;
-    return depth < 0 ? v->m : v->m & mi_lt(v->depth + 1, i_set(depth));
+    return v->m & depth_allows(t->scene, v->depth + 2);
 }
 
 // Connects vertices to the sensor, as light tracing does (particle.h).

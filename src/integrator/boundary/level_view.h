@@ -98,7 +98,6 @@ static NOINLINE void level_look(Tracer *t, const BoundaryJob *b, Int slot, Float
     if (!m_any(m)) {
         return;
     }
-    const int32_t depth = scene->max_depth;
     Float levels = f_from_i(v->line.turns + 1);
     v->level = i_min(i_from_f(rng_1d(&own, DIMENSION_SEGMENT_END) * levels), v->line.turns);
     v->probability = v->probability / levels;
@@ -111,7 +110,7 @@ static NOINLINE void level_look(Tracer *t, const BoundaryJob *b, Int slot, Float
         v->through = spec_select(mi_eq(v->level, i_set(i)), v->line.through[i], v->through);
         before = i_select(mi_eq(v->level, i_set(i)), v->line.depth[i], before);
     }
-    m = m & mi_lt(i_set(-1), v->x.hit.shape) & (m_set(depth < 0) | mi_lt(before + 1, i_set(depth)));
+    m = m & mi_lt(i_set(-1), v->x.hit.shape) & depth_allows(scene, before + 2);
     m = turned ? m : level_light(t, m, v);
     Float u = rng_1d(&own, DIMENSION_TURNING_SIDE);
     for (Mask left = m; m_any(left);) {

@@ -113,7 +113,8 @@ typedef struct SegmentTurn {
 
 static SegmentTurn segment_turn(const Tracer *t, int32_t kind, int64_t number) {
     const SceneView *scene = t->scene;
-    const int32_t shown = (kind == BOUNDARY_RIDING ? 1 : 2) - t->job->veils; // collisions see what a light's own edge shows, too
+    // Collisions see what a light's own edge shows, too; and what lets pass is no segment's end.
+    const int32_t shown = (kind == BOUNDARY_RIDING ? 1 : 2) - t->job->veils;
     SegmentTurn r = {.direct = scene->emitters_count > 0, .indirect = scene->max_depth < 0 || scene->max_depth > shown};
     r.indirect = r.indirect && (!scene->has_media || t->job->rides); // else only lights move there
     const int32_t riding = t->job->beacons ? 3 : 2, ways = kind == BOUNDARY_RIDING && r.indirect ? riding : r.indirect;

@@ -48,7 +48,7 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
     Float u;
     Vec2 at;
     sightline_numbers(key, bounce, m, &u, &at);
-    Mask ends = m_set(scene->max_depth >= 0) & ~mi_lt(s->depth[i] + 1, i_set(scene->max_depth));
+    Mask deeper = depth_allows(scene, s->depth[i] + 2);
     Mask turned = m_set(false);
     s->through[i + 1] = spec_zero();
     s->depth[i + 1] = s->depth[i];
@@ -74,7 +74,7 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         Float pdf;
         Spec f = bsdf_eval_pdf(&call, wi, b.wo, b.lobe, &pdf);
         Mask passes = m_set(scene->through) & lobe_is(b.lobe, LOBE_NULL);
-        Mask turns = mine & lobe_follows(b.lobe) & (passes | ~ends);
+        Mask turns = mine & lobe_follows(b.lobe) & (passes | deeper);
         turns = turns & m_gt(pdf, f_set(0)) & m_gt(spec_max(f), f_set(0));
         Vec3 wo = frame_to_world(&si.sh, b.wo);
         s->lobe[i] = i_select(turns, b.lobe, s->lobe[i]);
