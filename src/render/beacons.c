@@ -122,6 +122,27 @@ static double mesh_distance(const SceneView *view, const ShapeRecord *shape, con
     return sqrt(least);
 }
 
+// To the boxes around a curve's control points, of which segments have 2 or, with B-splines, 4.
+static double curve_distance(const SceneView *view, const ShapeRecord *shape, const double p[3]) {
+    const int points = shape->kind == SHAPE_BSPLINE ? 4 : 2;
+    double least = HUGE_VAL;
+    for (int32_t i = 0; i < shape->segment_count; i++) {
+        const float *at = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + i];
+        double outside = 0;
+        for (int k = 0; k < 3; k++) {
+            double low = HUGE_VAL, high = -HUGE_VAL;
+            for (int c = 0; c < points; c++) {
+                low = fmin(low, (double)at[4 * c + k] - (double)at[4 * c + 3]);
+                high = fmax(high, (double)at[4 * c + k] + (double)at[4 * c + 3]);
+            }
+            double beyond = fmax(fmax(low - p[k], p[k] - high), 0);
+            outside += beyond * beyond;
+        }
+        least = fmin(least, outside);
+    }
+    return sqrt(least);
+}
+
 // Bounds below the distance of p to a shape where it stands, and where an instance puts it.
 static double shape_distance(const SceneView *view, const ShapeRecord *shape, const float *instance, const double p[3]) {
     if (shape->kind == SHAPE_MESH) {
@@ -134,6 +155,9 @@ static double shape_distance(const SceneView *view, const ShapeRecord *shape, co
     }
     if (shape->kind == SHAPE_SPHERE) {
         return sphere_distance(view->tables + shape->table, q) * worth_of_instance;
+    }
+    if (shape->segment_count > 0) {
+        return curve_distance(view, shape, q) * worth_of_instance;
     }
     if (shape->to_world < 0 || !to_local(view->theta + shape->to_world, q, q, &worth)) {
         return 0;
@@ -349,7 +373,7 @@ static bool beacon_of_light(const Render *r, int32_t light, Beacon *beacon) {
 
 static rey_result refuse_lamp(const Render *r, int32_t light) {
     const SceneView *view = &r->scene->view;
-    const char *why = "so close to a surface (curves and grids of distances count as close) or to the border of its medium";
+    const char *why = "so close to a surface (grids of distances count as close) or to the border of its medium";
     char name[OBJECT_NAME];
     rey_name_emitter(r->scene, light, name);
     why = light_jumps(view, view->emitters + light) ? "where its beam_width is its cutoff_angle, or all but it" : why;

@@ -310,6 +310,7 @@ static const Motion motions[] = {
     {"ride_bulb.xml", "torch.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.03, 96, 768},
     {"ride_bulb.xml", "camera.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 64, 256},
     {"beacon_floor.xml", "torch.to_world", SHIFT, {1, 0.3f, 0}, 0.03, 384, 1536},
+    {"beacon_rope.xml", "torch.to_world", SHIFT, {1, 0.3f, 0}, 0.03, 512, 2048},
     {"seen_jar.xml", "ball.to_world", SHIFT, {1, 0.2f, 0}, 0.05, 768, 1536},
     {"seen_lantern.xml", "ball.to_world", SHIFT, {1, 0.2f, 0}, 0.02, 384, 2048},
     {"veil_through.xml", "screen.to_world", SHIFT, {0.3f, 0.2f, 1}, 0.02, 768, 2048},
