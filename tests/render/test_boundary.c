@@ -255,6 +255,8 @@ static void test_refused(void **state) {
                  {"ride_veil.xml", "camera.to_world", 3, "masks and thin glass"},
                  {"ride_hidden.xml", "camera.to_world", 3, "look past them"},
                  {"ride_hidden.xml", "bulb.to_world", 3, "look past them"},
+                 {"ride_cut.xml", "tile.to_world", 3, "cut off what comes through participating media"},
+                 {"ride_cut.xml", "lamp.to_world", 3, "cut off what comes through participating media"},
                  {"clip_hull.xml", "camera.to_world", 3, "cuts the border of a medium"},
                  {"clip_hull.xml", "hull.to_world", 3, "cuts the border of a medium"},
                  {"marks_faces.xml", "grid.bsdf.bsdf_0.reflectance.to_uv", 0, "the same line"},
