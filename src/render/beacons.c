@@ -12,14 +12,13 @@
 #include "render/update.h"
 #include "sensor/kinds.h"
 #include "shape/affine.h"
+#include "shape/cut.h"
 
 #include <math.h>
 
 // Rounding of what lies just outside of a ball; and the least radius over that of the scene: within smaller balls collisions are
 // too seldom to say what stands still.
 static const double within = 0.99, least_radius = 1e-3;
-
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Squared distance of p to the segment from a to b.
 static double segment_distance2(const double p[3], const double a[3], const double b[3]) {
@@ -28,11 +27,11 @@ static double segment_distance2(const double p[3], const double a[3], const doub
         e[k] = b[k] - a[k];
         q[k] = p[k] - a[k];
     }
-    double length2 = dot(e, e), t = length2 > 0 ? fmin(fmax(dot(e, q) / length2, 0), 1) : 0;
+    double length2 = dot3(e, e), t = length2 > 0 ? fmin(fmax(dot3(e, q) / length2, 0), 1) : 0;
     for (int k = 0; k < 3; k++) {
         d[k] = q[k] - t * e[k];
     }
-    return dot(d, d);
+    return dot3(d, d);
 }
 
 // That to a triangle: of the plane where p lies over it, else of the nearest side.
@@ -57,7 +56,7 @@ static double triangle_distance2(const double p[3], double (*v)[3]) {
         over = over && outside >= 0;
         least = fmin(least, segment_distance2(p, a, b));
     }
-    double area2 = dot(n, n), height = dot(n, q);
+    double area2 = dot3(n, n), height = dot3(n, q);
     return over && area2 > 0 ? height * height / area2 : least;
 }
 
@@ -70,19 +69,28 @@ static bool to_local(const float *m, const double p[3], double q[3], double *wor
         return false;
     }
     for (int k = 0; k < 3; k++) {
-        q[k] = dot(inverse + 4 * k, from) + inverse[4 * k + 3];
-        sum += dot(inverse + 4 * k, inverse + 4 * k);
+        q[k] = dot3(inverse + 4 * k, from) + inverse[4 * k + 3];
+        sum += dot3(inverse + 4 * k, inverse + 4 * k);
     }
     *worth = 1 / sqrt(sum);
     return true;
 }
 
+// Squared distance of p to a box; within it 0.
+static double beyond2(const double low[3], const double high[3], const double p[3]) {
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double beyond = fmax(fmax(low[k] - p[k], p[k] - high[k]), 0);
+        sum += beyond * beyond;
+    }
+    return sum;
+}
+
 // Distance of q to the surface of the unit cube.
 static double cube_distance(const double q[3]) {
-    double outside = 0, inside = HUGE_VAL;
+    static const double zero[3] = {0, 0, 0}, one[3] = {1, 1, 1};
+    double outside = beyond2(zero, one, q), inside = HUGE_VAL;
     for (int k = 0; k < 3; k++) {
-        double beyond = fmax(fmax(-q[k], q[k] - 1), 0);
-        outside += beyond * beyond;
         inside = fmin(inside, fmin(fabs(q[k]), fabs(q[k] - 1)));
     }
     return outside > 0 ? sqrt(outside) : inside;
@@ -94,7 +102,7 @@ static double sphere_distance(const float *table, const double p[3]) {
     for (int k = 0; k < 3; k++) {
         d[k] = p[k] - (double)table[k];
     }
-    return fabs(sqrt(dot(d, d)) - (double)table[3]);
+    return fabs(sqrt(dot3(d, d)) - (double)table[3]);
 }
 
 // A bound below the distance of q to a surface of the kind in its own space.
@@ -122,23 +130,12 @@ static double mesh_distance(const SceneView *view, const ShapeRecord *shape, con
     return sqrt(least);
 }
 
-// To the boxes around a curve's control points, of which segments have 2 or, with B-splines, 4.
-static double curve_distance(const SceneView *view, const ShapeRecord *shape, const double p[3]) {
-    const int points = shape->kind == SHAPE_BSPLINE ? 4 : 2;
-    double least = HUGE_VAL;
-    for (int32_t i = 0; i < shape->segment_count; i++) {
-        const float *at = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + i];
-        double outside = 0;
-        for (int k = 0; k < 3; k++) {
-            double low = HUGE_VAL, high = -HUGE_VAL;
-            for (int c = 0; c < points; c++) {
-                low = fmin(low, (double)at[4 * c + k] - (double)at[4 * c + 3]);
-                high = fmax(high, (double)at[4 * c + k] + (double)at[4 * c + 3]);
-            }
-            double beyond = fmax(fmax(low - p[k], p[k] - high), 0);
-            outside += beyond * beyond;
-        }
-        least = fmin(least, outside);
+// To the boxes of a curve's segments.
+static double curve_distance(const SceneView *view, int32_t id, const double p[3]) {
+    double least = HUGE_VAL, low[3], high[3];
+    for (int32_t i = 0; i < view->shapes[id].segment_count; i++) {
+        rey_tube_box(view, id, i, low, high);
+        least = fmin(least, beyond2(low, high, p));
     }
     return sqrt(least);
 }
@@ -157,7 +154,7 @@ static double shape_distance(const SceneView *view, const ShapeRecord *shape, co
         return sphere_distance(view->tables + shape->table, q) * worth_of_instance;
     }
     if (shape->segment_count > 0) {
-        return curve_distance(view, shape, q) * worth_of_instance;
+        return curve_distance(view, (int32_t)(shape - view->shapes), q) * worth_of_instance;
     }
     if (shape->to_world < 0 || !to_local(view->theta + shape->to_world, q, q, &worth)) {
         return 0;
@@ -239,7 +236,7 @@ static bool line_to(const Render *r, const Projection *projection, const double 
         line->d[k] = line->parallel ? axis : p[k] - (double)m[4 * k + 3];
         line->from[k] = p[k] - line->d[k];
     }
-    line->length = sqrt(dot(line->d, line->d));
+    line->length = sqrt(dot3(line->d, line->d));
     return local[2] > projection->near;
 }
 

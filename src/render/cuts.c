@@ -70,7 +70,7 @@ rey_result rey_cuts_find(rey_scene *scene, Array *edges) {
 }
 
 // What is not known of a shape that cuts light off, null where all is. sharp: there are such lights; moves: points or normals do;
-// looks: and these are the sensor's alone, which leave the planes of flat triangles where they are.
+// looks: the sensor does, which leaves the planes of flat triangles where they are.
 static const char *gap_of_shape(const SceneView *view, const ShapeRecord *shape, bool sharp, bool moves, bool looks) {
     bool round = shape->kind != SHAPE_MESH, bent = round || (shape->flags & SHAPE_HAS_NORMALS);
     if (view->has_media && moves && (bent || !looks)) {
@@ -89,12 +89,11 @@ const char *rey_cuts_gap(const rey_scene *scene, const SensorRecord *sensor, con
     const SceneView *view = &scene->view;
     const bool sharp = has_sharp_light(view);
     bool moves = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->normals >= 0;
-    bool looks = p->camera >= 0 && p->geometry < 0 && p->instance < 0 && p->normals < 0;
     bool turns = p->texture >= 0 && (p->terms & REY_TERM_TERMINATOR), lights = p->emitter >= 0 && sharp;
     for (int32_t i = 0; i < (int32_t)view->shapes_count && (moves || turns || lights); i++) {
         const ShapeRecord *shape = view->shapes + i;
         bool cuts = rey_cuts_within(view, shape->bsdf) && (!turns || cuts_within_map(view, shape->bsdf, false));
-        const char *gap = cuts && !rey_moves_border(view, p) ? gap_of_shape(view, shape, sharp, moves, looks) : NULL;
+        const char *gap = cuts && !rey_moves_border(view, p) ? gap_of_shape(view, shape, sharp, moves, p->camera >= 0) : NULL;
         if (cuts && p->normals >= 0 && !rey_turning_known(view, sensor)) {
             gap = "cut light off where vertex normals move, which is not known of smooth mirrors, glass, media and this sensor";
         }

@@ -99,10 +99,11 @@ bool rey_tube_folds(const SceneView *view, int32_t id) {
 static void tube_box(const SceneView *view, int32_t id, int32_t segment, double room, double low[3], double high[3]) {
     const ShapeRecord *shape = view->shapes + id;
     const float *p = view->theta + shape->positions + 4 * (int64_t)view->segments[shape->segment + segment];
+    const int points = shape->kind == SHAPE_LINEAR ? LINEAR_POINTS : BSPLINE_POINTS;
     for (int k = 0; k < 3; k++) {
         low[k] = INFINITY;
         high[k] = -INFINITY;
-        for (int i = 0; i < BSPLINE_POINTS; i++) {
+        for (int i = 0; i < points; i++) {
             low[k] = fmin(low[k], (double)p[4 * i + k] - room * (double)p[4 * i + 3]);
             high[k] = fmax(high[k], (double)p[4 * i + k] + room * (double)p[4 * i + 3]);
         }

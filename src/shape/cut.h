@@ -14,7 +14,7 @@ const int32_t *rey_mesh_triangle(const SceneView *view, const ShapeRecord *shape
 
 // Whether a tube bends somewhere more sharply than its radius, so that it passes through itself there.
 bool rey_tube_folds(const SceneView *view, int32_t shape);
-// What a tube's segment lies in, in its own space.
+// What a curve's segment lies in, in its own space.
 void rey_tube_box(const SceneView *view, int32_t shape, int32_t segment, double low[3], double high[3]);
 // What its triangles lie in.
 void rey_cut_box(const SceneView *view, int32_t shape, int32_t segment, double low[3], double high[3]);
