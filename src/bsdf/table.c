@@ -63,6 +63,8 @@ bool rey_bsdf_refracts(int kind) { return kind == BSDF_DIELECTRIC; }
 
 bool rey_bsdf_passes(int kind) { return kind == BSDF_NULL; }
 
+bool rey_bsdf_samples_alike(int kind) { return kind == BSDF_DIFFUSE || kind == BSDF_NULL; }
+
 bool rey_bsdf_tints(int kind) { return kind == BSDF_THINDIELECTRIC; }
 
 // Whether a number is 0 everywhere.

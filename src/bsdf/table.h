@@ -39,6 +39,8 @@ bool rey_bsdf_opens(int kind);
 bool rey_bsdf_tints(int kind);
 // Whether light passes it undeviated and undimmed.
 bool rey_bsdf_passes(int kind);
+// Whether nothing but the surface has a part in the density of directions.
+bool rey_bsdf_samples_alike(int kind);
 // Whether a function itself refracts into directions that end abruptly (rim.h).
 bool rey_bsdf_ends(const SceneView *view, const BsdfNode *node);
 // Whether a kind turns the shading normal of the function inside it.

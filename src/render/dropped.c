@@ -6,15 +6,14 @@
 #include "emitter/table.h"
 #include "render/blame.h"
 
-// Whether a parameter is, or is read by, a texture.
-static bool texture_reads(const SceneView *view, int32_t id, const Param *p) {
+bool rey_texture_reads(const SceneView *view, int32_t id, const Param *p) {
     if (id < 0) {
         return false;
     }
     const TextureNode *t = view->textures + id;
     return p->texture == id || p->to_uv == id || (t->kind == TEXTURE_ATTRIBUTE && p->attribute >= 0) ||
            (t->kind == TEXTURE_VOLUME && p->theta == view->volumes[t->volume].theta) ||
-           texture_reads(view, t->child[0], p) || texture_reads(view, t->child[1], p);
+           rey_texture_reads(view, t->child[0], p) || rey_texture_reads(view, t->child[1], p);
 }
 
 // Whether a parameter belongs to thin glass, by whose coefficient paths pass, or to what it stands in.
@@ -22,7 +21,7 @@ static bool gap_of_function(const SceneView *view, int32_t id, const Param *p) {
     const BsdfNode *bsdf = view->bsdfs + id;
     bool gap = false;
     for (int k = 0; k < rey_bsdf_kinds[bsdf->kind].param_count; k++) {
-        gap = gap || texture_reads(view, bsdf->slot[k], p);
+        gap = gap || rey_texture_reads(view, bsdf->slot[k], p);
     }
     return gap && rey_bsdf_holds(view, id, rey_bsdf_tints);
 }

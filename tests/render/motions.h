@@ -303,6 +303,7 @@ static const Motion motions[] = {
     {"ride_facing.xml", "ball.to_world", SHIFT, {1, 0.2f, -0.3f}, 0.03, 768, 1536},
     {"ride_facing.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.3f}, 0.03, 384, 512},
     {"ride_cut.xml", "camera.to_world", SHIFT, {1, 0.5f, 0.3f}, 0.05, 96, 384},
+    {"ride_sun.xml", "board.to_world", SHIFT, {1, 0.5f, 0}, 0.05, 64, 256},
     {"ride_phase.xml", "lamp.to_world", SHIFT, {1, 0.2f, 0.6f}, 0.04, 768, 768},
     {"ride_phase.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.6f}, 0.03, 512, 1024},
     {"ride_hidden.xml", "block.to_world", SHIFT, {1, 0.3f, 0.2f}, 0.03, 256, 512},

@@ -78,7 +78,7 @@ static void beside_find(Tracer *t, const BoundaryJob *b, Int number, Float share
     }
     Vec3 o = segment_stand(t, &s, segment_offset(&s));
     Int around = medium_around(t, o, s.d, s.m);
-    m = segment_shine(t, &s, o, around, number, s.m);
+    m = segment_shine(t, &s, o, around, f_set(0), number, s.m);
     if (!m_any(m)) {
         return;
     }

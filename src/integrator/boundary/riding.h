@@ -15,13 +15,10 @@
 static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
     Int around = medium_around(t, o, s->d, s->m);
-    Mask m = segment_shine(t, s, o, around, number, s->m);
-    if (!m_any(m)) {
-        return;
-    }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
-    m = leg.m & (mi_lt(i_set(-1), leg.air) | (mi_lt(s->source, i_set(0)) & m_set(b->chains)));
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
+    Mask m = leg.m & (mi_lt(i_set(-1), leg.air) | (mi_lt(s->source, i_set(0)) & m_set(b->chains)));
+    m = m_any(m) ? segment_shine(t, s, o, around, v3_length(v3_sub(leg.near.p, o)), number, m) : m;
     // Directions stay, and the ends slide over their lights.
     s->attached = m_set(false);
     s->distance = f_select(mi_lt(s->source, i_set(0)), f_set(INFINITY), s->distance);

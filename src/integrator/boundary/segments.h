@@ -376,9 +376,12 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     segment_keep(s, o, &near, lit, number, q, m);
 }
 
-// In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through.
-static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Int number, Mask m) {
+// In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through. Fog may
+// have no end: lights beyond the scene are as far from near points, `behind` the edge, as shadow rays from there take them to be.
+static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Float behind, Int number, Mask m) {
     Ray ahead = segment_ahead(s, o);
+    Float far = f_set((2 - 2 * SHADOW_SHORT) * (real)t->scene->bounds_radius) - behind;
+    ahead.tmax = f_select(m_lt(s->distance, f_set(INFINITY)), ahead.tmax, f_max(far, f_set(0)));
     Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false};
     Mask blocked;
     Spec through = walk_transmittance(t, ahead, m, &fog, &blocked, NULL);
@@ -400,9 +403,7 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
     Vec3 o = rides ? segment_stand(t, s, segment_offset(s)) : segment_offset(s);
     Int around = medium_around(t, o, s->d, s->m);
     Mask m = s->m;
-    if (lit) {
-        m = segment_shine(t, s, o, around, number, m);
-    } else {
+    if (!lit) {
         Ray ahead = {o, s->d, f_set(INFINITY)};
         s->far = trace_solid(t, &ahead, false, m, NULL);
         m = s->attached = m & mi_lt(i_set(-1), s->far.shape);
@@ -413,6 +414,9 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
     m = rides ? leg.m & mi_lt(leg.air, i_set(0)) : leg.m;
+    if (lit && m_any(m)) {
+        m = segment_shine(t, s, o, around, v3_length(v3_sub(leg.near.p, o)), number, m);
+    }
     segment_keep_leg(around, &leg, q, m);
     segment_keep(s, o, &leg.near, lit, number, q, m);
 }
