@@ -114,8 +114,8 @@ void KNAME(rey_kernel_boundary)(BoundaryJob *b) {
     size_t bytes = workspace_layout(&t.ws, job.workspace, MODE_PRIMAL);
     bool turns = boundary_is_terminator(b->kind) || boundary_is_horizon(b->kind);
     bool segments = turns || b->kind == BOUNDARY_INDIRECT || b->kind == BOUNDARY_MEETING || boundary_is_paired(b->kind);
-    segments |= boundary_is_rim(b->kind) && (b->job.any_motion || b->job.any_places);
-    Indirect in = {.t = &t, .b = b, .upstream = (b->chains || b->job.rides) && segments};
+    segments |= boundary_is_rim(b->kind);
+    Indirect in = {.t = &t, .b = b, .upstream = boundary_has_ways(b) && segments};
     bytes += segments_layout(&in.q, (char *)job.workspace + bytes);
     int32_t *kept = (int32_t *)((char *)job.workspace + bytes), *begin = kept + CHUNK + 2 * LANES;
     FilterTable filter;

@@ -204,7 +204,6 @@ static bool turns(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         found |= (shape->flags & SHAPE_HAS_NORMALS) && !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
-        found |= rey_bsdf_ends_within(view, shape->bsdf);
     }
     for (int64_t i = 0; i < view->media_count; i++) {
         found |= rey_phase_varies(view, view->media[i].phase);

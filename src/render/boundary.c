@@ -279,7 +279,7 @@ static int64_t sample_count(const Render *r, int32_t kind) {
                                                   [BOUNDARY_RIDING_HORIZON] = 4, [BOUNDARY_RIM] = 1, [BOUNDARY_RIM_VIEW] = 1,
                                                   [BOUNDARY_CHAINED_RIM] = 1, [BOUNDARY_FACING] = 4,
                                                   [BOUNDARY_FACING_VIEW] = 1, [BOUNDARY_CHAINED_FACING] = 4,
-                                                  [BOUNDARY_RIDING_FACING] = 4};
+                                                  [BOUNDARY_RIDING_FACING] = 4, [BOUNDARY_RIDING_RIM] = 1};
     int32_t asked = rey_boundary_term(kind) == REY_TERM_PRIMARY ? r->request.primary_spp : r->request.indirect_spp;
     int64_t pixels = (int64_t)r->plan.width * r->plan.height, least = asked ? 1 : LEAST_SAMPLES;
     int64_t part = kind == BOUNDARY_PRIMARY && asked ? 1 : share[kind];
@@ -329,9 +329,10 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     const int32_t depth = r->scene->view.max_depth;
     if (boundary_is_rim(kind)) { // `direct` without emitter_samples meets no such lights
         bool lit = !r->scene->view.split || r->scene->view.light_samples > 0, deep = depth < 0 || depth > 2;
-        bool chained = kind == BOUNDARY_CHAINED_RIM, moves = r->job.any_motion || r->job.any_places;
-        edge_count = lit && (deep || kind == BOUNDARY_RIM_VIEW) && !r->scene->view.has_media;
-        edge_count = chained && !(moves && rey_boundary_chained(&r->scene->view)) ? 0 : edge_count;
+        bool media = r->scene->view.has_media, ways = rides || rey_boundary_chained(&r->scene->view);
+        bool apart = ways && (r->job.any_motion || r->job.any_places); // what keeps its direction is seen by a kind of its own
+        bool mine = kind == BOUNDARY_CHAINED_RIM ? apart && !media : kind != BOUNDARY_RIDING_RIM || (apart && media);
+        edge_count = lit && mine && (deep || kind == BOUNDARY_RIM_VIEW);
     }
     const bool passes = kind == BOUNDARY_MIRRORED && r->job.veils; // what the sensor meets may be behind them
     if (kind != BOUNDARY_PRIMARY && !passes && depth >= 0 && depth < 2) { // paths end where the sensor meets a surface

@@ -12,9 +12,10 @@
 // at which maps cut light off (turning.h); lines of textures that move over their surfaces (lines.h); and edges as collisions see
 // them (riding.h). CHAINED_TERMINATOR and CHAINED_HORIZON are those of turning.h along such chains, RIDING_TERMINATOR and
 // RIDING_HORIZON those that collisions see or light. RIM and RIM_VIEW are the ends of rough refraction in the light of a point or
-// of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h); CHAINED_RIM, those of segments that
-// keep their directions. FACING and FACING_VIEW are where normals of maps turn away, as other vertices and as the sensor see that
-// (facing.h, facing_view.h), and CHAINED_FACING and RIDING_FACING as vertices see it along chains, and as collisions do.
+// of one direction, as other vertices and as the sensor see them (rim_light.h, rim_view.h); CHAINED_RIM and, in media, RIDING_RIM
+// are those of segments that keep their directions. FACING and FACING_VIEW are where normals of maps turn away, as other vertices
+// and as the sensor see that (facing.h, facing_view.h), and CHAINED_FACING and RIDING_FACING as vertices see it along chains, and
+// as collisions do.
 enum {
     BOUNDARY_PRIMARY,
     BOUNDARY_INDIRECT,
@@ -37,6 +38,7 @@ enum {
     BOUNDARY_FACING_VIEW,
     BOUNDARY_CHAINED_FACING,
     BOUNDARY_RIDING_FACING,
+    BOUNDARY_RIDING_RIM,
     BOUNDARY_KINDS
 };
 
@@ -78,7 +80,7 @@ static inline bool boundary_is_horizon(int32_t kind) {
 }
 static inline bool boundary_is_riding(int32_t kind) {
     return kind == BOUNDARY_RIDING || kind == BOUNDARY_RIDING_TERMINATOR || kind == BOUNDARY_RIDING_HORIZON ||
-           kind == BOUNDARY_RIDING_FACING;
+           kind == BOUNDARY_RIDING_FACING || kind == BOUNDARY_RIDING_RIM;
 }
 static inline bool boundary_is_chained(int32_t kind) {
     return kind == BOUNDARY_CHAINED || kind == BOUNDARY_CHAINED_TERMINATOR || kind == BOUNDARY_CHAINED_HORIZON ||
@@ -87,7 +89,12 @@ static inline bool boundary_is_chained(int32_t kind) {
 static inline bool boundary_is_paired(int32_t kind) { return kind == BOUNDARY_CHAINED || kind == BOUNDARY_RIDING; }
 
 static inline bool boundary_is_rim(int32_t kind) {
-    return kind == BOUNDARY_RIM || kind == BOUNDARY_RIM_VIEW || kind == BOUNDARY_CHAINED_RIM;
+    return kind == BOUNDARY_RIM || kind == BOUNDARY_RIM_VIEW || kind == BOUNDARY_CHAINED_RIM || kind == BOUNDARY_RIDING_RIM;
+}
+
+// Whether near points may move with what lies further towards the sensor (upstream.h), where something moves.
+static inline bool boundary_has_ways(const BoundaryJob *b) {
+    return (b->chains || b->job.rides) && (b->job.any_motion || b->job.any_places || !boundary_is_rim(b->kind));
 }
 
 // Samples of one number of a `pixel` of their random numbers.

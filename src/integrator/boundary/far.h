@@ -198,16 +198,3 @@ KFN Spec far_radiance(const Indirect *in, Int slot, Int depth) {
 
 // Jumps have either sign.
 KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }
-
-// In media, lanes whose way towards the sensor is open; *l becomes what of it arrives there. seen: it is the last one, which leads
-// past lights that hide.
-static Mask near_clear(Tracer *t, const Ray *ray, Int medium, Int slot, int32_t bounce, bool seen, Mask m, Spec *l) {
-    if (!m_any(m)) {
-        return m;
-    }
-    Mask blocked;
-    Fog fog = {medium, stream_key(t, slot, bounce, STREAM_SHADOW), seen && t->scene->hide_emitters};
-    Spec through = walk_transmittance(t, *ray, m, &fog, &blocked, NULL);
-    *l = spec_mul(*l, through);
-    return m & m_gt(spec_max(through), f_set(0));
-}

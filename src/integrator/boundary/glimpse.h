@@ -218,22 +218,6 @@ static Spec glimpse_radiance(const Indirect *in, const Glimpsed *at, const Glimp
     return l;
 }
 
-// In media, weighs l with what the pieces of the lines before the last one let through.
-static Spec glimpse_clear(Tracer *t, const Glimpse *g, Int slot, int32_t bounce, Spec l) {
-    for (int32_t i = 0; i + 1 < g->line.last; i++) {
-        Mask on = g->m & mi_lt(i_set(i), g->turns);
-        if (!m_any(on)) {
-            return l;
-        }
-        Spec arrives = l;
-        Vec3 o = g->line.o[i], d = g->line.d[i];
-        Ray ray = {o, d, v3_dot(v3_sub(g->line.hit[i].p, o), d) * (1.0f - SHADOW_SHORT)};
-        near_clear(t, &ray, medium_around(t, o, d, on), slot, bounce + MAX_BOUNCES * (i + 1), i == 0, on, &arrives);
-        l = spec_select(on, arrives, l);
-    }
-    return l;
-}
-
 // A line from a random film position that leads to the vertices of m. *back: the direction from them to its last mirror, whose
 // distance it returns.
 static Float glimpse_find(Indirect *in, const SampleKey *key, const Glimpsed *at, Vec2 lens, Sink *still, Mask m, Glimpse *g,
@@ -261,8 +245,8 @@ static void glimpse_bring(Indirect *in, const SampleKey *key, Glimpse *g, const 
         return;
     }
     if (t->scene->has_media) {
-        g->m = near_clear(t, ray, medium, at->slot, bounce + MAX_BOUNCES, false, g->m, &l);
-        l = glimpse_clear(t, g, at->slot, bounce + 1, l);
+        g->m = sight_clear(t, ray, medium, at->slot, bounce + MAX_BOUNCES, false, g->m, &l);
+        l = sightline_clear(t, &g->line, g->turns, at->slot, bounce + 1, g->m, l);
     } else {
         g->m = particle_open(t, ray, false, g->m);
     }

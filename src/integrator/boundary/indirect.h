@@ -62,7 +62,7 @@ static void near_connect(Indirect *in, const Landing *at, int32_t bounce) {
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     if (t->scene->has_media) {
         Ray ray = {interaction_offset(&at->si, d), d, sight.length * (1.0f - SHADOW_SHORT)};
-        m = near_clear(in->t, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, true, m, &l);
+        m = sight_clear(in->t, &ray, medium_behind(at->group, at->si.ng, d, at->v.medium), at->v.slot, bounce, true, m, &l);
     } else if (m_any(m)) {
         // As the sensor's rays find it, which do not start above surfaces: where things touch, there is little between them.
         Ray ray = {v3_madd(at->si.p, sight.length, d), v3_neg(d), sight.length - 0.25f * interaction_step(at->si.p)};
@@ -96,7 +96,7 @@ static int32_t near_collisions(Indirect *in, int32_t medium, const int32_t *orde
     Spec l = spec_mul(spec_mul(v.beta, f), far_radiance(in, v.slot, v.depth));
     m = m & m_gt(jump_size(l), f_set(0)) & m_finite(spec_sum(l));
     Ray ray = {v.hit.p, d, sight.length * (1.0f - SHADOW_SHORT)};
-    m = near_clear(in->t, &ray, v.medium, v.slot, bounce, true, m, &l);
+    m = sight_clear(in->t, &ray, v.medium, v.slot, bounce, true, m, &l);
     near_book(in, &sight, l, v.slot, bounce, m);
     if (in->glimpses && m_any(v.m)) {
         glimpse_connect_air(in, &v, &c, near_lens(in, v.slot), bounce);
@@ -166,7 +166,8 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         if (t->scene->has_media) {
             near_place(t, q, k);
         }
-        if (segments_at_surface(in->b) || boundary_is_rim(in->b->kind)) { // they are there, or are known to meet it
+        // They are there, or are known to meet it.
+        if (segments_at_surface(in->b) || (boundary_is_rim(in->b->kind) && !t->scene->has_media)) {
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
             hit_store(t, k, &hit);

@@ -2,6 +2,8 @@
 // camera see them. Particles start on the lights as in light tracing, and leave the surface that they meet along its rim:
 //   dI += integral dPhi_x dphi |n_g . v| / |n_g . l| f_+ s g' W
 // over the flux that meets the surface and the azimuths of the directions v.
+// In media v leads to a collision or to a surface. Segments between surfaces are attached at both ends; collisions ride along with
+// what they are seen from (ride.h), in directions that stay, so that x slides over its surface as at the end of a chain.
 #pragma once
 
 #include "integrator/boundary/rim_vertex.h"
@@ -33,12 +35,36 @@ static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
         r.flux = spec_select(mine & one.valid, flux, r.flux);
     }
     m = m & m_gt(spec_max(r.flux), f_set(0)) & m_finite(spec_sum(r.flux));
-    t->job->rays += m_count(m);
-    r.x.hit = trace_closest(scene, &(Ray){o, d, f_set(INFINITY)}, m, false);
+    Ray ray = {o, d, f_set(INFINITY)};
+    t->job->rays += scene->has_media ? 0 : m_count(m);
+    r.x.hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
     r.x.light_d = v3_neg(d);
-    r.x.light_distance = v3_length(v3_sub(r.x.hit.p, o));
     r.m = m & mi_lt(i_set(-1), r.x.hit.shape);
+    Spec value;
+    r.x.light_distance = lights_sample(scene, r.x.light, r.m, r.x.hit.p, (Vec2){f_set(0), f_set(0)}, &value).distance;
     return r;
+}
+
+// In media: flies from surfaces along `ray` to *near, of segments that are stored next. Weighs *l with what media let through on
+// the way to the light. Returns the lanes whose segments are this kind's.
+static Mask rims_fly(Tracer *t, const BoundaryJob *job, const SurfaceSweep *s, const RimVertex *x, const Ray *ray, Int slot,
+                     Segments *q, Hit *near, Spec *l, Mask m) {
+    Ray shadow;
+    shadow_ray(&s->si, x->light_d, x->light_distance, &shadow);
+    *l = spec_mul(*l, rim_lit(t, &shadow, slot, m));
+    m = m & m_gt(spec_max(*l), f_set(0));
+    Int around = medium_around(t, ray->o, ray->d, m);
+    SampleKey key = stream_key(t, slot, 0, STREAM_PROBE);
+    Leg leg = leg_trace(t, *ray, ray->o, around, spec_set(f_set(1)), &key, m);
+    Mask air = mi_lt(i_set(-1), leg.air);
+    *near = leg.near;
+    if (boundary_is_chained(job->kind)) {
+        m = leg.m & (air | m_set(job->chains)); // surfaces may be pieces of chains
+    } else {
+        m = leg.m & ~(air & m_set(boundary_has_ways(job)));
+    }
+    segment_keep_leg(around, &leg, q, m);
+    return m;
 }
 
 // Lets those that meet surfaces of a group leave along the rim, and keeps those that meet something there.
@@ -65,9 +91,15 @@ static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, co
     Spec l = spec_scale(spec_mul(in->flux, r.value), weight);
     m = r.m & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
     Ray ray = {interaction_offset(&s.si, view), view, f_set(INFINITY)};
-    t->job->rays += m_count(m);
-    Hit near = trace_closest(t->scene, &ray, m, false);
-    rims_keep(q, &x, &r, ray.o, &near, l, number, m & mi_lt(i_set(-1), near.shape));
+    Hit near;
+    if (t->scene->has_media) {
+        m = rims_fly(t, job, &s, &x, &ray, number, q, &near, &l, m);
+    } else {
+        t->job->rays += m_count(m);
+        near = trace_closest(t->scene, &ray, m, false);
+        m = m & mi_lt(i_set(-1), near.shape);
+    }
+    rims_keep(q, &x, &r, ray.o, &near, l, number, m);
 }
 
 // As segments_find.

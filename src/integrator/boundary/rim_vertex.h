@@ -23,6 +23,22 @@ KFN Mask rim_light(const SceneView *scene, const SampleKey *key, Int *light, Flo
     return light_is_delta(scene, *light);
 }
 
+// What surfaces and media let through along shadow rays of m from such vertices.
+static Spec rim_lit(Tracer *t, const Ray *shadow, Int slot, Mask m) {
+    const bool media = t->scene->has_media;
+    if (!t->scene->through) {
+        t->job->rays += m_count(m);
+        return trace_transmittance(t->scene, shadow, m);
+    }
+    Mask blocked;
+    Fog fog = {.past_lights = false};
+    if (media) {
+        fog.medium = medium_around(t, shadow->o, shadow->d, m);
+        fog.key = stream_key(t, slot, 0, STREAM_SHADOW);
+    }
+    return walk_transmittance(t, *shadow, m, media ? &fog : NULL, &blocked, NULL);
+}
+
 typedef struct Rim {
     Spec value;  // f_+
     Float scale; // of an adjoint of the value whose product with it is s g': e over the sum of f_+

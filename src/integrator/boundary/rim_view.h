@@ -22,13 +22,14 @@ static void rim_views_find(Tracer *t, const BoundaryJob *b, const Strips *all, i
         LevelPlace at;
         Float x = 0.5f * (s.x[0] + s.x[1]), y = 0.5f * (s.y[0] + s.y[1]);
         m = level_place(t, b, all, slot, x, y, true, m, &at);
-        t->job->rays += m_count(m);
-        m = m & m_gt(spec_max(trace_transmittance(t->scene, &at.view.shadow, m)), f_set(0));
+        Spec lit = rim_lit(t, &at.view.shadow, slot, m);
+        lit = t->scene->has_media ? sightline_clear(t, &at.view.line, at.view.level + 1, slot, 0, m, lit) : lit;
+        m = m & m_gt(spec_max(lit), f_set(0));
         if (!m_any(m)) {
             continue;
         }
         Float weight = level_again(t, b, all, slot, &at, m) * f_safe_rcp(at.slope) * f_set(1 / all->density);
-        Spec l = spec_mul(spec_mul(at.view.through, at.view.arrives), at.view.rim.value);
+        Spec l = spec_mul(spec_mul(lit, spec_mul(at.view.through, at.view.arrives)), at.view.rim.value);
         l = spec_scale(l, weight * f_safe_rcp(at.view.probability));
         m = m & m_gt(weight, f_set(0)) & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
         f_compress(t->ws.film_x + q->count, x, m);

@@ -168,6 +168,22 @@ static Carried sightline_back(const Tracer *t, const Sightline *s, Int level, Ve
     return c;
 }
 
+// In media, weighs l with what the first `pieces` pieces of lines of m let through.
+static Spec sightline_clear(Tracer *t, const Sightline *s, Int pieces, Int slot, int32_t bounce, Mask m, Spec l) {
+    for (int32_t i = 0; i < s->last; i++) {
+        Mask on = m & mi_lt(i_set(i), pieces);
+        if (!m_any(on)) {
+            return l;
+        }
+        Spec arrives = l;
+        Vec3 o = s->o[i], d = s->d[i];
+        Ray ray = {o, d, v3_dot(v3_sub(s->hit[i].p, o), d) * (1.0f - SHADOW_SHORT)};
+        sight_clear(t, &ray, medium_around(t, o, d, on), slot, bounce + MAX_BOUNCES * (i + 1), i == 0, on, &arrives);
+        l = spec_select(on, arrives, l);
+    }
+    return l;
+}
+
 // Half of the difference of film positions that slopes are taken over, in film widths: rays turn by little more than rounding.
 #define FILM_STEP ((real)0.004)
 

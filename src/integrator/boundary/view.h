@@ -104,3 +104,16 @@ static NOINLINE Hit trace_solid(Tracer *t, const Ray *given, bool viewed, Mask m
     }
     return met;
 }
+
+// In media, lanes whose way towards the sensor is open; *l becomes what of it arrives there. seen: it is the last one, which leads
+// past lights that hide.
+static Mask sight_clear(Tracer *t, const Ray *ray, Int medium, Int slot, int32_t bounce, bool seen, Mask m, Spec *l) {
+    if (!m_any(m)) {
+        return m;
+    }
+    Mask blocked;
+    Fog fog = {medium, stream_key(t, slot, bounce, STREAM_SHADOW), seen && t->scene->hide_emitters};
+    Spec through = walk_transmittance(t, *ray, m, &fog, &blocked, NULL);
+    *l = spec_mul(*l, through);
+    return m & m_gt(spec_max(through), f_set(0));
+}
