@@ -113,8 +113,8 @@ static bool moves_always(const void *user, int32_t shape, int32_t instance) {
     return true;
 }
 
-// Chains, and collisions that ride along with surfaces, may see all curves along which borders of light pass through surfaces, also
-// those that stand still.
+// Collisions that ride along with surfaces may see all curves along which borders of light pass through surfaces, also those that
+// stand still.
 static rey_result check_borders(rey_scene *scene, int term) {
     Array meetings = {0};
     rey_result result = rey_meetings_with_borders(scene, NULL, 0, moves_always, NULL, &meetings);
@@ -236,7 +236,7 @@ static rey_result boundary_check(const Render *r, int term) {
                           name);
         }
     }
-    return r->job.rides || term == REY_TERM_SPECULAR ? check_borders(scene, term) : REY_OK;
+    return r->job.rides || (view->has_media && term == REY_TERM_SPECULAR) ? check_borders(scene, term) : REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {
@@ -248,6 +248,7 @@ void rey_boundaries_free(Render *r) {
         rey_free(ctx, plan->films);
         rey_array_free(ctx, &plan->steps);
         rey_array_free(ctx, &plan->step_at);
+        rey_array_free(ctx, &plan->beams);
     }
     rey_array_free(ctx, &r->edges);
     rey_array_free(ctx, &r->fans);
@@ -300,6 +301,15 @@ static rey_result check_halves(const Render *r) {
     return REY_OK;
 }
 
+// Whether the selection moves a light that ends abruptly.
+static bool beams_move(const Render *r, const BoundaryPlan *plan) {
+    bool moves = false;
+    for (size_t i = 0; i < plan->beams.count; i++) {
+        moves |= rey_light_moves(r, ARRAY_AT(plan->beams, BeamRecord, i).light);
+    }
+    return moves;
+}
+
 static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     rey_context *ctx = r->scene->ctx;
     *plan = (BoundaryPlan){.film = r->plan};
@@ -307,6 +317,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     rey_result result = reserve_workspaces(r);
     if (result == REY_OK && kind == BOUNDARY_MIRRORED) { // it looks for edges where they are seen
         result = rey_texture_step_records(r->scene, r->job.to_uv_at, &plan->steps, &plan->step_at);
+        result = result == REY_OK ? rey_beam_records(r->scene, &plan->steps, &plan->beams) : result;
         result = result == REY_OK ? check_halves(r) : result;
     } else if (result == REY_OK && !boundary_is_rim(kind) && kind != BOUNDARY_FACING_VIEW) {
         result = rey_boundary_edges(r, kind, plan);
@@ -322,7 +333,7 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     known |= rides && (kind == BOUNDARY_MEETING || kind == BOUNDARY_FACING);
     int32_t edge_count = (boundary_is_riding(kind) ? rides : known) ? plan->job.edge_count : 0;
     if (kind == BOUNDARY_MIRRORED) {
-        edge_count = (r->job.any_motion || r->lines) && chains;
+        edge_count = (r->job.any_motion || r->lines || (!r->scene->view.has_media && beams_move(r, plan))) && chains;
     }
     edge_count = kind == BOUNDARY_FACING_VIEW ? 1 : edge_count;
     edge_count = kind == BOUNDARY_CHAINED_FACING && !rey_boundary_chained(&r->scene->view) ? 0 : edge_count;
@@ -343,8 +354,9 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
                               .fans = r->fans.data, .sides = r->sides.data, .meetings = r->meetings.data,
                               .marks = r->marks.data, .cdf = plan->cdf,
                               .steps = plan->steps.data, .step_at = plan->step_at.data,
+                              .beams = plan->beams.data, .beam_count = (int32_t)plan->beams.count,
                               .edge_count = edge_count, .round = plan->job.round, .none = r->none,
-                              .everywhere = r->turns_rays || r->lines, .lines = r->lines,
+                              .everywhere = r->turns_rays || r->lines || beams_move(r, plan), .lines = r->lines,
                               .chains = boundary_is_rim(kind) ? rey_boundary_chained(&r->scene->view) : chains,
                               .scale = (float)((double)r->job.spp / (double)plan->samples)};
     plan->job.job.x = r->plan.x;

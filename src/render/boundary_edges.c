@@ -17,7 +17,7 @@ static bool shape_moves_itself(const Render *r, int32_t id, int32_t instance) {
                        (r->scene->view.shapes[id].collection >= 0 && job->instance_at[instance] >= 0));
 }
 
-static bool light_moves(const Render *r, int32_t light) {
+bool rey_light_moves(const Render *r, int32_t light) {
     bool moves = false;
     for (int k = 0; k < MAX_EMITTER_SLOTS && light >= 0; k++) {
         moves |= r->job.place_at[MAX_EMITTER_SLOTS * light + k] >= 0;
@@ -28,7 +28,7 @@ static bool light_moves(const Render *r, int32_t light) {
 // The same, as the sensor sees it; id -1: of a light, or a plane that moves with the sensor.
 static bool moves_on_film(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
-    return r->job.any_camera || (id < 0 ? light_moves(r, instance) : shape_moves_itself(r, id, instance));
+    return r->job.any_camera || (id < 0 ? rey_light_moves(r, instance) : shape_moves_itself(r, id, instance));
 }
 
 // Whether it moves the line of a texture over its surface.
@@ -46,13 +46,20 @@ static bool edge_moves(const Render *r, const EdgeRecord *e) {
 static bool meeting_moves(const Render *r, const EdgeRecord *e) {
     const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
     return shape_moves_itself(r, m->shape[0], m->instance[0]) || shape_moves_itself(r, m->shape[1], m->instance[1]) ||
-           (m->shape[1] < 0 && light_moves(r, m->prim[1]));
+           (m->shape[1] < 0 && rey_light_moves(r, m->prim[1]));
 }
 
 // Whether it is where a plane cuts what the sensor sees.
 static bool clips(const Render *r, const EdgeRecord *e) {
     const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
     return m->shape[1] < 0 && m->prim[1] < 0;
+}
+
+// Whether it is where light ends on a surface that only mirrors or refracts, on which nothing shows it.
+static bool ends_unseen(const Render *r, const EdgeRecord *e) {
+    const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
+    const SceneView *view = &r->scene->view;
+    return m->shape[1] < 0 && m->prim[1] >= 0 && !view->bsdfs[view->shapes[m->shape[0]].bsdf].spreads;
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
@@ -165,7 +172,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     bool crosses = e->kind == EDGE_MEETING, still = crosses && !meeting_moves(r, e);
-    if (crosses && w->kind != BOUNDARY_PRIMARY && clips(r, e)) {
+    if (crosses && ((w->kind != BOUNDARY_PRIMARY && clips(r, e)) || ends_unseen(r, e))) {
         return 0;
     }
     if (w->kind == BOUNDARY_PRIMARY) {

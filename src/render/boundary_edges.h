@@ -8,5 +8,8 @@
 // silhouettes in; or triangles, by area and by the angle between their normals.
 rey_result rey_boundary_edges(Render *r, int32_t kind, BoundaryPlan *plan);
 
+// Whether the selection moves a light.
+bool rey_light_moves(const Render *r, int32_t light);
+
 // Refuses what moves where the sensor's near or far plane cuts the border of a medium in view, unless terms were asked for by name.
 rey_result rey_check_clipped_media(const Render *given);

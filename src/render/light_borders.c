@@ -1,5 +1,5 @@
 // light_borders.c: the surfaces in the air at which light jumps: the borders of projectors' pictures, the lines along which these
-// jump, and the cones of spots without a soft border.
+// and spots' textures jump, and the cones of spots without a soft border.
 #include "render/light_borders.h"
 
 #include "bsdf/table.h"
@@ -62,36 +62,62 @@ static rey_result push_border(rey_scene *scene, Array *borders, LightBorder bord
     return REY_OK;
 }
 
-// The line between two places of a projector's picture, by their uv.
-static rey_result push_picture_line(rey_scene *scene, int32_t light, const double from[2], const double to[2], Array *borders) {
-    const SceneView *view = &scene->view;
-    const float *extent = view->tables + view->emitters[light].table + PROJECTOR_EXTENT;
-    double a[2], b[2];
-    for (int k = 0; k < 2; k++) {
-        a[k] = (1 - 2 * from[k]) * (double)extent[k];
-        b[k] = (1 - 2 * to[k]) * (double)extent[k];
-    }
-    return push_border(scene, borders, border_between(view, light, SLOT(Projector, to_world), 1, a, b));
+// A picture in the light of a projector or a spot.
+typedef struct Picture {
+    int32_t light, texture;
+    int slot;         // of the light's pose
+    double extent[2]; // uv = 1/2 - slope / (2 extent)
+} Picture;
+
+static double spot_tangent(const SceneView *view, const EmitterRecord *e) {
+    return tan((double)view->theta[view->textures[e->slot[SLOT(Spot, cutoff_angle)]].theta] * 3.14159265358979323846 / 180);
 }
 
-// Where the picture ends, and where it jumps.
-static rey_result find_picture(rey_scene *scene, int32_t light, Array *borders) {
-    static const double corners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
-    const SceneView *view = &scene->view;
-    int32_t texture = view->emitters[light].slot[SLOT(Projector, irradiance)];
-    rey_result result = REY_OK;
-    for (int k = 0; k < 4 && result == REY_OK && ends_lit(view, view->textures + texture); k++) {
-        result = push_picture_line(scene, light, corners[k], corners[k + 1], borders);
+static Picture picture_of(const SceneView *view, int32_t light) {
+    const EmitterRecord *e = view->emitters + light;
+    if (e->kind == EMITTER_SPOT) {
+        double extent = -spot_tangent(view, e);
+        return (Picture){light, e->slot[SLOT(Spot, texture)], SLOT(Spot, to_world), {extent, extent}};
     }
+    const float *extent = view->tables + e->table + PROJECTOR_EXTENT;
+    return (Picture){light, e->slot[SLOT(Projector, irradiance)], SLOT(Projector, to_world),
+                     {(double)extent[0], (double)extent[1]}};
+}
+
+// The line between two places of a picture, by their uv.
+static rey_result push_picture_line(rey_scene *scene, const Picture *picture, const double from[2], const double to[2],
+                                    Array *borders) {
+    double a[2], b[2];
+    for (int k = 0; k < 2; k++) {
+        a[k] = (1 - 2 * from[k]) * picture->extent[k];
+        b[k] = (1 - 2 * to[k]) * picture->extent[k];
+    }
+    return push_border(scene, borders, border_between(&scene->view, picture->light, picture->slot, 1, a, b));
+}
+
+// Where a projector's picture ends.
+static rey_result find_sides(rey_scene *scene, int32_t light, Array *borders) {
+    static const double corners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
+    const Picture picture = picture_of(&scene->view, light);
+    rey_result result = REY_OK;
+    for (int k = 0; k < 4 && result == REY_OK && ends_lit(&scene->view, scene->view.textures + picture.texture); k++) {
+        result = push_picture_line(scene, &picture, corners[k], corners[k + 1], borders);
+    }
+    return result;
+}
+
+// Where a picture jumps.
+static rey_result find_lines(rey_scene *scene, int32_t light, Array *borders) {
+    const Picture picture = picture_of(&scene->view, light);
     Array steps = {0};
-    result = result == REY_OK ? rey_light_steps(scene, texture, &steps) : result;
+    rey_result result = rey_light_steps(scene, picture.texture, &steps);
     for (size_t i = 0; i < steps.count && result == REY_OK; i++) {
         const TextureStep *s = &ARRAY_AT(steps, TextureStep, i);
         double low = s->offset + fmin(s->u, 0) + fmin(s->v, 0), high = s->offset + fmax(s->u, 0) + fmax(s->v, 0), ends[2][2];
         for (double level = fmax(ceil(low), s->low); level <= fmin(floor(high), s->high) && result == REY_OK; level++) {
             int side;
             result = !rey_step_across(s, level, ends, &side) ? REY_OK
-                                                             : push_picture_line(scene, light, ends[0], ends[1], borders);
+                                                             : push_picture_line(scene, &picture, ends[0], ends[1], borders);
         }
     }
     rey_array_free(scene->ctx, &steps);
@@ -105,7 +131,7 @@ static rey_result find_cone(rey_scene *scene, int32_t light, Array *borders) {
     const SceneView *view = &scene->view;
     const EmitterRecord *e = view->emitters + light;
     const float *x = view->tables + e->table, *y = x + 4, *z = x + 8; // rows of the inverse
-    double spread = tan((double)view->theta[view->textures[e->slot[SLOT(Spot, cutoff_angle)]].theta] * turn * AROUND / 360);
+    double spread = spot_tangent(view, e);
     float size = 1 / sqrtf(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]), t2 = (float)(spread * spread);
     Quadric cone = {.constant = 0};
     for (int k = 0; k < 3; k++) {
@@ -130,10 +156,57 @@ static rey_result find_borders(rey_scene *scene, Array *borders) {
     rey_result result = REY_OK;
     for (int32_t i = 0; i < view->emitters_count && result == REY_OK; i++) {
         const EmitterRecord *e = view->emitters + i;
-        if (e->kind == EMITTER_PROJECTOR) {
-            result = find_picture(scene, i, borders);
-        } else if (e->kind == EMITTER_SPOT && rey_light_is_abrupt(view, e)) {
-            result = find_cone(scene, i, borders);
+        const bool projector = e->kind == EMITTER_PROJECTOR;
+        result = projector                        ? find_sides(scene, i, borders)
+                 : rey_light_is_abrupt(view, e) ? find_cone(scene, i, borders)
+                                                  : REY_OK;
+        result = result == REY_OK && (projector || e->kind == EMITTER_SPOT) ? find_lines(scene, i, borders) : result;
+    }
+    return result;
+}
+
+static rey_result push_record(rey_scene *scene, StepRecord step, Array *steps) {
+    StepRecord *one = rey_array_push(scene->ctx, steps, sizeof *one, 1);
+    if (one) {
+        *one = step;
+    }
+    return one ? REY_OK : REY_ERROR_MEMORY;
+}
+
+// The sides of a projector's picture, and the lines along which it or a spot's jumps.
+static rey_result push_picture_records(rey_scene *scene, int32_t light, Array *steps) {
+    const SceneView *view = &scene->view;
+    const int32_t texture = picture_of(view, light).texture;
+    const bool ends = view->emitters[light].kind == EMITTER_PROJECTOR && ends_lit(view, view->textures + texture);
+    Array lines = {0};
+    rey_result result = rey_light_steps(scene, texture, &lines);
+    for (int k = 0; k < 2 && result == REY_OK && ends; k++) {
+        result = push_record(scene, (StepRecord){.u = k == 0, .v = k == 1, .high = 1, .sort = STEP_LINES, .at = -1}, steps);
+    }
+    for (size_t i = 0; i < lines.count && result == REY_OK; i++) {
+        const TextureStep *s = &ARRAY_AT(lines, TextureStep, i);
+        result = push_record(scene, (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high,
+                                                 (float)s->scale, STEP_LINES, -1}, steps);
+    }
+    rey_array_free(scene->ctx, &lines);
+    return result;
+}
+
+rey_result rey_beam_records(rey_scene *scene, Array *steps, Array *beams) {
+    const SceneView *view = &scene->view;
+    rey_result result = REY_OK;
+    for (int32_t i = 0; i < view->emitters_count && result == REY_OK; i++) {
+        const EmitterRecord *e = view->emitters + i;
+        const bool picture = e->kind == EMITTER_PROJECTOR || e->kind == EMITTER_SPOT;
+        BeamRecord beam = {.light = i, .first = (int32_t)steps->count, .cone = rey_light_is_abrupt(view, e)};
+        result = picture ? push_picture_records(scene, i, steps) : REY_OK;
+        beam.end = (int32_t)steps->count;
+        BeamRecord *one = result == REY_OK && (beam.cone || beam.end > beam.first)
+                              ? rey_array_push(scene->ctx, beams, sizeof *one, 1)
+                              : &beam;
+        result = one ? result : REY_ERROR_MEMORY;
+        if (one) {
+            *one = beam;
         }
     }
     return result;

@@ -14,6 +14,7 @@ typedef struct BoundaryPlan {
     EdgeRecord *edges;
     float *cdf;
     Array steps, step_at;    // where textures jump (shape/marks.h): StepRecord, and of every shape its first one
+    Array beams;             // and light in the air: BeamRecord
     FilmPlan film;           // one tile that covers the picture
     double *films;           // forward: one per shard
     int64_t samples;         // of one set

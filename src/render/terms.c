@@ -6,12 +6,13 @@
 #include "render/boundary.h"
 #include "render/cuts.h"
 #include "render/dropped.h"
-#include "render/endless.h"
 #include "render/edge_on.h"
+#include "render/endless.h"
 #include "render/facing.h"
 #include "render/motion.h"
 #include "render/particles.h"
 #include "render/rims.h"
+#include "render/texture_steps.h"
 #include "scene/sink.h"
 
 #include <stdio.h>
@@ -273,6 +274,7 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
     gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
     gap = gap ? gap : gap_of_index(view, p);
     gap = gap ? gap : gap_in_media(view, p);
+    gap = gap ? gap : rey_spots_gap(view, p);
     gap = gap ? gap : rey_endless_gap(view, view->sensors + def->sensor, p, terms);
     bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
                   (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));

@@ -11,6 +11,8 @@ rey_result rey_light_steps(rey_scene *scene, int32_t texture, Array *steps);
 // The same as the first for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the
 // end. Both stay empty where nothing jumps.
 rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at);
+// Why the derivative by a parameter is not known beside spots whose textures jump, null where it is.
+const char *rey_spots_gap(const SceneView *view, const Param *p);
 // Whether a selection moves lines along which textures jump, by their to_uv.
 bool rey_lines_selected(const SceneView *view, const int32_t *to_uv_at);
 // Where it does in a way that is not known, and the object: of one sort, -1 = none;

@@ -20,6 +20,12 @@ typedef struct StepRecord {
     int32_t sort, at;
 } StepRecord;
 
+// A spot or projector whose light ends abruptly or jumps: at its cone, or along the lines first... of its picture, STEP_LINES of
+// its uv.
+typedef struct BeamRecord {
+    int32_t light, first, end, cone;
+} BeamRecord;
+
 // A piece of such a curve: two points, by their barycentrics in a triangle, or by uv on other shapes; and of a line of a
 // texture whose to_uv is selected, what the step says of it. Where such a line lies along the end of its surface or triangle, the
 // picture has two derivatives, one to either side: `half` of its jump is their mean, between the field on the left of the piece and

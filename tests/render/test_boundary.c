@@ -264,6 +264,8 @@ static void test_refused(void **state) {
                  {"clip_hull.xml", "hull.to_world", 3, "cuts the border of a medium"},
                  {"marks_faces.xml", "grid.bsdf.bsdf_0.reflectance.to_uv", 0, "the same line"},
                  {"seen_tiles.xml", "coin.emitter.radiance.to_uv", 0, "edges of their surfaces"},
+                 {"seen_beam.xml", "lamp.cutoff_angle.value", 0, "move with its cutoff_angle"},
+                 {"seen_beam.xml", "lamp.texture.to_uv", 0, "other kinds than 'area'"},
                  {"twins.xml", "camera.to_world", 3, "the same place, as"},
                  {"twins_group.xml", "camera.to_world", 3, "the same place, as"}};
     static float image[NUMBERS];

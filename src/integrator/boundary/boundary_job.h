@@ -52,8 +52,9 @@ typedef struct BoundaryJob {
     const MarkRecord *marks;
     const StepRecord *steps;  // where textures jump: those of a shape from step_at[shape] to step_at[shape + 1]
     const int32_t *step_at;   // null: nothing jumps
+    const BeamRecord *beams;  // where light ends or jumps in the air; their steps are among these
     const float *cdf;         // cumulative probabilities of the edges
-    int32_t edge_count;
+    int32_t edge_count, beam_count;
     bool round;               // outlines of round surfaces, marks, terminators or edges of smooth meshes are among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering

@@ -19,7 +19,8 @@ enum { SEGMENT_CREASE = 4, SEGMENT_BESIDE = 5 };
 // must start on their own side of the other one; so must those in an acute wedge.
 KFN Float chained_step(const EdgePoint *e) {
     Float step = (1.0f + f_max(f_max(f_abs(e->p.x), f_abs(e->p.y)), f_abs(e->p.z))) * 1e-5f;
-    return f_select(e->meeting, MEETING_STEPS * interaction_step(e->p), f_max(step, edge_wedge(e)));
+    Float apart = f_select(mi_lt(e->met.shape, i_set(0)), f_set(1), f_set(MEETING_STEPS)); // borders of light hide nothing
+    return f_select(e->meeting, apart * interaction_step(e->p), f_max(step, edge_wedge(e)));
 }
 
 // The rays past both sides of an edge, from half-way to the near point on: n points to the second one.
@@ -45,7 +46,7 @@ static Mask chained_between(Tracer *t, const BoundaryJob *b, const Segment *s, V
 }
 
 // Stores the segments of m, in any direction. Where surfaces pass through each other, the edge moves with both (meeting.h): `far`
-// is on the other one, and beside n = x a + y b there is y b.
+// is on the other one, or its prim is the light whose border passes, else -1; and beside n = x a + y b there is y b.
 static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind, Int number, Segments *q, Mask m) {
     const EdgePoint *e = &s->edge;
     int32_t at = q->count;
@@ -64,7 +65,7 @@ static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind
     i_compress(q->number + at, number, m);
     f_compress(q->along + at, f_set(0), m);
     Hit none = *near;
-    none.shape = i_set(-1);
+    none.shape = none.prim = i_set(-1);
     Hit far = hit_select(e->meeting, &e->met, &none);
     KEEP_HIT(q, at, near, near, near->p, m);
     KEEP_HIT(q, at, edge, &e->hit, e->p, m);

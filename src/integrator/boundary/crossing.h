@@ -7,7 +7,8 @@
 // what is mirrored or refracted there along d begins.
 #pragma once
 
-#include "integrator/boundary/field.h"
+#include "integrator/boundary/alike.h"
+#include "integrator/boundary/beam.h"
 #include "integrator/boundary/sightline.h"
 
 typedef struct Crossing {
@@ -15,9 +16,11 @@ typedef struct Crossing {
     Vec3 p;              // on the line
     Vec3 n, n_other, across; // across: n - n'
     Mask m, meeting;
-    Float wedge;         // cotangent of the angle between the faces of one mesh that meet there, where it is acute, else 0
+    Float wedge;         // how far off the paths must pass it [MEETING_STEPS]: between faces of one mesh, the cotangent of their
+                         // angle where it is acute; else 0
     Mask terminator, horizon; // n . view = 0 in the triangle of `hit`: where the line ends, or at the vertex before
     Vec3 view;
+    Int light;           // whose border the surface of `hit` passes through there, else -1: `other` is that
     Int step;            // of the texture that jumps there, else -1: how it rises over the surface, and uv
     Vec3 rise;
     Vec2 uv;
@@ -34,15 +37,6 @@ typedef struct Miss {
 
 // Where rounding could have brought a ray from one side of an edge to the other.
 #define MISS_NEAR 1e-4f
-
-static void triangle_load(const SceneView *scene, int32_t flags, const Hit *hit, Vec3 p[3]) {
-    Corners c = mesh_corners(scene, hit->shape, hit->prim);
-    Int positions = SHAPE_FIELD(scene, hit->shape, positions);
-    for (int k = 0; k < 3; k++) {
-        p[k] = theta_v3(scene, positions + c.i[k] * 3);
-        p[k] = flags & SHAPE_INSTANCED ? pose_to_world(scene, instance_table(scene, hit), p[k]) : p[k];
-    }
-}
 
 static Miss miss_triangle(const SceneView *scene, int32_t flags, const Hit *own, Vec3 o, Vec3 d) {
     Vec3 p[3];
@@ -254,6 +248,29 @@ static Mask crossing_mark(const Tracer *t, const BoundaryJob *b, const Ends *e, 
     return m;
 }
 
+// Where a border of light lies between them on one surface: as where surfaces pass through each other, n = x a + y b, a and b the
+// normals of both.
+static Mask crossing_beam(const Tracer *t, const BoundaryJob *b, const Ends *e, const Miss *miss, Mask m, Crossing *c) {
+    BeamBorder border;
+    c->light = i_set(-1);
+    if (b->beam_count == 0) {
+        return m_set(false);
+    }
+    m = m & mi_eq(e->behind[0], e->behind[1]);
+    m = lines_share(t->scene, e->hit, e->hit + 1, m);
+    m = beams_part(t->scene, b, e->hit[0].p, e->hit[1].p, lanes_spread(t->scene, e->hit, m), &border);
+    Vec3 own = miss->normal, n = v3_normalize(v3_cross(e->d[0], v3_cross(own, border.normal)));
+    Float cosine = v3_dot(own, border.normal), rcp = f_safe_rcp(1.0f - cosine * cosine);
+    Float x = (v3_dot(n, own) - cosine * v3_dot(n, border.normal)) * rcp;
+    c->light = i_select(m, border.light, c->light);
+    c->n = v3_select(m, v3_scale(own, x), c->n);
+    c->n_other = v3_select(m, v3_sub(v3_scale(own, x), n), c->n_other);
+    c->hit = hit_select(m, e->hit, &c->hit);
+    c->p = v3_select(m, e->hit[0].p, c->p);
+    c->wedge = f_select(m, f_set(1.0f / MEETING_STEPS), c->wedge); // beyond what rounding makes of the border
+    return m;
+}
+
 // Vertices of a level at which two lines meet one triangle with vertex normals; lanes of m.
 static Mask smooth_alike(const SceneView *scene, const Hit hit[2], Mask m) {
     m = m & mi_lt(i_set(-1), hit[0].shape) & mi_eq(hit[0].shape, hit[1].shape) & mi_eq(hit[0].prim, hit[1].prim) &
@@ -290,6 +307,7 @@ static void crossing_turns(const Tracer *t, const Sightline lines[2], const Ends
     c->meeting = c->meeting & ~turns;
     c->wedge = f_zero_unless(~turns, c->wedge);
     c->step = i_select(turns, i_set(-1), c->step);
+    c->light = i_select(turns, i_set(-1), c->light);
 }
 
 // The wedge between two faces that the lines of m meet.
@@ -338,7 +356,9 @@ static NOINLINE Crossing crossing_find(const Tracer *t, const BoundaryJob *b, co
     c.hit = hit_select(mark, &line, &c.hit);
     c.p = v3_select(mark, line.p, c.p);
     c.n = v3_select(mark, across, c.n);
-    c.m = edge[0] | edge[1] | c.meeting | mark;
+    Mask beam = crossing_beam(t, b, &e, miss, met[0] & met[1] & ~mark, &c);
+    c.meeting = c.meeting & ~beam;
+    c.m = edge[0] | edge[1] | c.meeting | mark | beam;
     crossing_turns(t, lines, &e, level, m, &c);
     c.across = v3_sub(c.n, c.n_other);
     return c;
@@ -354,6 +374,10 @@ static Carried crossing_move_adj(const Tracer *t, const Crossing *c, const Sight
     points_move_adj(t, &c->hit, v3_scale(c->n, own), v3_zero(), sink, c->m & ~turns);
     if (m_any(c->meeting)) {
         points_move_adj(t, &c->other, v3_scale(c->n_other, -own), v3_zero(), sink, c->meeting);
+    }
+    Mask beam = c->m & mi_lt(i_set(-1), c->light);
+    if (sink->any_places && m_any(beam)) {
+        borders_move_adj(t->scene, c->light, c->p, v3_scale(c->n_other, -own), sink, beam);
     }
     if (m_any(turns)) {
         SurfaceAdj d = surface_adj_zero();

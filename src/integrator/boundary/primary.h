@@ -32,7 +32,8 @@ typedef struct PrimarySample {
 // Beside the edges of smooth meshes thin bands are dark, whose other sides mirrored.h finds: the paths pass as near as those do.
 // Where surfaces pass through each other, shadow rays start above the one and may miss the other, if the paths pass nearer than at
 // most; there, rays that one lets pass start a step behind it and must meet the other one; where a plane
-// cuts surfaces, they start on that; so do they in acute wedges. scale: pixels per length across the edge.
+// cuts surfaces, they start on that; so do they in acute wedges. Borders of light hide nothing. scale: pixels per length across the
+// edge.
 static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint *e, Float scale) {
     Mask smooth = mi_lt(i_set(0), SHAPE_FIELD(t->scene, i_max(e->hit.shape, i_set(0)), flags) & SHAPE_HAS_NORMALS);
     const real finest = 2 * film_resolution(t->sensor);
@@ -40,7 +41,8 @@ static Float primary_step(const Tracer *t, const BoundaryJob *b, const EdgePoint
     step = f_select(smooth & m_set(b->chains), f_set(finest), step);
     Float behind = f_max(step, MEETING_STEPS * interaction_step(e->p) * scale);
     step = f_max(step, edge_wedge(e) * scale);
-    return f_select((e->meeting & m_set(b->chains)) | edge_clips(e), behind, step);
+    Mask through = e->meeting & mi_lt(i_set(-1), e->met.shape);
+    return f_select((through & m_set(b->chains)) | edge_clips(e), behind, step);
 }
 
 static void primary_sample(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole, Int slot, Mask m, PrimarySample *out) {
