@@ -8,10 +8,6 @@
 // What keeps the samplers of rims in the light of points and of single directions from all of what a parameter moves, null where
 // nothing does (integrator/boundary/rim_light.h, rim_view.h).
 static const char *gap_of_sharp_light(const SceneView *view, const SensorRecord *sensor) {
-    if (view->through && rey_boundary_veiled(view)) {
-        return "in the light of a point or of one direction, where masks or thin glass may hide it, the integrators for media do "
-               "not find that. 'path' does";
-    }
     if (!rey_boundary_sees(sensor)) {
         return "in the light of a point or of one direction only perspective, thinlens and orthographic sensors find that";
     }

@@ -122,6 +122,8 @@ static const SharpView veiled_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "4", "ch
 
 static const SharpView of_plain_floor = {"0.3, -1, -0.3", "0, 0.3, -0.8", "3", "chalk", "nothing", "3.3"};
 static const SharpView of_haze = {"0.3, -1, -0.3", "0.3, 3, -0.33", "3", "chalk", "nothing", "3.3"};
+static const SharpView shaded_pane = {"0.3, -1, -0.3", "0, 0, 0", "2", "chalk", "shade", "2"};
+static const SharpView shaded_haze = {"0.3, -1, -0.3", "0.3, 3, -0.33", "3", "chalk", "shade", "3.3"};
 static const SharpView beside_mirror = {"0.3, 0.5, -0.3", "0.3, 0.9, -0.7", "4", "mirror", "nothing", "2"};
 
 static Room sharp_open(const char *scene, const char *kind, const char *light, const SharpView *view, int lanes) {
@@ -189,7 +191,7 @@ static void test_moves(void **state) {
     check_rows("rim_sharp", rows, COUNT_OF(rows));
 }
 
-// In haze collisions see it, too.
+// In haze collisions see it, too. Masks may shade it there: they let light pass to surfaces.
 static void test_haze(void **state) {
     static const float shift[16] = {[7] = 1, [11] = 0.3f}, along[16] = {[3] = 1, [7] = 0.5f}, place[3] = {1, 0.3f, 0.5f};
     static const float swing[16] = {[2] = 0.3f, [6] = 0.5f, [10] = -0.5f};
@@ -202,7 +204,9 @@ static void test_haze(void **state) {
                                     {"coat", "sun", "coat.eta.value", &of_haze, one, 1, 1 << 15},
                                     {"glass", "sun", "light.to_world", &of_haze, swing, 16, 1 << 15},
                                     {"coat", "sun", "pane.to_world", &of_haze, nod, 16, 1 << 17},
-                                    {"coat", "sun", "sensor_0.to_world", &of_haze, along, 16, 1 << 15}};
+                                    {"coat", "sun", "sensor_0.to_world", &of_haze, along, 16, 1 << 15},
+                                    {"glass", "lamp", "glass.eta.value", &shaded_pane, one, 1, 1 << 15},
+                                    {"coat", "sun", "coat.eta.value", &shaded_haze, one, 1, 1 << 16}};
     (void)state;
     check_rows("rim_haze", rows, COUNT_OF(rows));
 }

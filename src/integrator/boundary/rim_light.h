@@ -10,6 +10,7 @@
 #include "integrator/particle_start.h"
 
 #define DIMENSION_RIM 0x80000006u
+#define DIMENSION_RIM_PASS 0x80000300u
 
 // Particles as they meet surfaces.
 typedef struct RimLight {
@@ -17,6 +18,28 @@ typedef struct RimLight {
     Spec flux; // over the density
     Mask m;
 } RimLight;
+
+// Where they stop: surfaces that shadow rays pass are passed or not, with an even chance.
+static Hit rims_meet(Tracer *t, Ray ray, const SampleKey *key, Spec *flux, Mask m) {
+    const SceneView *scene = t->scene;
+    Hit met = HIT_NONE;
+    for (uint32_t i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(m); i++) {
+        t->job->rays += scene->has_media ? 0 : m_count(m);
+        Hit hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
+        Mask opens = m_set(false);
+        met = hit_select(m, &hit, &met);
+        for (Mask left = scene->through ? m & mi_lt(i_set(-1), hit.shape) : m_set(false); m_any(left);) {
+            int32_t id;
+            Hit h;
+            Mask mine = take_group(scene, &hit, &left, &id, &h);
+            opens = scene->bsdfs[scene->groups[id].bsdf].transmits ? opens | mine : opens;
+        }
+        *flux = spec_select(opens, spec_scale(*flux, f_set(2)), *flux);
+        ray.o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
+        m = opens & m_lt(rng_1d(key, DIMENSION_RIM_PASS + i), f_set(0.5f));
+    }
+    return met;
+}
 
 static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
     const SceneView *scene = t->scene;
@@ -35,9 +58,7 @@ static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
         r.flux = spec_select(mine & one.valid, flux, r.flux);
     }
     m = m & m_gt(spec_max(r.flux), f_set(0)) & m_finite(spec_sum(r.flux));
-    Ray ray = {o, d, f_set(INFINITY)};
-    t->job->rays += scene->has_media ? 0 : m_count(m);
-    r.x.hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
+    r.x.hit = rims_meet(t, (Ray){o, d, f_set(INFINITY)}, key, &r.flux, m);
     r.x.light_d = v3_neg(d);
     r.m = m & mi_lt(i_set(-1), r.x.hit.shape);
     Spec value;
@@ -45,14 +66,9 @@ static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
     return r;
 }
 
-// In media: flies from surfaces along `ray` to *near, of segments that are stored next. Weighs *l with what media let through on
-// the way to the light. Returns the lanes whose segments are this kind's.
-static Mask rims_fly(Tracer *t, const BoundaryJob *job, const SurfaceSweep *s, const RimVertex *x, const Ray *ray, Int slot,
-                     Segments *q, Hit *near, Spec *l, Mask m) {
-    Ray shadow;
-    shadow_ray(&s->si, x->light_d, x->light_distance, &shadow);
-    *l = spec_mul(*l, rim_lit(t, &shadow, slot, m));
-    m = m & m_gt(spec_max(*l), f_set(0));
+// In media: flies from surfaces along `ray` to *near, of segments that are stored next. Returns the lanes whose segments are this
+// kind's.
+static Mask rims_fly(Tracer *t, const BoundaryJob *job, const Ray *ray, Int slot, Segments *q, Hit *near, Mask m) {
     Int around = medium_around(t, ray->o, ray->d, m);
     SampleKey key = stream_key(t, slot, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, *ray, ray->o, around, spec_set(f_set(1)), &key, m);
@@ -90,10 +106,16 @@ static void rims_leave(Tracer *t, const BoundaryJob *job, const RimLight *in, co
     Float weight = f_abs(v3_dot(s.si.ng, view)) * f_safe_rcp(f_abs(v3_dot(s.si.ng, x.light_d)) * pdf);
     Spec l = spec_scale(spec_mul(in->flux, r.value), weight);
     m = r.m & m_finite(spec_sum(l)) & m_gt(spec_max(l), f_set(0));
+    if (t->scene->through) { // else they came from there
+        Ray shadow;
+        shadow_ray(&s.si, x.light_d, x.light_distance, &shadow);
+        l = spec_mul(l, rim_lit(t, &shadow, number, m));
+        m = m & m_gt(spec_max(l), f_set(0));
+    }
     Ray ray = {interaction_offset(&s.si, view), view, f_set(INFINITY)};
     Hit near;
     if (t->scene->has_media) {
-        m = rims_fly(t, job, &s, &x, &ray, number, q, &near, &l, m);
+        m = rims_fly(t, job, &ray, number, q, &near, m);
     } else {
         t->job->rays += m_count(m);
         near = trace_closest(t->scene, &ray, m, false);
