@@ -10,6 +10,7 @@
 #include "render/boundary_edges.h"
 #include "render/corners.h"
 #include "render/light_borders.h"
+#include "render/terms.h"
 #include "render/texture_steps.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
@@ -382,7 +383,8 @@ static void watch_smooth_normals(Render *r, bool look_out) {
 }
 
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
-    return !rey_boundary_chained(view) && rey_boundary_sees(sensor) && !view->has_media && !view->drops;
+    const bool through = view->has_media && rey_rides_gap(view);
+    return !rey_boundary_chained(view) && rey_boundary_sees(sensor) && !through && !view->drops;
 }
 
 rey_result rey_boundaries_begin(Render *r) {

@@ -2,6 +2,7 @@
 #include "render/motion.h"
 
 #include "bsdf/table.h"
+#include "render/boundary.h"
 #include "sensor/kinds.h"
 #include "shape/normals.h"
 #include "shape/shape.h"
@@ -131,7 +132,8 @@ static bool normals_follow(const Render *r, int64_t shape) {
 
 void rey_motion_settle(Render *r) {
     const SceneView *view = &r->scene->view;
-    r->job.rides = r->job.any_motion && view->has_media;
+    const bool turns = r->job.any_normals && rey_turning_known(view, r->plan.sensor);
+    r->job.rides = view->has_media && (r->job.any_motion || turns);
     int32_t *volume_at = (int32_t *)(uintptr_t)r->job.volume_at;
     for (int64_t i = 0; i < view->volumes_count && r->job.any_volumes; i++) {
         for (int64_t k = 0; k < view->volumes_count && view->volumes[i].to_world >= 0; k++) {

@@ -378,7 +378,8 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "the gradient of lights that hide (hide_emitters) within a participating medium, and of cameras that look "
                         "past them, does not exist yet: what the medium scatters jumps where the camera's ray passes such a light");
     }
-    if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection)) {
+    const bool points = r->job.any_motion || r->job.any_places || r->job.glides; // not normals alone
+    if (result == REY_OK && (r->faces & LIGHT_WITHIN) && selection_moves(r, selection) && points) {
         return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
                         "that move beside them, does not exist yet here: points next to a light, from which its light is "
