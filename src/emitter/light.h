@@ -173,17 +173,26 @@ KFN Vec3 light_direction_to_local(const SceneView *scene, const Light *l, Vec3 d
     return v3(r[0], r[1], r[2]);
 }
 
+// Gradients and normals of the light's space in the world: by A^-T.
+KFN Vec3 light_gradient_to_world(const SceneView *scene, const Light *l, Vec3 g) {
+    Float q[3];
+    for (int k = 0; k < 3; k++) {
+        q[k] = light_table(scene, l, k) * g.x + light_table(scene, l, 4 + k) * g.y + light_table(scene, l, 8 + k) * g.z;
+    }
+    return v3(q[0], q[1], q[2]);
+}
+
 // From the adjoint of y = A^-1 x to that of A: dA = -q y^T with q = A^-T dy, which is the adjoint of x.
 KFN Vec3 light_direction_to_local_adj(const SceneView *scene, const Light *l, int slot, Vec3 y, Vec3 dy, Sink *sink,
                                       Mask m) {
-    Float q[3];
+    Vec3 q = light_gradient_to_world(scene, l, dy);
+    Float rows[3] = {q.x, q.y, q.z};
     for (int k = 0; k < 3; k++) {
-        q[k] = light_table(scene, l, k) * dy.x + light_table(scene, l, 4 + k) * dy.y + light_table(scene, l, 8 + k) * dy.z;
-        light_place_adj(l, slot, 4 * k, -q[k] * y.x, sink, m);
-        light_place_adj(l, slot, 4 * k + 1, -q[k] * y.y, sink, m);
-        light_place_adj(l, slot, 4 * k + 2, -q[k] * y.z, sink, m);
+        light_place_adj(l, slot, 4 * k, -rows[k] * y.x, sink, m);
+        light_place_adj(l, slot, 4 * k + 1, -rows[k] * y.y, sink, m);
+        light_place_adj(l, slot, 4 * k + 2, -rows[k] * y.z, sink, m);
     }
-    return v3(q[0], q[1], q[2]);
+    return q;
 }
 
 // Host: what kinds derive from their parameters; false when a pose is singular.

@@ -10,17 +10,24 @@
 
 enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be blocked
 
-// Lanes of m whose shapes are of the kind null.
-KFN Mask null_lanes(const SceneView *scene, Int shape, Mask m) {
+static inline bool node_is_null(const BsdfNode *node) { return node->kind == BSDF_NULL; }
+static inline bool node_spreads(const BsdfNode *node) { return node->spreads; }
+static inline bool node_transmits(const BsdfNode *node) { return node->transmits; }
+
+// Lanes of m, all of which have a shape, whose functions are so.
+KFN Mask lanes_that(bool (*are)(const BsdfNode *node), const SceneView *scene, Int shape, Mask m) {
     Int groups = SHAPE_FIELD(scene, i_max(shape, i_set(0)), group);
-    Mask null = m_set(false);
+    Mask found = m_set(false);
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(groups, m_first(left));
         mine = left & mi_eq(groups, i_set(id));
-        null = null | (mine & m_set(scene->bsdfs[scene->groups[id].bsdf].kind == BSDF_NULL));
+        found = found | (mine & m_set(are(scene->bsdfs + scene->groups[id].bsdf)));
     }
-    return null;
+    return found;
 }
+
+// Lanes of m whose shapes are of the kind null.
+KFN Mask null_lanes(const SceneView *scene, Int shape, Mask m) { return lanes_that(node_is_null, scene, shape, m); }
 
 // What a ray meets where Embree says that it meets `hit`.
 static NOINLINE Hit hit_touching(const SceneView *scene, const Hit *hit, const Ray *ray, Mask m) {

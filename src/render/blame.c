@@ -116,6 +116,16 @@ bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind)) {
     return found;
 }
 
+bool rey_texture_reads(const SceneView *view, int32_t id, const Param *p) {
+    if (id < 0) {
+        return false;
+    }
+    const TextureNode *t = view->textures + id;
+    return p->texture == id || p->to_uv == id || (t->kind == TEXTURE_ATTRIBUTE && p->attribute >= 0) ||
+           (t->kind == TEXTURE_VOLUME && p->theta == view->volumes[t->volume].theta) ||
+           rey_texture_reads(view, t->child[0], p) || rey_texture_reads(view, t->child[1], p);
+}
+
 bool rey_is_volume(const SceneView *view, const TextureNode *t) {
     UNUSED(view);
     return t->kind == TEXTURE_VOLUME;

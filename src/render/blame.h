@@ -19,6 +19,8 @@ void rey_name_obstacle(const rey_scene *scene, const SensorRecord *sensor, char 
 bool rey_bsdf_holds(const SceneView *view, int32_t bsdf, bool (*is)(int kind));
 // Whether a texture, or one inside it, is of a sort.
 bool rey_texture_holds(const SceneView *view, int32_t texture, bool (*is)(const SceneView *view, const TextureNode *t));
+// Whether a texture, -1 = none, is a parameter, or reads one.
+bool rey_texture_reads(const SceneView *view, int32_t texture, const Param *p);
 bool rey_is_volume(const SceneView *view, const TextureNode *t);
 // Whether surfaces use some function of a sort.
 bool rey_bsdfs_used(const SceneView *view, bool (*are)(int kind));

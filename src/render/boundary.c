@@ -383,8 +383,8 @@ static void watch_smooth_normals(Render *r, bool look_out) {
 }
 
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor) {
-    const bool through = view->has_media && rey_rides_gap(view);
-    return !rey_boundary_chained(view) && rey_boundary_sees(sensor) && !through && !view->drops;
+    const bool known = !view->has_media || !rey_rides_gap(view);
+    return known && !rey_boundary_chained(view) && rey_boundary_sees(sensor) && !view->drops;
 }
 
 rey_result rey_boundaries_begin(Render *r) {

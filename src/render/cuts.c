@@ -94,7 +94,7 @@ const char *rey_cuts_gap(const rey_scene *scene, const SensorRecord *sensor, con
         const ShapeRecord *shape = view->shapes + i;
         bool cuts = rey_cuts_within(view, shape->bsdf) && (!turns || cuts_within_map(view, shape->bsdf, false));
         const char *gap = cuts && !rey_moves_border(view, p) ? gap_of_shape(view, shape, sharp, moves, p->camera >= 0) : NULL;
-        if (cuts && p->normals >= 0 && (view->has_media || !rey_turning_known(view, sensor))) {
+        if (cuts && p->normals >= 0 && !rey_turning_known(view, sensor)) {
             gap = "cut light off where vertex normals move, which is not known of smooth mirrors, glass, media and this sensor";
         }
         if (gap) {

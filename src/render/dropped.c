@@ -6,16 +6,6 @@
 #include "emitter/table.h"
 #include "render/blame.h"
 
-bool rey_texture_reads(const SceneView *view, int32_t id, const Param *p) {
-    if (id < 0) {
-        return false;
-    }
-    const TextureNode *t = view->textures + id;
-    return p->texture == id || p->to_uv == id || (t->kind == TEXTURE_ATTRIBUTE && p->attribute >= 0) ||
-           (t->kind == TEXTURE_VOLUME && p->theta == view->volumes[t->volume].theta) ||
-           rey_texture_reads(view, t->child[0], p) || rey_texture_reads(view, t->child[1], p);
-}
-
 // Whether a parameter belongs to thin glass, by whose coefficient paths pass, or to what it stands in.
 static bool gap_of_function(const SceneView *view, int32_t id, const Param *p) {
     const BsdfNode *bsdf = view->bsdfs + id;

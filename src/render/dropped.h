@@ -4,9 +4,6 @@
 
 #include "render/render_parts.h"
 
-// Whether a texture, -1 = none, is a parameter, or reads one.
-bool rey_texture_reads(const SceneView *view, int32_t texture, const Param *p);
-
 // Why the derivative by a parameter with these REY_TERM_ is not known, null where it is.
 const char *rey_dropped_gap(const SceneView *view, const Param *p, int terms);
 

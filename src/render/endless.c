@@ -4,7 +4,7 @@
 #include "bsdf/table.h"
 #include "emitter/emitter.h"
 #include "medium/table.h"
-#include "render/dropped.h"
+#include "render/blame.h"
 #include "render/motion.h"
 
 // Whether the medium around the sensor reaches up to the sky (walk.h, medium_beyond).

@@ -73,6 +73,8 @@ static double spot_tangent(const SceneView *view, const EmitterRecord *e) {
     return tan((double)view->theta[view->textures[e->slot[SLOT(Spot, cutoff_angle)]].theta] * 3.14159265358979323846 / 180);
 }
 
+static bool has_picture(const EmitterRecord *e) { return e->kind == EMITTER_PROJECTOR || e->kind == EMITTER_SPOT; }
+
 static Picture picture_of(const SceneView *view, int32_t light) {
     const EmitterRecord *e = view->emitters + light;
     if (e->kind == EMITTER_SPOT) {
@@ -95,12 +97,18 @@ static rey_result push_picture_line(rey_scene *scene, const Picture *picture, co
     return push_border(scene, borders, border_between(&scene->view, picture->light, picture->slot, 1, a, b));
 }
 
+// Whether a light is a projector whose picture does not end black.
+static bool has_sides(const SceneView *view, int32_t light) {
+    const EmitterRecord *e = view->emitters + light;
+    return e->kind == EMITTER_PROJECTOR && ends_lit(view, view->textures + e->slot[SLOT(Projector, irradiance)]);
+}
+
 // Where a projector's picture ends.
 static rey_result find_sides(rey_scene *scene, int32_t light, Array *borders) {
     static const double corners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
     const Picture picture = picture_of(&scene->view, light);
     rey_result result = REY_OK;
-    for (int k = 0; k < 4 && result == REY_OK && ends_lit(&scene->view, scene->view.textures + picture.texture); k++) {
+    for (int k = 0; k < 4 && result == REY_OK; k++) {
         result = push_picture_line(scene, &picture, corners[k], corners[k + 1], borders);
     }
     return result;
@@ -155,20 +163,20 @@ static rey_result find_borders(rey_scene *scene, Array *borders) {
     const SceneView *view = &scene->view;
     rey_result result = REY_OK;
     for (int32_t i = 0; i < view->emitters_count && result == REY_OK; i++) {
-        const EmitterRecord *e = view->emitters + i;
-        const bool projector = e->kind == EMITTER_PROJECTOR;
-        result = projector                        ? find_sides(scene, i, borders)
-                 : rey_light_is_abrupt(view, e) ? find_cone(scene, i, borders)
-                                                  : REY_OK;
-        result = result == REY_OK && (projector || e->kind == EMITTER_SPOT) ? find_lines(scene, i, borders) : result;
+        if (has_sides(view, i)) {
+            result = find_sides(scene, i, borders);
+        } else if (rey_light_is_abrupt(view, view->emitters + i)) {
+            result = find_cone(scene, i, borders);
+        }
+        result = result == REY_OK && has_picture(view->emitters + i) ? find_lines(scene, i, borders) : result;
     }
     return result;
 }
 
-static rey_result push_record(rey_scene *scene, StepRecord step, Array *steps) {
+static rey_result push_record(rey_scene *scene, TextureStep step, Array *steps) {
     StepRecord *one = rey_array_push(scene->ctx, steps, sizeof *one, 1);
     if (one) {
-        *one = step;
+        *one = rey_step_record(&step);
     }
     return one ? REY_OK : REY_ERROR_MEMORY;
 }
@@ -176,17 +184,13 @@ static rey_result push_record(rey_scene *scene, StepRecord step, Array *steps) {
 // The sides of a projector's picture, and the lines along which it or a spot's jumps.
 static rey_result push_picture_records(rey_scene *scene, int32_t light, Array *steps) {
     const SceneView *view = &scene->view;
-    const int32_t texture = picture_of(view, light).texture;
-    const bool ends = view->emitters[light].kind == EMITTER_PROJECTOR && ends_lit(view, view->textures + texture);
     Array lines = {0};
-    rey_result result = rey_light_steps(scene, texture, &lines);
-    for (int k = 0; k < 2 && result == REY_OK && ends; k++) {
-        result = push_record(scene, (StepRecord){.u = k == 0, .v = k == 1, .high = 1, .sort = STEP_LINES, .at = -1}, steps);
+    rey_result result = rey_light_steps(scene, picture_of(view, light).texture, &lines);
+    for (int k = 0; k < 2 && result == REY_OK && has_sides(view, light); k++) {
+        result = push_record(scene, (TextureStep){.sort = STEP_LINES, .at = -1, .u = k == 0, .v = k == 1, .high = 1}, steps);
     }
     for (size_t i = 0; i < lines.count && result == REY_OK; i++) {
-        const TextureStep *s = &ARRAY_AT(lines, TextureStep, i);
-        result = push_record(scene, (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high,
-                                                 (float)s->scale, STEP_LINES, -1}, steps);
+        result = push_record(scene, ARRAY_AT(lines, TextureStep, i), steps);
     }
     rey_array_free(scene->ctx, &lines);
     return result;
@@ -197,17 +201,17 @@ rey_result rey_beam_records(rey_scene *scene, Array *steps, Array *beams) {
     rey_result result = REY_OK;
     for (int32_t i = 0; i < view->emitters_count && result == REY_OK; i++) {
         const EmitterRecord *e = view->emitters + i;
-        const bool picture = e->kind == EMITTER_PROJECTOR || e->kind == EMITTER_SPOT;
         BeamRecord beam = {.light = i, .first = (int32_t)steps->count, .cone = rey_light_is_abrupt(view, e)};
-        result = picture ? push_picture_records(scene, i, steps) : REY_OK;
+        result = has_picture(e) ? push_picture_records(scene, i, steps) : REY_OK;
         beam.end = (int32_t)steps->count;
-        BeamRecord *one = result == REY_OK && (beam.cone || beam.end > beam.first)
-                              ? rey_array_push(scene->ctx, beams, sizeof *one, 1)
-                              : &beam;
-        result = one ? result : REY_ERROR_MEMORY;
-        if (one) {
-            *one = beam;
+        if (result != REY_OK || (!beam.cone && beam.end == beam.first)) {
+            continue;
         }
+        BeamRecord *one = rey_array_push(scene->ctx, beams, sizeof *one, 1);
+        if (!one) {
+            return REY_ERROR_MEMORY;
+        }
+        *one = beam;
     }
     return result;
 }

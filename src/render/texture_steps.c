@@ -268,6 +268,10 @@ rey_result rey_light_steps(rey_scene *scene, int32_t texture, Array *steps) {
     return add_texture(&s, texture, false);
 }
 
+StepRecord rey_step_record(const TextureStep *s) {
+    return (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high, (float)s->scale, s->sort, s->at};
+}
+
 rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at) {
     Array steps = {0};
     rey_result result = rey_texture_steps(scene, to_uv_at, &steps);
@@ -278,9 +282,7 @@ rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, A
         for (size_t i = 0; at && i <= count; i++) {
             at[i] = (int32_t)k;
             for (; k < steps.count && ARRAY_AT(steps, TextureStep, k).shape == (int32_t)i; k++) {
-                const TextureStep *s = &ARRAY_AT(steps, TextureStep, k);
-                to[k] = (StepRecord){(float)s->u, (float)s->v, (float)s->offset, (float)s->low, (float)s->high, (float)s->scale,
-                                     s->sort, s->at};
+                to[k] = rey_step_record(&ARRAY_AT(steps, TextureStep, k));
             }
         }
         result = at ? REY_OK : REY_ERROR_MEMORY;

@@ -8,6 +8,8 @@
 rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *steps);
 // Appends the lines of the picture of a light that is no surface, over the unit square. No shape has them.
 rey_result rey_light_steps(rey_scene *scene, int32_t texture, Array *steps);
+// A step as kernels read it.
+StepRecord rey_step_record(const TextureStep *s);
 // The same as the first for kernels: an Array of StepRecord, and one of int32_t: of every shape its first step, and of none the
 // end. Both stay empty where nothing jumps.
 rey_result rey_texture_step_records(rey_scene *scene, const int32_t *to_uv_at, Array *records, Array *step_at);

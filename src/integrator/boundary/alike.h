@@ -71,15 +71,3 @@ static Mask lines_share(const SceneView *scene, const Hit *a, const Hit *b, Mask
     }
     return m & (one | (m_any(apart) ? triangles_join(scene, a, b, apart) : apart));
 }
-
-// Lanes of m whose surfaces scatter into many directions.
-static Mask lanes_spread(const SceneView *scene, const Hit *hit, Mask m) {
-    Mask spreads = m_set(false);
-    for (Mask left = m; m_any(left);) {
-        int32_t id;
-        Hit h;
-        Mask mine = take_group(scene, hit, &left, &id, &h);
-        spreads = scene->bsdfs[scene->groups[id].bsdf].spreads ? spreads | mine : spreads;
-    }
-    return spreads;
-}

@@ -1,5 +1,4 @@
-// beam.h: between which points of a surface the light of a spot ends abruptly, or that of a projector ends or jumps
-// (render/light_borders.h).
+// beam.h: between which points of a surface the light of a spot or a projector ends abruptly or jumps (render/light_borders.h).
 #pragma once
 
 #include "emitter/emitter.h"
@@ -72,14 +71,10 @@ static NOINLINE Mask beams_part(const SceneView *scene, const BoundaryJob *b, Ve
         const EmitterRecord *e = scene->emitters + beam->light;
         Light l = light_alone(e, i_set(beam->light));
         BeamPoints p = beam_points(scene, &l, from, to);
-        Vec3 local, row[3];
-        Mask found = beam_parts(b, beam, &p, m, &local);
-        for (int k = 0; k < 3; k++) { // by the inverse pose, transposed
-            row[k] = v3(light_table(scene, &l, 4 * k), light_table(scene, &l, 4 * k + 1), light_table(scene, &l, 4 * k + 2));
-        }
-        Vec3 n = v3_madd(v3_madd(v3_scale(row[0], local.x), local.y, row[1]), local.z, row[2]);
+        Vec3 n;
+        Mask found = beam_parts(b, beam, &p, m, &n);
         border->light = i_select(found, i_set(beam->light), border->light);
-        border->normal = v3_select(found, v3_normalize(n), border->normal);
+        border->normal = v3_select(found, v3_normalize(light_gradient_to_world(scene, &l, n)), border->normal);
         m = m & ~found;
     }
     return mi_lt(i_set(-1), border->light);

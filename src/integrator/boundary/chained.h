@@ -50,8 +50,7 @@ static Mask chained_between(Tracer *t, const BoundaryJob *b, const Segment *s, V
 static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind, Int number, Segments *q, Mask m) {
     const EdgePoint *e = &s->edge;
     int32_t at = q->count;
-    Float c = v3_dot(e->across[0], e->across[1]), rcp = f_safe_rcp(1.0f - c * c);
-    Float y = (v3_dot(s->n, e->across[1]) - c * v3_dot(s->n, e->across[0])) * rcp;
+    Float y = part_along(s->n, e->across[1], e->across[0]);
     Vec3 other = v3_select(e->meeting, v3_scale(e->across[1], -s->weight * y), v3_zero());
     v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
     v3_compress(q->dx + at, q->dy + at, q->dz + at, s->d, m);

@@ -257,11 +257,10 @@ static Mask crossing_beam(const Tracer *t, const BoundaryJob *b, const Ends *e, 
         return m_set(false);
     }
     m = m & mi_eq(e->behind[0], e->behind[1]);
-    m = lines_share(t->scene, e->hit, e->hit + 1, m);
-    m = beams_part(t->scene, b, e->hit[0].p, e->hit[1].p, lanes_spread(t->scene, e->hit, m), &border);
+    m = lanes_that(node_spreads, t->scene, e->hit->shape, lines_share(t->scene, e->hit, e->hit + 1, m));
+    m = beams_part(t->scene, b, e->hit[0].p, e->hit[1].p, m, &border);
     Vec3 own = miss->normal, n = v3_normalize(v3_cross(e->d[0], v3_cross(own, border.normal)));
-    Float cosine = v3_dot(own, border.normal), rcp = f_safe_rcp(1.0f - cosine * cosine);
-    Float x = (v3_dot(n, own) - cosine * v3_dot(n, border.normal)) * rcp;
+    Float x = part_along(n, own, border.normal);
     c->light = i_select(m, border.light, c->light);
     c->n = v3_select(m, v3_scale(own, x), c->n);
     c->n_other = v3_select(m, v3_sub(v3_scale(own, x), n), c->n_other);

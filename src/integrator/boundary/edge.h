@@ -288,6 +288,12 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     return out;
 }
 
+// x in n = x a + y b, of unit vectors in one plane.
+KFN Float part_along(Vec3 n, Vec3 a, Vec3 b) {
+    Float c = v3_dot(a, b);
+    return (v3_dot(n, a) - c * v3_dot(n, b)) * f_safe_rcp(1.0f - c * c);
+}
+
 // The middle of the surfaces of round edges, and the point itself of others.
 KFN Vec3 edge_reference(const EdgePoint *e) { return v3_select(e->round, e->middle, e->p); }
 

@@ -38,14 +38,14 @@ static void meeting_segment(Tracer *t, const BoundaryJob *b, Mask m, Int number,
     Mask first = which | border;
     Vec3 d = warp_uniform_sphere(rng_2d(&key, DIMENSION_SEGMENT_END)), across = v3_cross(d, e.tangent);
     Vec3 own = v3_select(first, e.across[0], e.across[1]), other = v3_select(first, e.across[1], e.across[0]);
-    Float length = v3_length(across), c = v3_dot(own, other), r = f_safe_rcp(1.0f - c * c);
+    Float length = v3_length(across);
     // The visible half of the surface is on the viewer's side of the other one: along `other`, less its part along `own`.
     Float side = f_copysign(f_set(1), f_select(border, f_select(which, f_set(1), f_set(-1)), -v3_dot(d, other)));
-    Vec3 half = v3_scale(v3_madd(other, -c, own), side);
+    Vec3 half = v3_scale(v3_madd(other, -v3_dot(own, other), own), side);
     Vec3 n = v3_scale(across, f_safe_rcp(length));
     n = v3_scale(n, f_copysign(f_set(1), v3_dot(n, half)));
     Float weight = length * (8 * PI) * f_safe_rcp(e.probability);
-    Float x = (v3_dot(n, own) - c * v3_dot(n, other)) * r, y = (v3_dot(n, other) - c * v3_dot(n, own)) * r;
+    Float x = part_along(n, own, other), y = part_along(n, other, own);
     Float step = interaction_step(e.p);
     Ray ray = {v3_madd(e.p, -step, d), v3_neg(d), f_set(INFINITY)};
     m = m & m_finite(weight) & m_finite(x + y) & m_gt(weight, f_set(0)) & m_gt(e.probability, f_set(0));

@@ -95,7 +95,8 @@ static Int lines_part(const Tracer *t, const BoundaryJob *job, const Sightline *
         same = same & ~fields_part(t->scene, job, a->hit[i].shape, a->uv[i], b->uv[i], met, &unused, &step);
         if (job->beam_count > 0) {
             BeamBorder border;
-            same = same & ~beams_part(t->scene, job, a->hit[i].p, b->hit[i].p, lanes_spread(t->scene, a->hit + i, met), &border);
+            met = lanes_that(node_spreads, t->scene, a->hit[i].shape, met); // others do not show it
+            same = same & ~beams_part(t->scene, job, a->hit[i].p, b->hit[i].p, met, &border);
         }
         level = i_select(m & ~same, i_set(i), level);
         Mask alike = mi_eq(a->lobe[i], b->lobe[i]);

@@ -26,14 +26,8 @@ static Hit rims_meet(Tracer *t, Ray ray, const SampleKey *key, Spec *flux, Mask 
     for (uint32_t i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(m); i++) {
         t->job->rays += scene->has_media ? 0 : m_count(m);
         Hit hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
-        Mask opens = m_set(false);
         met = hit_select(m, &hit, &met);
-        for (Mask left = scene->through ? m & mi_lt(i_set(-1), hit.shape) : m_set(false); m_any(left);) {
-            int32_t id;
-            Hit h;
-            Mask mine = take_group(scene, &hit, &left, &id, &h);
-            opens = scene->bsdfs[scene->groups[id].bsdf].transmits ? opens | mine : opens;
-        }
+        Mask opens = lanes_that(node_transmits, scene, hit.shape, m & mi_lt(i_set(-1), hit.shape) & m_set(scene->through));
         *flux = spec_select(opens, spec_scale(*flux, f_set(2)), *flux);
         ray.o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
         m = opens & m_lt(rng_1d(key, DIMENSION_RIM_PASS + i), f_set(0.5f));
