@@ -12,7 +12,6 @@ enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be bl
 
 static inline bool node_is_null(const BsdfNode *node) { return node->kind == BSDF_NULL; }
 static inline bool node_spreads(const BsdfNode *node) { return node->spreads; }
-static inline bool node_transmits(const BsdfNode *node) { return node->transmits; }
 
 // Lanes of m, all of which have a shape, whose functions are so.
 KFN Mask lanes_that(bool (*are)(const BsdfNode *node), const SceneView *scene, Int shape, Mask m) {

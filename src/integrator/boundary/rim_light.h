@@ -27,7 +27,10 @@ static Hit rims_meet(Tracer *t, Ray ray, const SampleKey *key, Spec *flux, Mask 
         t->job->rays += scene->has_media ? 0 : m_count(m);
         Hit hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
         met = hit_select(m, &hit, &met);
-        Mask opens = lanes_that(node_transmits, scene, hit.shape, m & mi_lt(i_set(-1), hit.shape) & m_set(scene->through));
+        Mask opens = m & mi_lt(i_set(-1), hit.shape) & m_set(scene->through), may;
+        Vec3 past = ray.o;
+        Spec pass = walk_pass(t, &hit, ray.d, opens, &past, &may, NULL);
+        opens = may & m_gt(spec_max(pass), f_set(0));
         *flux = spec_select(opens, spec_scale(*flux, f_set(2)), *flux);
         ray.o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
         m = opens & m_lt(rng_1d(key, DIMENSION_RIM_PASS + i), f_set(0.5f));
