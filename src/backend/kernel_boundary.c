@@ -65,7 +65,9 @@ static void run_mirrored(Tracer *t, const BoundaryJob *b, const FilterTable *fil
         }
         half = (q->count + LANES - 1) / LANES * LANES;
         curves_start(t, q, b->first + at, half);
+        t->on_lines = true;
         path_forward(t, begin);
+        t->on_lines = false;
         pairs_adjoint(t, b, filter, q->count);
         (turned ? facing_views_finish : curves_finish)(t, b, q, sink, half);
         pairs_splat(t, b, q->count);

@@ -238,10 +238,20 @@ static NOINLINE BorderSurface border_surface(const Tracer *t, const RecordBatch 
     return s;
 }
 
+// Lanes of m whose paths went on along their rays.
+KFN Mask border_passed(const Tracer *t, const RecordBatch *batch, Mask m) {
+    return m & lobe_is(i_load(t->ws.records.lobe + batch->first), LOBE_NULL);
+}
+
 static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     BorderSurface s = border_surface(t, batch);
-    const int sides = t->scene->bsdfs[s.group->bsdf].kind == BSDF_NULL ? 2 : 1; // behind others, other rays begin
-    for (int side = 0; side < sides; side++) {
+    // Behind others, other rays begin.
+    const bool passed = t->scene->bsdfs[s.group->bsdf].kind == BSDF_NULL, veil = group_is_veil(t, s.group);
+    for (int side = 0; side < (passed || veil ? 2 : 1); side++) {
+        if (veil && side) {
+            s.m = border_passed(t, batch, s.m);
+            s.beta = spec_mul(s.beta, spec_load(t->ws.records.weight, batch->first));
+        }
         for (Mask left = s.m & mi_lt(i_set(-1), s.medium[side]), mine; m_any(left); left = left & ~mine) {
             int32_t id = i_lane(s.medium[side], m_first(left));
             mine = left & mi_eq(s.medium[side], i_set(id));

@@ -26,7 +26,7 @@ static NOINLINE void passed_surfaces_adj(const Tracer *t, const Walk *walk, int3
         int32_t id = i_lane(groups, m_first(left));
         const Group *group = scene->groups + id;
         mine = left & mi_eq(groups, i_set(id));
-        bool moves = t->job->any_borders && (t->job->live[id] & LIVE_MOTION);
+        bool moves = (t->job->any_borders || t->job->rides) && (t->job->live[id] & LIVE_MOTION);
         if (!moves && !turn) {
             continue;
         }
@@ -151,7 +151,7 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
 static void passage_move_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, const SampleKey *key, Turn *turn,
                              Sink *sink) {
     dt = spec_mul(dt, transmittance);
-    for (int32_t i = 0; i < walk->count && (t->job->any_borders || turn); i++) {
+    for (int32_t i = 0; i < walk->count && (t->job->any_borders || t->job->rides || turn); i++) {
         passed_surfaces_adj(t, walk, i, dt, turn, sink);
     }
     for (int32_t i = 0; i < walk->segments; i++) {

@@ -171,7 +171,8 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     Vec3 o = interaction_offset(si, w.d);
     Int medium = medium_behind(group, si->ng, w.d, v->medium);
     if (scene->has_media && m_any(w.m & w.passed)) {
-        o = v3_select(w.passed, interaction_behind(si, w.d), o);
+        const bool border = scene->bsdfs[group->bsdf].kind == BSDF_NULL;
+        o = v3_select(w.passed, interaction_past(si, w.d, border), o);
         Int through = medium_passed(t, group, si, &v->hit, w.d, v->medium, w.m & w.passed);
         medium = i_select(w.passed, through, medium);
     }
@@ -377,7 +378,8 @@ static void fork_air(Tracer *t) {
 // those that a picture's alpha shows, are looked at one by one.
 static bool path_takes_legs(const Tracer *t) {
     const SceneView *scene = t->scene;
-    return scene->has_media && scene->open_apart && !t->derivative && !t->fork && !scene->hide_emitters && !scene->solid;
+    const bool alone = t->derivative || t->fork || t->on_lines;
+    return scene->has_media && scene->open_apart && !alone && !scene->hide_emitters && !scene->solid;
 }
 
 // Of those as many as a packet's lanes usually meet in a row.

@@ -337,7 +337,7 @@ static void path_backward(Tracer *t, int32_t count) {
             s.attached = attached;
             surface_sweep(t, batch, &s, finite, live_passing, &p, &sink);
         }
-        ride_end_sweep(t, batch, l, finite, &sink);
+        ride_end_sweep(t, batch, l, suffix, finite, &sink);
     }
     first_rays_end(t, count, &sink);
     job->faces |= sink.faces;

@@ -67,26 +67,41 @@ KFN void ride_flight(Tracer *t, const RecordBatch *batch, Int slot, Mask m) {
     }
 }
 
+// s a S + j in front of ends of rays (side 0) or behind them, and s.
+static NOINLINE Spec ride_side(const Tracer *t, const RecordBatch *batch, const BorderSurface *s, int side, Mask m,
+                               Spec *extinction) {
+    Spec sent = spec_zero();
+    *extinction = spec_zero();
+    for (Mask left = m & mi_lt(i_set(-1), s->medium[side]), mine; m_any(left); left = left & ~mine) {
+        int32_t id = i_lane(s->medium[side], m_first(left));
+        mine = left & mi_eq(s->medium[side], i_set(id));
+        Filling f = medium_filling(t, id, s->p[side], s->d);
+        Spec scattered = border_scattered(t, batch, side, s->slot, mine);
+        sent = spec_select(mine, spec_add(spec_mul(f.extinction, scattered), f.emission), sent);
+        *extinction = spec_select(mine, f.extinction, *extinction);
+    }
+    return sent;
+}
+
 // The ends of rays at a batch of surface vertices, from which `radiance` leaves. Adds what that asks of the rays to their drag.
-// What is attached there asks for the length of attached rays, what goes on along chains for where they slide.
-static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec radiance, Mask finite, Sink *sink) {
+// What is attached there asks for the length of attached rays, what goes on along chains for where they slide. What passes masks
+// and thin glass, some of `behind`, stays on its line, which is shorter behind them by as much as it is longer before them.
+static NOINLINE void ride_end_sweep(Tracer *t, const RecordBatch *batch, Spec radiance, Spec behind, Mask finite, Sink *sink) {
     if (!t->job->rides) {
         return;
     }
     BorderSurface s = border_surface(t, batch);
     Mask slides = records_slide(t, batch->first);
-    Spec gain = spec_zero(), extinction = gain, lost;
+    Spec extinction, lost, gain = ride_side(t, batch, &s, 0, s.m, &extinction);
     Spec attached = spec_zero_unless(~slides, spec_gather(t->ws.attached, s.slot));
-    for (Mask left = s.m & mi_lt(i_set(-1), s.medium[0]), mine; m_any(left); left = left & ~mine) {
-        int32_t id = i_lane(s.medium[0], m_first(left));
-        mine = left & mi_eq(s.medium[0], i_set(id));
-        Filling f = medium_filling(t, id, s.p[0], s.d);
-        Spec scattered = border_scattered(t, batch, 0, s.slot, mine);
-        gain = spec_select(mine, spec_add(spec_mul(f.extinction, scattered), f.emission), gain);
-        extinction = spec_select(mine, f.extinction, extinction);
-    }
     gain = spec_sub(gain, spec_mul(extinction, spec_sub(radiance, attached)));
     lost = spec_mul(extinction, attached);
+    if (group_is_veil(t, s.group)) {
+        Mask passed = border_passed(t, batch, s.m);
+        Spec sent = ride_side(t, batch, &s, 1, passed, &extinction), weight = spec_load(t->ws.records.weight, batch->first);
+        sent = spec_mul(weight, spec_sub(sent, spec_mul(extinction, behind)));
+        gain = spec_sub(gain, spec_zero_unless(passed, sent));
+    }
     Mask m = s.m & finite & m_finite(spec_sum(gain) + spec_sum(lost));
     for (int c = 0; c < drives(t); c++) {
         Spec worth = spec_mul(slot_adjoint(t, s.slot, c), s.beta);

@@ -52,6 +52,7 @@ typedef struct Tracer {
     Fork *fork;              // or null
     int32_t *lobes;          // per slot, of the last vertex of a particle; or null
     bool placed;             // the paths' first vertices are known
+    bool on_lines;           // paths take the random numbers of lines of sight (sightline.h): what is passed counts as a bounce
     bool spares;             // lights are not selected: what vertices bring is found out from the first selected one on
     bool local;              // of surfaces nothing is recorded but what materials ask for
     bool bare;               // collisions count as if all of the extinction scattered, in media that have a sigma_s

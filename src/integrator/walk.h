@@ -141,7 +141,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &safe), t->floor);
         Vec3 wo = frame_to_local(&si.sh, d);
         pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
-        *o = v3_select(mine, medium ? interaction_behind(&si, d) : interaction_offset(&si, d), *o);
+        *o = v3_select(mine, interaction_past(&si, d, medium && scene->bsdfs[group->bsdf].kind == BSDF_NULL), *o);
         *may = *may | mine;
         if (medium) {
             *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);

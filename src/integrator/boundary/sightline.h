@@ -81,9 +81,6 @@ static NOINLINE Mask sightline_turn(Tracer *t, const SampleKey *key, int32_t i, 
         s->depth[i + 1] = i_select(turns & ~passes, s->depth[i] + 1, s->depth[i + 1]);
         s->through[i + 1] = spec_select(turns, spec_scale(spec_mul(s->through[i], f), f_safe_rcp(pdf)), s->through[i + 1]);
         Vec3 o = interaction_offset(&si, wo);
-        if (scene->has_media) { // in which paths that pass stay on their line
-            o = v3_select(lobe_is(b.lobe, LOBE_NULL), interaction_behind(&si, wo), o);
-        }
         ray->o = v3_select(turns, o, ray->o);
         ray->d = v3_select(turns, wo, ray->d);
         turned = turned | turns;
