@@ -224,7 +224,7 @@ static void collision_lights(Tracer *t, const Vertex *v, const Collision *c, con
     m = m & s.valid & m_gt(weight, f_set(0)) & (m_set(t->derivative) | m_gt(spec_max(l), f_set(0)));
     Ray ray;
     collision_shadow_ray(v->hit.p, s.d, s.distance, &ray);
-    append_shadows(t, &ray, l, v->slot, record, v->medium, m);
+    append_shadows(t, &ray, light, l, v->slot, record, v->medium, m);
     if (record >= 0) {
         record_light(t, record, light, &s, s.d, spec_set(f_zero_unless(m, weight)), f);
     }

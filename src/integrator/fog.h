@@ -84,6 +84,7 @@ typedef struct Fog {
     Int medium; // that it is in
     SampleKey key;
     bool past_lights; // that hide from the sensor, from which the ray comes
+    Float lead;       // behind the ray's origin, where the media that count begin
 } Fog;
 
 // Transmittance of a segment of shadow rays number `segment`, each in a medium of its own.

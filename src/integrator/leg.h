@@ -37,7 +37,22 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
 typedef struct LegDef {
     int most;      // surfaces that it may pass; where there are more, it ends at the next one
     bool emission, coherent;
+    Mask unveiled; // lanes that pass masks and thin glass or end there, with an even chance
 } LegDef;
+
+// Masks and thin glass that the lanes of m meet: lets a half of them pass, as leg_pass does.
+static NOINLINE Mask leg_unveil(const Tracer *t, const Hit *hit, Vec3 d, Float u, Mask m, Vec3 *o, Int *medium, Spec *weight) {
+    Mask may;
+    Vec3 past = *o;
+    Int beyond = *medium;
+    Spec pass = walk_pass(t, hit, d, m_set(false), m, &past, &may, &beyond);
+    Mask opens = may & m_gt(spec_max(pass), f_set(0)), passed = opens & m_lt(u, f_set(0.5f));
+    *o = v3_select(passed, past, *o);
+    *medium = i_select(passed, beyond, *medium);
+    *weight = spec_select(opens, spec_scale(*weight, f_set(2)), *weight);
+    *weight = spec_select(passed, spec_mul(*weight, pass), *weight);
+    return passed;
+}
 
 // What the ray meets first, `solid` the first surface that lets no light pass, however far away.
 KFN Hit leg_meet(const SceneView *scene, const Ray *ray, const Hit *solid, Mask m) {
@@ -92,6 +107,11 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
         leg.around = i_select(left, medium, leg.around);
         Int behind = medium;
         Mask passes = found & ~collides & m_set(i < def.most), passed = leg_pass(t, &hit, ray.d, passes, &ray.o, &behind);
+        if (m_any(def.unveiled & passes & ~passed)) {
+            const uint32_t dimension = MOST_SURFACES_IN_A_ROW * (MOST_COLLISIONS + 1) + 1 + (uint32_t)i;
+            Mask veiled = def.unveiled & passes & ~passed;
+            passed = passed | leg_unveil(t, &hit, ray.d, rng_1d(key, dimension), veiled, &ray.o, &behind, &leg.weight);
+        }
         Mask met = found & ~collides & ~passed;
         medium = i_select(begun, behind, medium);
         from = v3_select(passed & begun, hit.p, from);
@@ -104,8 +124,10 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
     return leg;
 }
 
-KFN Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, Spec weight, const SampleKey *key, Mask m) {
-    return leg_follow(t, (LegDef){.most = MOST_SURFACES_IN_A_ROW}, ray, from, medium, weight, key, m);
+// unveiled: lanes that pass masks and thin glass or end there, with an even chance.
+KFN Leg leg_trace(Tracer *t, Ray ray, Vec3 from, Int medium, const SampleKey *key, Mask unveiled, Mask m) {
+    const LegDef def = {.most = MOST_SURFACES_IN_A_ROW, .unveiled = unveiled};
+    return leg_follow(t, def, ray, from, medium, spec_set(f_set(1)), key, m);
 }
 
 // What trace_stage and flight_stage do, for such ways of paths.

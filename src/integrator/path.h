@@ -100,7 +100,7 @@ KFN void connect_lights(Tracer *t, const Group *group, const Vertex *v, const In
     Mask m = drawn & s.valid & useful & m_gt(weight, f_set(0));
     Ray ray;
     shadow_ray(si, s.d, s.distance, &ray);
-    append_shadows(t, &ray, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
+    append_shadows(t, &ray, light, l, v->slot, record, medium_behind(group, si->ng, s.d, v->medium), m);
     if (record >= 0 && v->live) {
         Spec brings = spec_zero_unless(m, t->spares ? spec_scale(radiance, weight) : spec_set(weight));
         record_light(t, record, light, &s, v->local ? wo : s.d, brings, f);
@@ -290,13 +290,13 @@ static void shadow_stage(Tracer *t, int32_t bounce) {
         ray.o = v3(f_load(q->ox + k), f_load(q->oy + k), f_load(q->oz + k));
         ray.d = v3(f_load(q->dx + k), f_load(q->dy + k), f_load(q->dz + k));
         ray.tmax = f_load(q->tmax + k);
-        Mask blocked;
+        Mask blocked, end = t->job->veils ? veils_end(t, i_select(m, i_load(q->light + k), i_set(0))) : m_set(false);
         Fog fog = {.past_lights = false};
         if (media) {
             fog.medium = i_select(m, i_load(q->medium + k), i_set(-1));
             fog.key = stream_key(t, i_select(m, i_load(q->slot + k), i_set(0)), bounce, STREAM_SHADOW);
         }
-        Spec transmittance = t->scene->through ? walk_transmittance(t, ray, m, media ? &fog : NULL, &blocked, NULL)
+        Spec transmittance = t->scene->through ? walk_transmittance(t, ray, end, m, media ? &fog : NULL, &blocked, NULL)
                                                : trace_transmittance(t->scene, &ray, m);
         Spec l = spec_mul(spec_load(q->radiance, k), transmittance);
         Mask open = m & m_gt(spec_max(transmittance), f_set(0));

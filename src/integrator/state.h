@@ -21,10 +21,11 @@ enum {
 #define PATH_INTS(I) I(slot) I(medium) I(depth) I(begins)
 enum { BEGINS_AT_SURFACE, BEGINS_IN_AIR, BEGINS_AT_VEIL };
 
-// A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom.
+// A shadow ray: ray, what it brings if nothing is in the way (in derivatives: without the throughput before it), whom, and, where
+// some of them end at what others pass (PathJob.veils), the light.
 #define SHADOW_FLOATS(F) F(ox) F(oy) F(oz) F(dx) F(dy) F(dz) F(tmax)
 #define SHADOW_SPECS(S) S(radiance)
-#define SHADOW_INTS(I) I(slot) I(record) I(medium)
+#define SHADOW_INTS(I) I(slot) I(record) I(medium) I(light)
 
 // A recorded vertex: its tag, the hit, the incoming ray, throughput before it, the MIS weight of its own emission,
 // the light sample (direction, where the light's texture was read, distance, transmittance over density, value of the

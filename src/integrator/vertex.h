@@ -172,8 +172,8 @@ KFN void shadow_ray(const Interaction *si, Vec3 d, Float distance, Ray *ray) {
     ray->tmax = length * (1.0f - SHADOW_SHORT);
 }
 
-// Appends the shadow rays of m: what they bring, to whom, and the media that they start in.
-KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t record, Int medium, Mask m) {
+// Appends the shadow rays of m to lights: what they bring, to whom, and the media that they start in.
+KFN void append_shadows(Tracer *t, const Ray *ray, Int light, Spec l, Int slot, int32_t record, Int medium, Mask m) {
     if (t->derivative && t->shadows_later) {
         return;
     }
@@ -187,6 +187,9 @@ KFN void append_shadows(Tracer *t, const Ray *ray, Spec l, Int slot, int32_t rec
     i_compress(q->record + at, i_iota() + record, m);
     if (t->scene->has_media) {
         i_compress(q->medium + at, medium, m);
+    }
+    if (t->job->veils) {
+        i_compress(q->light + at, light, m);
     }
     t->shadow_count += m_count(m);
 }

@@ -19,10 +19,16 @@ typedef struct Walk {
     Spec clear;                        // what the media let through
 } Walk;
 
-// Whether a surface lets light pass that shadow rays do not bring (PathJob.veils): paths that go on through it count as chains do.
+// Whether a surface lets light pass of lights that paths meet by chance, which shadow rays do not bring (PathJob.veils): paths that
+// go on through it count as chains do.
 KFN bool group_is_veil(const Tracer *t, const Group *group) {
     const BsdfNode *bsdf = t->scene->bsdfs + group->bsdf;
     return t->job->veils && bsdf->transmits && !(t->scene->has_media && bsdf->kind == BSDF_NULL);
+}
+
+// Lanes whose shadow rays end at such surfaces.
+KFN Mask veils_end(const Tracer *t, Int light) {
+    return t->job->veils ? ~light_is_delta(t->scene, i_max(light, i_set(0))) : m_set(false);
 }
 
 // The hit, with a shape of this group also in the lanes that hit another one.
@@ -121,9 +127,10 @@ static NOINLINE Int medium_around(const Tracer *t, Vec3 o, Vec3 d, Mask m) {
     return medium;
 }
 
-// What the surfaces that the lanes of m hit do to light that passes along d, and where the ray goes on behind them.
+// What the surfaces that the lanes of m hit do to light that passes along d, and where the ray goes on behind them. end: lanes that
+// end at veils.
 // `may` becomes the lanes whose surface could let light through, *medium what they go on in (null: there are no media).
-static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, Vec3 *o, Mask *may, Int *medium) {
+static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask end, Mask m, Vec3 *o, Mask *may, Int *medium) {
     const SceneView *scene = t->scene;
     Int groups = SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), group);
     Spec pass = spec_zero();
@@ -133,7 +140,8 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
         Mask mine = left & mi_eq(groups, i_set(id));
         const Group *group = scene->groups + id;
         left = left & ~mine;
-        if (!scene->bsdfs[group->bsdf].transmits || group_is_veil(t, group)) {
+        mine = group_is_veil(t, group) ? mine & ~end : mine;
+        if (!scene->bsdfs[group->bsdf].transmits || !m_any(mine)) {
             continue;
         }
         Hit safe = walk_hit(hit, mine);
@@ -153,12 +161,12 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, 
 // Shadow rays end a little before their lights; the media do not. By what part of the ray's length.
 #define SHADOW_SHORT 9e-4f
 
-// Transmittance of the rays of m. blocked becomes the lanes that no choice of parameters would open; walk may be null, and
-// so is fog where there are no media.
-static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Mask *blocked, Walk *walk) {
+// Transmittance of the rays of m. end: those that end at veils; blocked becomes the lanes that no choice of parameters would open;
+// walk may be null, and so is fog where there are no media.
+static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask end, Mask m, Fog *fog, Mask *blocked, Walk *walk) {
     Spec transmittance = spec_set(f_zero_unless(m, f_set(1)));
     const Float beyond = ray.tmax * (SHADOW_SHORT / (1.0f - SHADOW_SHORT));
-    Float skip = f_set(0); // of the medium, by the step off the surface before
+    Float skip = fog ? -fog->lead : f_set(0); // of the medium, by the step off the surface before
     const bool past_lights = fog && fog->past_lights;
     // What lets no light pass is asked first, and need not be met again behind each surface that does.
     const bool apart = t->scene->open_apart && !past_lights && !(fog && t->scene->borders_touch);
@@ -176,7 +184,7 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Ma
         if (!m_any(found) && !fog) {
             break;
         }
-        Spec pass = walk_pass(t, &hit, ray.d, found, &o, &may, fog ? &fog->medium : NULL);
+        Spec pass = walk_pass(t, &hit, ray.d, end, found, &o, &may, fog ? &fog->medium : NULL);
         may = may & m_set(i < MOST_SURFACES_IN_A_ROW);
         if (walk && i < MOST_SURFACES_IN_A_ROW) {
             walk->hit[i] = hit;
@@ -187,7 +195,7 @@ static NOINLINE Spec walk_transmittance(Tracer *t, Ray ray, Mask m, Fog *fog, Ma
         if (fog) {
             Mask open = left & (may | ~found);
             Ray piece = {v3_madd(ray.o, -skip, ray.d), ray.d, ray.tmax};
-            Float length = f_select(found, v3_dot(v3_sub(hit.p, ray.o), ray.d), ray.tmax + beyond) + skip;
+            Float length = f_max(f_select(found, v3_dot(v3_sub(hit.p, ray.o), ray.d), ray.tmax + beyond) + skip, f_set(0));
             Spec clear = fog_transmittance(t, fog, medium, &piece, length, i, open);
             skip = f_zero_unless(found, v3_dot(v3_sub(o, hit.p), ray.d));
             transmittance = spec_select(open, spec_mul(transmittance, clear), transmittance);

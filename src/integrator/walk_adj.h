@@ -55,6 +55,7 @@ static NOINLINE void passage_find(Tracer *t, const RecordBatch *batch, const Ray
     Mask blocked;
     Fog fog = {.past_lights = false};
     Walk *walk = &p->walk;
+    const Int light = i_load(r->light + at);
     if (p->found) {
         return;
     }
@@ -65,9 +66,9 @@ static NOINLINE void passage_find(Tracer *t, const RecordBatch *batch, const Ray
         fog.medium = medium;
         fog.key = stream_key(t, slot, batch->bounce, STREAM_SHADOW);
     }
-    p->transmittance = walk_transmittance(t, *ray, m, t->scene->has_media ? &fog : NULL, &blocked, walk);
+    p->transmittance = walk_transmittance(t, *ray, veils_end(t, light), m, t->scene->has_media ? &fog : NULL, &blocked, walk);
     p->open = m & ~blocked;
-    p->light_value = lights_eval(t->scene, i_load(r->light + at), m, (Vec2){f_load(r->lu + at), f_load(r->lv + at)},
+    p->light_value = lights_eval(t->scene, light, m, (Vec2){f_load(r->lu + at), f_load(r->lv + at)},
                                  i_load(r->lprim + at), f_load(r->ldist + at));
     p->found = true;
 }

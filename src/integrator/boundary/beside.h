@@ -17,11 +17,11 @@ static NOINLINE Spec beside_light(Tracer *t, Int light, Vec3 x, Vec3 away, Vec3 
     LightSample l = lights_sample(scene, light, m, x, (Vec2){f_set(0.5f), f_set(0.5f)}, &arriving);
     Int medium = medium_around(t, x, away, m);
     Mask blocked;
-    Fog fog = {medium, stream_key(t, number, 0, STREAM_FLIGHT), false};
+    Fog fog = {medium, stream_key(t, number, 0, STREAM_FLIGHT), false, f_set(0)};
     Ray ray;
     collision_shadow_ray(x, l.d, l.distance, &ray);
     m = m & l.valid;
-    arriving = spec_mul(arriving, walk_transmittance(t, ray, m, &fog, &blocked, NULL));
+    arriving = spec_mul(arriving, walk_transmittance(t, ray, m_set(false), m, &fog, &blocked, NULL));
     for (Mask left = m & mi_lt(i_set(-1), medium), mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(medium, m_first(left));
         mine = left & mi_eq(medium, i_set(id));
@@ -83,7 +83,7 @@ static void beside_find(Tracer *t, const BoundaryJob *b, Int number, Float share
         return;
     }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s.d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s.d), f_set(INFINITY)}, o, around, &key, m_set(false), m);
     Float behind = v3_length(v3_sub(leg.near.p, s.edge.p)), whole = behind + s.distance;
     BeaconShare still = beacon_share(radius, r, whole, leg.m);
     s.light = spec_scale(s.light, still.chi * behind * f_safe_rcp(whole));

@@ -196,5 +196,3 @@ KFN Spec far_radiance(const Indirect *in, Int slot, Int depth) {
 
 // ---- towards the sensor ------------------------------------------------------------------------------------------
 
-// Jumps have either sign.
-KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }

@@ -152,22 +152,28 @@ static void near_place(Tracer *t, const Segments *q, int32_t k) {
     spec_store(p->beta, k, spec_load(q->flown, k));
 }
 
+// Whether, without media, they are there, or are known to meet it, or have passed what they pass on the way to it.
+static bool segments_know_near(const Indirect *in) {
+    const int32_t kind = in->b->kind;
+    return segments_at_surface(in->b) || boundary_is_rim(kind) || (in->t->job->veils && kind == BOUNDARY_INDIRECT);
+}
+
 static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     Tracer *t = in->t;
     const Segments *q = &in->q;
     uint32_t scramble = t->job->scramble;
     t->job->scramble = rng_mix(scramble, 1); // independent of the far side
+    const bool media = t->scene->has_media, known = !media && segments_know_near(in);
     for (int32_t k = 0; k < q->count; k += LANES) {
         Int slot = i_min(i_iota() + k, i_set(q->count - 1));
         Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), v3_neg(LOAD_V3(*q, dx, dy, dz, slot)), f_set(INFINITY)};
         Spec kept = spec_load(t->ws.radiance, k);
         path_begin(t, k, slot, &ray, f_set(1));
         spec_store(t->ws.radiance, k, kept);
-        if (t->scene->has_media) {
+        if (media) {
             near_place(t, q, k);
         }
-        // They are there, or are known to meet it.
-        if (segments_at_surface(in->b) || (boundary_is_rim(in->b->kind) && !t->scene->has_media)) {
+        if (known || segments_at_surface(in->b)) {
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
             hit_store(t, k, &hit);
@@ -175,8 +181,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     }
     t->active = q->count;
     t->current = 0;
-    const bool media = t->scene->has_media;
-    t->placed = segments_at_surface(in->b) || boundary_is_rim(in->b->kind) || media;
+    t->placed = known || media;
     int32_t surfaces = (int32_t)t->scene->groups_count + 1, groups = surfaces + (media ? (int32_t)t->scene->media_count : 0);
     t->lobes = in->upstream ? q->lobe : NULL;
     for (int32_t bounce = 0; t->active > 0 && bounce < MAX_BOUNCES; bounce++) {

@@ -24,7 +24,7 @@ static Hit meeting_near(Tracer *t, const Ray *ray, Int number, Segments *q, Mask
     }
     Int around = medium_around(t, ray->o, ray->d, *m);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, *ray, ray->o, around, spec_set(f_set(1)), &key, *m);
+    Leg leg = leg_trace(t, *ray, ray->o, around, &key, m_set(false), *m);
     *m = leg.m & mi_lt(leg.air, i_set(0));
     segment_keep_leg(around, &leg, q, *m);
     return leg.near;

@@ -152,9 +152,9 @@ static void primary_approach(Tracer *t, const PrimarySample *s, int32_t k, int32
     t->job->rays += m_count(m);
     Float clear = f_select(mi_lt(i_set(-1), before.shape), f_min(v3_length(v3_sub(before.p, from)), reach), reach);
     Mask blocked;
-    Fog fog = {i_set(t->sensor->medium), stream_key(t, i_iota() + k, 0, STREAM_SHADOW), t->scene->hide_emitters};
+    Fog fog = {i_set(t->sensor->medium), stream_key(t, i_iota() + k, 0, STREAM_SHADOW), t->scene->hide_emitters, f_set(0)};
     Ray to = {ray.o, v3_normalize(v3_sub(from, ray.o)), v3_length(v3_sub(from, ray.o))};
-    Spec arrives = walk_transmittance(t, to, m, &fog, &blocked, NULL);
+    Spec arrives = walk_transmittance(t, to, m_set(true), m, &fog, &blocked, NULL);
     Int medium = medium_around(t, from, back.d, m);
     for (int side = 0; side < 2; side++) {
         int32_t at = side * half + k;

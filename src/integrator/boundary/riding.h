@@ -16,7 +16,7 @@ static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number
     Vec3 o = segment_stand(t, s, segment_offset(s));
     Int around = medium_around(t, o, s->d, s->m);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, &key, segment_unveiled(t, s, s->m), s->m);
     Mask m = leg.m & (mi_lt(i_set(-1), leg.air) | (mi_lt(s->source, i_set(0)) & m_set(b->chains)));
     m = m_any(m) ? segment_shine(t, s, o, around, v3_length(v3_sub(leg.near.p, o)), number, m) : m;
     // Directions stay, and the ends slide over their lights.
@@ -32,7 +32,7 @@ static void riding_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int 
     Vec3 o = chained_offset(s);
     Int around = medium_around(t, o, v3_neg(s->d), s->m); // towards the edge, rays may slip through between its faces
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, s->m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, &key, m_set(false), s->m);
     Mask m = leg.m & (s->silhouette | mi_lt(i_set(-1), leg.air) | m_set(b->chains));
     if (m_any(m)) {
         Float behind;
@@ -100,9 +100,9 @@ static void riding_see(Tracer *t, const BoundaryJob *b, Segment *s, Vec3 near, I
         return;
     }
     Int around = medium_around(t, o, d, m);
-    Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE), false};
+    Fog fog = {around, stream_key(t, number, 0, STREAM_PROBE), false, f_set(0)};
     Ray back = {o, d, v3_length(v3_sub(near, o))};
-    leg.weight = spec_mul(leg.weight, walk_transmittance(t, back, m, &fog, &blocked, NULL));
+    leg.weight = spec_mul(leg.weight, walk_transmittance(t, back, m_set(true), m, &fog, &blocked, NULL));
     leg.around = leg.air;
     m = m & m_gt(spec_max(leg.weight), f_set(0));
     Float behind;

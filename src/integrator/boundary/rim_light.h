@@ -10,7 +10,6 @@
 #include "integrator/particle_start.h"
 
 #define DIMENSION_RIM 0x80000006u
-#define DIMENSION_RIM_PASS 0x80000300u
 
 // Particles as they meet surfaces.
 typedef struct RimLight {
@@ -18,25 +17,6 @@ typedef struct RimLight {
     Spec flux; // over the density
     Mask m;
 } RimLight;
-
-// Where they stop: surfaces that shadow rays pass are passed or not, with an even chance.
-static Hit rims_meet(Tracer *t, Ray ray, const SampleKey *key, Spec *flux, Mask m) {
-    const SceneView *scene = t->scene;
-    Hit met = HIT_NONE;
-    for (uint32_t i = 0; i < MOST_SURFACES_IN_A_ROW && m_any(m); i++) {
-        t->job->rays += scene->has_media ? 0 : m_count(m);
-        Hit hit = scene->has_media ? trace_solid(t, &ray, false, m, NULL) : trace_closest(scene, &ray, m, false);
-        met = hit_select(m, &hit, &met);
-        Mask opens = m & mi_lt(i_set(-1), hit.shape) & m_set(scene->through), may;
-        Vec3 past = ray.o;
-        Spec pass = walk_pass(t, &hit, ray.d, opens, &past, &may, NULL);
-        opens = may & m_gt(spec_max(pass), f_set(0));
-        *flux = spec_select(opens, spec_scale(*flux, f_set(2)), *flux);
-        ray.o = v3_madd(hit.p, interaction_step(hit.p), ray.d);
-        m = opens & m_lt(rng_1d(key, DIMENSION_RIM_PASS + i), f_set(0.5f));
-    }
-    return met;
-}
 
 static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
     const SceneView *scene = t->scene;
@@ -55,7 +35,11 @@ static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
         r.flux = spec_select(mine & one.valid, flux, r.flux);
     }
     m = m & m_gt(spec_max(r.flux), f_set(0)) & m_finite(spec_sum(r.flux));
-    r.x.hit = rims_meet(t, (Ray){o, d, f_set(INFINITY)}, key, &r.flux, m);
+    Ray ray = {o, d, f_set(INFINITY)};
+    Float chance;
+    Spec pass; // is part of what arrives from the light
+    r.x.hit = veils_meet(t, &ray, key, &chance, &pass, m);
+    r.flux = spec_scale(r.flux, chance);
     r.x.light_d = v3_neg(d);
     r.m = m & mi_lt(i_set(-1), r.x.hit.shape);
     Spec value;
@@ -68,7 +52,7 @@ static RimLight rims_shine(Tracer *t, const SampleKey *key, Mask m) {
 static Mask rims_fly(Tracer *t, const BoundaryJob *job, const Ray *ray, Int slot, Segments *q, Hit *near, Mask m) {
     Int around = medium_around(t, ray->o, ray->d, m);
     SampleKey key = stream_key(t, slot, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, *ray, ray->o, around, spec_set(f_set(1)), &key, m);
+    Leg leg = leg_trace(t, *ray, ray->o, around, &key, m_set(false), m);
     Mask air = mi_lt(i_set(-1), leg.air);
     *near = leg.near;
     if (boundary_is_chained(job->kind)) {

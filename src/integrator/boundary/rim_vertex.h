@@ -36,7 +36,7 @@ static Spec rim_lit(Tracer *t, const Ray *shadow, Int slot, Mask m) {
         fog.medium = medium_around(t, shadow->o, shadow->d, m);
         fog.key = stream_key(t, slot, 0, STREAM_SHADOW);
     }
-    return walk_transmittance(t, *shadow, m, media ? &fog : NULL, &blocked, NULL);
+    return walk_transmittance(t, *shadow, m_set(false), m, media ? &fog : NULL, &blocked, NULL);
 }
 
 typedef struct Rim {

@@ -8,8 +8,8 @@
 #pragma once
 
 #include "integrator/boundary/edge.h"
+#include "integrator/boundary/veils.h"
 #include "integrator/leg.h"
-#include "integrator/boundary/view.h"
 
 // Beside the numbers of edges: the light, and where on it or which direction.
 #define DIMENSION_EDGE_SEGMENT 0x80000002u
@@ -325,6 +325,33 @@ static Ray segment_ahead(const Segment *s, Vec3 o) {
                  f_select(ends, length * (1.0f - SHADOW_SHORT), f_set(INFINITY))};
 }
 
+// In media, fog may have no end: lights beyond the scene are as far from near points, `behind` the edge, as shadow rays from there
+// take them to be.
+static Ray segment_reach(const Tracer *t, const Segment *s, Vec3 o, Float behind) {
+    Ray ahead = segment_ahead(s, o);
+    Float far = f_set((2 - 2 * SHADOW_SHORT) * (real)t->scene->bounds_radius) - behind;
+    ahead.tmax = f_select(m_lt(s->distance, f_set(INFINITY)) | m_set(!t->scene->has_media), ahead.tmax, f_max(far, f_set(0)));
+    return ahead;
+}
+
+// Lanes of m whose lights shine through masks and thin glass.
+KFN Mask segment_unveiled(const Tracer *t, const Segment *s, Mask m) {
+    return m & m_set(t->job->veils) & mi_lt(i_set(-1), s->source);
+}
+
+// In lanes of m of those: what comes past the edge from the side where o lies less what comes on the other one. The rays begin
+// half-way between the edge and what is behind it, where surfaces that end at the edge are met by the second one alone.
+static Spec segment_jump(Tracer *t, const Segment *s, Vec3 o, Int around, Float behind, Int number, Mask m) {
+    Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
+    Hit first = trace_media(t, &back, m, false);
+    t->job->rays += m_count(m);
+    Float half = f_set(0.5f) * v3_length(v3_sub(first.p, o)), step = interaction_step(s->edge.p);
+    half = f_select(m & mi_lt(i_set(-1), first.shape), half, f_set(0.5f * (real)t->scene->bounds_radius));
+    Vec3 from = v3_madd(o, -half, s->d);
+    Ray rays[2] = {segment_reach(t, s, from, behind - half), segment_reach(t, s, v3_madd(from, -2.0f * step, s->n), behind - half)};
+    return veils_jump(t, rays, half, around, number, m);
+}
+
 // Lanes of m in which what was found against d is seen along d, too: tubes stop rays from outside alone.
 static Mask segment_forwards(Tracer *t, Vec3 o, Vec3 near, Vec3 d, Mask m) {
     Float step = interaction_step(near);
@@ -349,15 +376,31 @@ static Mask segment_clears(const Tracer *t, const Segment *s, const Hit *near, M
     return m & ~(close & m_lt(height, step) & m_gt(height, 0.02f * step));
 }
 
+// Lanes of m whose shadow rays pass what is behind their edges, too: finds one of the points from which they come.
+static void segment_unveil(Tracer *t, Segment *s, Ray *back, Int number, Mask m, Hit *near) {
+    SampleKey key = slot_key(t, number);
+    Float chance;
+    Spec pass;
+    Hit met = veils_meet(t, back, &key, &chance, &pass, m);
+    *near = hit_select(m, &met, near);
+    s->light = spec_select(m, spec_scale(spec_mul(s->light, pass), chance), s->light);
+}
+
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
     Ray ahead = {o, s->d, f_set(INFINITY)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
-    Mask m = s->m;
-    t->job->rays += m_count(m);
+    Mask m = s->m, unveiled = segment_unveiled(t, s, m);
+    Spec jump = spec_zero();
+    t->job->rays += m_count(m & ~unveiled);
+    if (m_any(unveiled)) {
+        jump = segment_jump(t, s, o, i_set(-1), f_set(0), number, unveiled);
+        s->light = spec_select(unveiled, spec_mul(s->light, jump), s->light);
+    }
     if (lit) {
         ahead = segment_ahead(s, o);
-        m = m & m_gt(spec_max(trace_transmittance(t->scene, &ahead, m)), f_set(0));
+        m = m & m_gt(spec_max(trace_transmittance(t->scene, &ahead, m & ~unveiled)), f_set(0));
+        m = m | (unveiled & m_gt(jump_size(jump), f_set(0)));
     } else {
         s->far = trace_closest(t->scene, &ahead, m, false);
         s->attached = m & mi_lt(i_set(-1), s->far.shape);
@@ -366,27 +409,29 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     if (!m_any(m)) {
         return;
     }
-    t->job->rays += m_count(m);
-    Hit near = trace_closest(t->scene, &back, m, false);
+    t->job->rays += m_count(m & ~unveiled);
+    Hit near = trace_closest(t->scene, &back, m & ~unveiled, false);
+    if (m_any(m & unveiled)) {
+        segment_unveil(t, s, &back, number, m & unveiled, &near);
+    }
     m = m & mi_lt(i_set(-1), near.shape);
     if (t->scene->segments_count && m_any(m)) {
-        m = segment_forwards(t, o, near.p, s->d, m);
+        m = segment_forwards(t, back.o, near.p, s->d, m);
     }
     m = segment_clears(t, s, &near, m);
     segment_keep(s, o, &near, lit, number, q, m);
 }
 
-// In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through. Fog may
-// have no end: lights beyond the scene are as far from near points, `behind` the edge, as shadow rays from there take them to be.
+// In media, lanes of m whose light arrives at o, in the medium `around`: weighs it with what the way there lets through.
 static Mask segment_shine(Tracer *t, Segment *s, Vec3 o, Int around, Float behind, Int number, Mask m) {
-    Ray ahead = segment_ahead(s, o);
-    Float far = f_set((2 - 2 * SHADOW_SHORT) * (real)t->scene->bounds_radius) - behind;
-    ahead.tmax = f_select(m_lt(s->distance, f_set(INFINITY)), ahead.tmax, f_max(far, f_set(0)));
-    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false};
-    Mask blocked;
-    Spec through = walk_transmittance(t, ahead, m, &fog, &blocked, NULL);
+    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false, f_set(0)};
+    Mask blocked, unveiled = segment_unveiled(t, s, m);
+    Spec through = walk_transmittance(t, segment_reach(t, s, o, behind), m_set(true), m & ~unveiled, &fog, &blocked, NULL);
+    if (m_any(unveiled)) {
+        through = spec_select(unveiled, segment_jump(t, s, o, around, behind, number, unveiled), through);
+    }
     s->light = spec_mul(s->light, through);
-    return m & m_gt(spec_max(through), f_set(0));
+    return m & m_gt(jump_size(through), f_set(0));
 }
 
 // Keeps where the flights of m from the edge, in `medium`, have ended, of segments that are stored next.
@@ -412,7 +457,7 @@ static void segment_fly(Tracer *t, Segment *s, bool lit, Int number, Segments *q
         return;
     }
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, spec_set(f_set(1)), &key, m);
+    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, &key, segment_unveiled(t, s, m), m);
     m = rides ? leg.m & mi_lt(leg.air, i_set(0)) : leg.m;
     if (lit && m_any(m)) {
         m = segment_shine(t, s, o, around, v3_length(v3_sub(leg.near.p, o)), number, m);

@@ -122,7 +122,7 @@ static Mask turning_fly(Tracer *t, const BoundaryJob *b, const Turning *s, const
     Mask m = s->m;
     if (boundary_is_terminator(kind)) {
         SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-        leg = leg_trace(t, *ray, ray->o, around, leg.weight, &key, m);
+        leg = leg_trace(t, *ray, ray->o, around, &key, m_set(false), m);
         *end = leg.near;
         const bool rides = boundary_is_riding(kind);
         m = leg.m & ((mi_lt(leg.air, i_set(0)) ^ m_set(rides)) | m_set(rides && b->chains)); // surfaces may be pieces of chains

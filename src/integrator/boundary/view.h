@@ -112,8 +112,8 @@ static Mask sight_clear(Tracer *t, const Ray *ray, Int medium, Int slot, int32_t
         return m;
     }
     Mask blocked;
-    Fog fog = {medium, stream_key(t, slot, bounce, STREAM_SHADOW), seen && t->scene->hide_emitters};
-    Spec through = walk_transmittance(t, *ray, m, &fog, &blocked, NULL);
+    Fog fog = {medium, stream_key(t, slot, bounce, STREAM_SHADOW), seen && t->scene->hide_emitters, f_set(0)};
+    Spec through = walk_transmittance(t, *ray, m_set(true), m, &fog, &blocked, NULL);
     *l = spec_mul(*l, through);
     return m & m_gt(spec_max(through), f_set(0));
 }
