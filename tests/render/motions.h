@@ -329,6 +329,7 @@ static const Motion motions[] = {
     {"veil_lamp.xml", "card.to_world", TURN, {0.5f, 0.3f, 1}, 1, 128, 512},
     {"veil_lamp.xml", "ball.to_world", GROW, {0.5f, -0.2f, 0.6f}, 0.02, 128, 512},
     {"veil_lamp.xml", "lamp.position", ADD, {0}, 0.03, 64, 256},
+    {"ride_veil_glow.xml", "veil.to_world", SHIFT, {0, -0.6f, 1}, 0.05, 1024, 6144},
     {"ride_veil_sun.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.02, 768, 3072},
     {"ride_veil_sun.xml", "card.to_world", TURN, {0.5f, 0.3f, 1}, 1, 1024, 4096},
     {"ride_rope.xml", "rope.control_points", BEND, {0.1f, 0.3f, 1}, 0.05, 512, 1024},
