@@ -245,10 +245,10 @@ KFN Mask border_passed(const Tracer *t, const RecordBatch *batch, Mask m) {
 
 static void border_surface_offer(Tracer *t, const RecordBatch *batch) {
     BorderSurface s = border_surface(t, batch);
-    // Behind others, other rays begin.
-    const bool passed = t->scene->bsdfs[s.group->bsdf].kind == BSDF_NULL, veil = group_is_veil(t, s.group);
-    for (int side = 0; side < (passed || veil ? 2 : 1); side++) {
-        if (veil && side) {
+    const bool veil = group_is_veil(t, s.group);
+    const int sides = veil || group_is_null(t->scene, s.group) ? 2 : 1; // behind others, other rays begin
+    for (int side = 0; side < sides; side++) {
+        if (veil && side) { // of which not all paths pass
             s.m = border_passed(t, batch, s.m);
             s.beta = spec_mul(s.beta, spec_load(t->ws.records.weight, batch->first));
         }

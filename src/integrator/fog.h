@@ -14,6 +14,9 @@ KFN SampleKey stream_key(const Tracer *t, Int slot, int32_t bounce, uint32_t str
     return key;
 }
 
+// Whether a surface is of the kind null, which with media is a border of theirs that rays pass.
+KFN bool group_is_null(const SceneView *scene, const Group *group) { return node_is_null(scene->bsdfs + group->bsdf); }
+
 // The medium that a ray along d enters behind a surface with normal ng, or stays in.
 KFN Int medium_behind(const Group *group, Vec3 ng, Vec3 d, Int medium) {
     if (group->interior < 0 && group->exterior < 0) {

@@ -22,7 +22,7 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
         int32_t id = i_lane(groups, m_first(left));
         const Group *group = scene->groups + id;
         mine = left & mi_eq(groups, i_set(id));
-        if (scene->bsdfs[group->bsdf].kind == BSDF_NULL) {
+        if (group_is_null(scene, group)) {
             Hit safe = walk_hit(hit, mine);
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
             *o = v3_select(mine, interaction_behind(&si, d), *o);
@@ -107,9 +107,9 @@ static NOINLINE Leg leg_follow(Tracer *t, LegDef def, Ray ray, Vec3 from, Int me
         leg.around = i_select(left, medium, leg.around);
         Int behind = medium;
         Mask passes = found & ~collides & m_set(i < def.most), passed = leg_pass(t, &hit, ray.d, passes, &ray.o, &behind);
-        if (m_any(def.unveiled & passes & ~passed)) {
+        Mask veiled = def.unveiled & passes & ~passed;
+        if (m_any(veiled)) {
             const uint32_t dimension = MOST_SURFACES_IN_A_ROW * (MOST_COLLISIONS + 1) + 1 + (uint32_t)i;
-            Mask veiled = def.unveiled & passes & ~passed;
             passed = passed | leg_unveil(t, &hit, ray.d, rng_1d(key, dimension), veiled, &ray.o, &behind, &leg.weight);
         }
         Mask met = found & ~collides & ~passed;

@@ -275,7 +275,7 @@ static void first_rays_end(Tracer *t, int32_t count, Sink *sink) {
 // The borders that a batch of surface vertices lies on. Whether these are no vertices of the path: where surfaces move, segments
 // are attached through surfaces of the kind null.
 static bool passed_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Mask m, Sink *sink) {
-    const bool passed = t->job->rides && t->scene->bsdfs[t->scene->groups[batch->group].bsdf].kind == BSDF_NULL;
+    const bool passed = t->job->rides && group_is_null(t->scene, t->scene->groups + batch->group);
     if (border_is_live(t, batch) && (passed || !t->job->rides)) {
         border_surface_sweep(t, batch, suffix, finite, sink);
     }

@@ -23,7 +23,7 @@ typedef struct Walk {
 // go on through it count as chains do.
 KFN bool group_is_veil(const Tracer *t, const Group *group) {
     const BsdfNode *bsdf = t->scene->bsdfs + group->bsdf;
-    return t->job->veils && bsdf->transmits && !(t->scene->has_media && bsdf->kind == BSDF_NULL);
+    return t->job->veils && bsdf->transmits && !(t->scene->has_media && group_is_null(t->scene, group));
 }
 
 // Lanes whose shadow rays end at such surfaces.
@@ -149,7 +149,7 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask end
         BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &safe), t->floor);
         Vec3 wo = frame_to_local(&si.sh, d);
         pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
-        *o = v3_select(mine, interaction_past(&si, d, medium && scene->bsdfs[group->bsdf].kind == BSDF_NULL), *o);
+        *o = v3_select(mine, interaction_past(&si, d, medium && group_is_null(scene, group)), *o);
         *may = *may | mine;
         if (medium) {
             *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);

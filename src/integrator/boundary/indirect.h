@@ -152,10 +152,10 @@ static void near_place(Tracer *t, const Segments *q, int32_t k) {
     spec_store(p->beta, k, spec_load(q->flown, k));
 }
 
-// Whether, without media, they are there, or are known to meet it, or have passed what they pass on the way to it.
+// Whether they are there or, without media, are known to meet it, or have passed what they pass on the way to it.
 static bool segments_know_near(const Indirect *in) {
-    const int32_t kind = in->b->kind;
-    return segments_at_surface(in->b) || boundary_is_rim(kind) || (in->t->job->veils && kind == BOUNDARY_INDIRECT);
+    const bool meet = boundary_is_rim(in->b->kind) || (in->t->job->veils && in->b->kind == BOUNDARY_INDIRECT);
+    return segments_at_surface(in->b) || (meet && !in->t->scene->has_media);
 }
 
 static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
@@ -163,7 +163,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
     const Segments *q = &in->q;
     uint32_t scramble = t->job->scramble;
     t->job->scramble = rng_mix(scramble, 1); // independent of the far side
-    const bool media = t->scene->has_media, known = !media && segments_know_near(in);
+    const bool media = t->scene->has_media, known = segments_know_near(in);
     for (int32_t k = 0; k < q->count; k += LANES) {
         Int slot = i_min(i_iota() + k, i_set(q->count - 1));
         Ray ray = {LOAD_V3(*q, ox, oy, oz, slot), v3_neg(LOAD_V3(*q, dx, dy, dz, slot)), f_set(INFINITY)};
@@ -173,7 +173,7 @@ static void near_particles(Indirect *in, int32_t *begin, Sink *sink) {
         if (media) {
             near_place(t, q, k);
         }
-        if (known || segments_at_surface(in->b)) {
+        if (known) {
             Hit hit = LOAD_HIT(q, k, near);
             hit.shape = i_select(m_first_n(q->count - k), hit.shape, i_set(q->near_shape[0]));
             hit_store(t, k, &hit);

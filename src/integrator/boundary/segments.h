@@ -376,32 +376,46 @@ static Mask segment_clears(const Tracer *t, const Segment *s, const Hit *near, M
     return m & ~(close & m_lt(height, step) & m_gt(height, 0.02f * step));
 }
 
-// Lanes of m whose shadow rays pass what is behind their edges, too: finds one of the points from which they come.
-static void segment_unveil(Tracer *t, Segment *s, Ray *back, Int number, Mask m, Hit *near) {
-    SampleKey key = slot_key(t, number);
-    Float chance;
-    Spec pass;
-    Hit met = veils_meet(t, back, &key, &chance, &pass, m);
-    *near = hit_select(m, &met, near);
-    s->light = spec_select(m, spec_scale(spec_mul(s->light, pass), chance), s->light);
+// Without media, lanes of m whose light arrives at o, or comes to one side of the edge alone: weighs it with the difference.
+static Mask segment_lit(Tracer *t, Segment *s, Vec3 o, Int number, Mask m) {
+    Mask unveiled = segment_unveiled(t, s, m), lit = m & ~unveiled;
+    Ray ahead = segment_ahead(s, o);
+    t->job->rays += m_count(lit);
+    lit = lit & m_gt(spec_max(trace_transmittance(t->scene, &ahead, lit)), f_set(0));
+    if (m_any(unveiled)) {
+        Spec jump = segment_jump(t, s, o, i_set(-1), f_set(0), number, unveiled);
+        s->light = spec_select(unveiled, spec_mul(s->light, jump), s->light);
+        lit = lit | (unveiled & m_gt(jump_size(jump), f_set(0)));
+    }
+    return lit;
+}
+
+// Without media, what the rays of m back from the edge end at. Where shadow rays pass what is there, too, it is one of the points
+// from which these come, `back` begins behind what they pass on the way, and the light is weighed with that.
+static Hit segment_near(Tracer *t, Segment *s, Int number, Mask m, Ray *back) {
+    Mask unveiled = segment_unveiled(t, s, m), plain = m & ~unveiled;
+    t->job->rays += m_count(plain);
+    Hit near = trace_closest(t->scene, back, plain, false);
+    if (m_any(unveiled)) {
+        SampleKey key = slot_key(t, number);
+        Float chance;
+        Spec pass;
+        Hit met = veils_meet(t, back, &key, &chance, &pass, unveiled);
+        near = hit_select(unveiled, &met, &near);
+        s->light = spec_select(unveiled, spec_scale(spec_mul(s->light, pass), chance), s->light);
+    }
+    return near;
 }
 
 // Traces both halves and keeps the segments that have ends.
 static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments *q) {
     Vec3 o = segment_stand(t, s, segment_offset(s));
     Ray ahead = {o, s->d, f_set(INFINITY)}, back = {o, v3_neg(s->d), f_set(INFINITY)};
-    Mask m = s->m, unveiled = segment_unveiled(t, s, m);
-    Spec jump = spec_zero();
-    t->job->rays += m_count(m & ~unveiled);
-    if (m_any(unveiled)) {
-        jump = segment_jump(t, s, o, i_set(-1), f_set(0), number, unveiled);
-        s->light = spec_select(unveiled, spec_mul(s->light, jump), s->light);
-    }
+    Mask m = s->m;
     if (lit) {
-        ahead = segment_ahead(s, o);
-        m = m & m_gt(spec_max(trace_transmittance(t->scene, &ahead, m & ~unveiled)), f_set(0));
-        m = m | (unveiled & m_gt(jump_size(jump), f_set(0)));
+        m = segment_lit(t, s, o, number, m);
     } else {
+        t->job->rays += m_count(m);
         s->far = trace_closest(t->scene, &ahead, m, false);
         s->attached = m & mi_lt(i_set(-1), s->far.shape);
         m = s->attached;
@@ -409,11 +423,7 @@ static void segment_trace(Tracer *t, Segment *s, bool lit, Int number, Segments 
     if (!m_any(m)) {
         return;
     }
-    t->job->rays += m_count(m & ~unveiled);
-    Hit near = trace_closest(t->scene, &back, m & ~unveiled, false);
-    if (m_any(m & unveiled)) {
-        segment_unveil(t, s, &back, number, m & unveiled, &near);
-    }
+    Hit near = segment_near(t, s, number, m, &back);
     m = m & mi_lt(i_set(-1), near.shape);
     if (t->scene->segments_count && m_any(m)) {
         m = segment_forwards(t, back.o, near.p, s->d, m);
