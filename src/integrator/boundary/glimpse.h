@@ -12,7 +12,7 @@
 #define DIMENSION_GLIMPSE 0x80002000u
 #define GLIMPSE_SAME 0.02f // pixels between lines that are the same one
 
-enum { MOST_STEPS = 24, MOST_GLIMPSES = 512 };
+enum { MOST_STEPS = 24, MOST_GLIMPSES = 16384 };
 
 // A line of sight of which the first `turns` vertices lead to a point.
 typedef struct Glimpse {
