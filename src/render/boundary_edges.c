@@ -144,14 +144,14 @@ static bool counts(const Render *r, EdgeRecord *e) {
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
     if (w->kind == BOUNDARY_LINES) {
-        return line_moves(r, e) ? rey_edge_in_world(r, e) : 0;
+        return line_moves(r, e) ? rey_edge_in_world(r, e, false) : 0;
     }
     if (w->kind != BOUNDARY_PRIMARY && e->kind == EDGE_MARK && ARRAY_AT(r->marks, MarkRecord, e->corner).half) {
         return 0;
     }
     if (boundary_is_facing(w->kind) || e->kind == EDGE_FACING) {
         bool reads = r->job.live[view->shapes[e->shape].group] & LIVE_SCATTERING; // which may be a map's texture
-        double area = boundary_is_facing(w->kind) && e->kind == EDGE_FACING ? rey_edge_in_world(r, e) : 0;
+        double area = boundary_is_facing(w->kind) && e->kind == EDGE_FACING ? rey_edge_in_world(r, e, false) : 0;
         return edge_moves(r, e) || reads ? area : w->still * area;
     }
     double factor = edge_moves(r, e) || (w->kind == BOUNDARY_PRIMARY && line_moves(r, e)) ? 1 : w->still;
@@ -182,7 +182,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     factor = still ? w->still : factor;
-    return factor * rey_edge_in_world(r, e);
+    return factor * rey_edge_in_world(r, e, marks);
 }
 
 // Whether what lies on a shape matters: along chains and from collisions, what moves shows it also where it stands still.

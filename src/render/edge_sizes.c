@@ -24,7 +24,7 @@ static void mesh_point(const SceneView *view, const EdgeRecord *e, int32_t verte
 // Whether rays from the eye pass both triangles of a mesh's edge on one side, or the picture jumps there anyway.
 static bool can_jump(const SceneView *view, const double eye[4], const EdgeRecord *e, const double a[3], const double b[3],
                      const int32_t *corners) {
-    if (e->crease == EDGE_CREASE || e->opposite < 0 || e->fan_count > 0) {
+    if (e->crease == EDGE_CREASE || e->crease == EDGE_STEP || e->opposite < 0 || e->fan_count > 0) {
         return true;
     }
     double side[2][3], n[3], d[3];
@@ -350,7 +350,7 @@ double rey_edge_on_film(const Render *r, const Projection *p, const double eye[4
     }
 }
 
-double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
+double rey_edge_in_world(const Render *r, const EdgeRecord *e, bool steps) {
     const SceneView *view = &r->scene->view;
     double length, angle, centre[3], reach;
     switch (e->kind) {
@@ -367,6 +367,7 @@ double rey_edge_in_world(const Render *r, const EdgeRecord *e) {
         return turning_weight(view, e);
     case EDGE_MESH:
         angle = mesh_edge_angle(view, e, &length);
+        angle = steps && e->crease == EDGE_STEP ? fmax(angle, 1) : angle; // jumps whatever the angle is
         return length * angle * (double)(e->last - e->first);
     default:
         return 10 / 3.0 * round_ball(view, e, centre, &reach) * round_length(e); // a silhouette in an angle of about pi

@@ -294,7 +294,7 @@ static rey_result mesh_edges(rey_scene *scene, int32_t id, const Array *steps, s
         if (jumps || !is_flat(&around)) {
             EdgeRecord e;
             result = mesh_edge(scene, id, sides + i, next - i, &around, fans, &e);
-            e.crease = jumps ? EDGE_CREASE : e.crease;
+            e.crease = jumps ? EDGE_STEP : e.crease;
             result = result == REY_OK ? push_edge(scene, edges, e) : result;
         }
     }

@@ -25,8 +25,8 @@ enum {
 };
 enum { EDGE_OPEN = -1 };
 enum { EDGE_NONE = -1, EDGE_ANY = -2 };
-// EDGE_SOFT: only the plane does behind which rays start
-enum { EDGE_SMOOTH, EDGE_CREASE, EDGE_SOFT };
+// EDGE_SOFT: only the plane does behind which rays start; EDGE_STEP: a texture does, also where the triangles lie in one plane
+enum { EDGE_SMOOTH, EDGE_CREASE, EDGE_SOFT, EDGE_STEP };
 
 typedef struct EdgeRecord {
     int32_t kind, shape;

@@ -337,6 +337,7 @@ static const Motion motions[] = {
     {"ride_rope.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.03, 384, 1024},
     {"mirror_rope.xml", "rope.control_points", BEND, {0.1f, 0.3f, 1}, 0.02, 512, 512},
     {"mirror_rope.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.02, 256, 1024},
+    {"mirror_seam.xml", "board.positions", SHEAR, {0}, 0.02, 256, 4096},
     {"mirror_tube.xml", "tube.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.03, 256, 128},
     {"mirror_tube.xml", "camera.to_world", SHIFT, {1, 0, 0.3f}, 0.05, 256, 128},
     {"ride_mirror.xml", "block.to_world", SHIFT, {1, 0.3f, 0.5f}, 0.05, 128, 384},
