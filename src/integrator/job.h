@@ -18,7 +18,7 @@ static inline bool mode_records(int32_t mode) {
 }
 
 // What of a group depends on the selected parameters; and what of a medium.
-enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4 };
+enum { LIVE_SCATTERING = 1, LIVE_EMISSION = 2, LIVE_MOTION = 4, LIVE_UNEVEN = 8 };
 enum { LIVE_EXTINCTION = 1, LIVE_ALBEDO = 2, LIVE_PHASE = 4, LIVE_GLOW = 8, LIVE_BORDER = 16 };
 
 // A ball around a light at a point (beacon.h), and how far around it on the film nothing hides what is seen of the ball [pixels];
@@ -58,6 +58,7 @@ typedef struct PathJob {
     bool any_volumes, any_borders; // volumes move; so do surfaces that only separate media
     bool glides;                  // the camera moves, and paths with it (glide.h)
     bool rides;                   // surfaces move in media, and collisions with them (ride.h)
+    bool veils_turn;              // what masks and thin glass let through changes as shadow rays turn: those of LIVE_UNEVEN groups
     bool veils;                   // shadow rays end at masks and thin glass, behind which light is met by chance (walk.h)
     const Beacon *beacons;        // null: lights at a point within media are not known beside what moves
     int32_t beacon_count;

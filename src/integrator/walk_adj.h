@@ -4,8 +4,22 @@
 #include "integrator/passage_move.h"
 #include "integrator/ride.h"
 
-// Accumulates the adjoint dt of the product of what a walk's surfaces let through.
-static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *sink) {
+// What a surface on the way of a walk asks of the ray that it lets through, and of itself where it moves, in the lanes of m: given
+// the adjoints of the ray's direction in its frame, of its texture coordinates, barycentrics and of its place in space.
+static NOINLINE void walk_turn_adj(const Tracer *t, const Hit *hit, const Interaction *si, Vec3 d, Vec3 local, SurfaceAdj worth,
+                                   Turn *turn, Sink *sink, Mask m) {
+    Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
+    Vec3 dd = v3_zero();
+    frame_to_local_adj(&si->sh, d, local, &dframe, &dd);
+    frame_from_tangent_adj(&si->sh, si->dp_du, &dframe, &worth.n, &worth.dp_du);
+    Vec3 drag = rays_find_adj(t, hit, d, &worth, sink, m);
+    Float far = v3_dot(v3_sub(hit->p, turn->from), d);
+    turn->d = v3_add(turn->d, v3_select(m, v3_madd(dd, far, drag), v3_zero()));
+    turn->shift = v3_add(turn->shift, v3_select(m, drag, v3_zero()));
+}
+
+// Accumulates the adjoint dt of the product of what a walk's surfaces let through; turn: as passage_move_adj.
+static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Turn *turn, Sink *sink) {
     const SceneView *scene = t->scene;
     Spec behind[MOST_SURFACES_IN_A_ROW], after = spec_set(f_set(1)), before = after;
     for (int32_t i = walk->count - 1; i >= 0; i--) {
@@ -30,9 +44,17 @@ static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Sink *
             BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &hit), t->floor);
             Vec3 wo = frame_to_local(&si.sh, walk->d), dwi = v3_zero(), dwo = v3_zero(), unused = v3_zero();
             Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
+            const bool turns = turn && t->job->veils_turn && (t->job->live[id] & LIVE_UNEVEN);
+            SurfaceAdj worth = surface_adj_zero();
+            sink->at = turns ? &worth.at : NULL;
+            sink->point = turns ? &worth.p : NULL;
             bsdf_adj(&call, v3_neg(wo), wo, i_set(LOBE_NULL), spec_zero_unless(mine, dpass), sink, mine, &dwi, &dwo,
-                     NULL);
-            if (sink->any_normals && group->shape_kind == SHAPE_MESH) {
+                     turns ? &worth.uv : NULL);
+            sink->at = NULL;
+            sink->point = NULL;
+            if (turns) {
+                walk_turn_adj(t, &hit, &si, walk->d, v3_sub(dwo, dwi), worth, turn, sink, mine);
+            } else if (sink->any_normals && group->shape_kind == SHAPE_MESH) {
                 frame_to_local_adj(&si.sh, walk->d, v3_sub(dwo, dwi), &dframe, &unused);
                 mesh_interaction_adj(scene, group->shape_flags, &hit, &si, &dframe, sink, mine);
             }
@@ -111,19 +133,19 @@ static NOINLINE void passage_light(Tracer *t, const RecordBatch *batch, Int slot
 // Accumulates the adjoint dt of a walk's transmittance, whose value is `transmittance`; turn: as passage_move_adj.
 static void passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce, Turn *turn,
                         Sink *sink) {
-    walk_adj(t, walk, spec_mul(dt, walk->clear), sink);
+    walk_adj(t, walk, spec_mul(dt, walk->clear), turn, sink);
     SampleKey key = stream_key(t, slot, bounce, STREAM_SHADOW_PROBE);
     if (t->job->live_extinctions) {
         fog_adj(t, walk, transmittance, dt, &key, sink);
     }
-    if (t->job->live_borders || turn) {
+    if (t->job->live_borders || (turn && t->scene->has_media)) {
         passage_move_adj(t, walk, transmittance, dt, &key, turn, sink);
     }
 }
 
-// Whether lights move, or collisions, and what media let through with them.
+// Whether shadow rays turn, and what lets more or less of the light pass with them.
 KFN bool lights_turn(const Tracer *t) {
-    return (t->job->any_places || t->job->glides || t->job->rides) && t->scene->has_media;
+    return t->job->veils_turn || ((t->job->any_places || t->job->glides || t->job->rides) && t->scene->has_media);
 }
 
 // Lights at a point whose place is selected, or from which collisions move away.
@@ -142,7 +164,7 @@ KFN Mask points_that_move(const Tracer *t, Int light) {
 static Vec3 connection_passage_adj(const Tracer *t, const Walk *walk, Spec transmittance, Spec dt, Int slot, int32_t bounce,
                                    const Connection *c, bool slides, Sink *sink) {
     bool turns = lights_turn(t);
-    Mask points = turns ? c->m & points_that_move(t, c->light) : m_set(false);
+    Mask points = turns && t->scene->has_media ? c->m & points_that_move(t, c->light) : m_set(false);
     Mask beacons = points & m_gt(beacon_radius(t, c->light, points), f_set(0));
     Turn turn = {c->from, v3_zero(), v3_zero(), f_set(0), points, beacons};
     passage_adj(t, walk, transmittance, spec_zero_unless(c->m, dt), slot, bounce, turns ? &turn : NULL, sink);

@@ -12,6 +12,7 @@
 #include "render/light_borders.h"
 #include "render/terms.h"
 #include "render/texture_steps.h"
+#include "render/veils.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
 #include "shape/cut.h"
@@ -68,41 +69,6 @@ bool rey_boundary_veiled(const SceneView *view) {
         }
     }
     return false;
-}
-
-// Whether the share of the light that passes a function undeviated is the same everywhere and from all directions.
-static bool passes_evenly(const SceneView *view, int32_t bsdf) {
-    const BsdfNode *node = view->bsdfs + bsdf;
-    bool even = !rey_bsdf_tints(node->kind);
-    if (!rey_bsdf_holds(view, bsdf, rey_bsdf_opens)) {
-        return true;
-    }
-    for (int k = 0; k < MAX_SLOTS && even; k++) {
-        even = node->slot[k] < 0 || view->textures[node->slot[k]].kind == TEXTURE_CONSTANT;
-    }
-    for (int k = 0; k < MAX_CHILDREN && even; k++) {
-        even = node->child[k] < 0 || passes_evenly(view, node->child[k]);
-    }
-    return even;
-}
-
-const char *rey_veils_gap(const SceneView *view) {
-    bool delta = false, sheaf = false, uneven = false; // such lights are never met by chance
-    for (int64_t i = 0; i < view->emitters_count; i++) {
-        int32_t kind = view->emitters[i].kind;
-        delta |= rey_emitter_kinds[kind].form == EMITTER_IS_DELTA;
-        sheaf |= kind == EMITTER_DIRECTIONALAREA;
-    }
-    if (!(delta || sheaf) || !view->through || !rey_boundary_veiled(view)) {
-        return NULL;
-    }
-    for (int64_t i = 0; i < view->shapes_count; i++) {
-        uneven |= !passes_evenly(view, view->shapes[i].bsdf);
-    }
-    return sheaf    ? "the shadow rays of 'volpath', which pass masks and thin glass to lights of the kind 'directionalarea'"
-           : uneven ? "the shadow rays of 'volpath', which pass thin glass, or masks that differ from place to place, to lights at "
-                      "a point or with one direction"
-                    : NULL;
 }
 
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {

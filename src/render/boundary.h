@@ -15,8 +15,6 @@ bool rey_boundary_hides(const SceneView *view, const ShapeRecord *shape);
 // In media, those of the kind null are passed by all (sightline.h, leg.h), and count for neither.
 bool rey_boundary_chained(const SceneView *view);
 bool rey_boundary_veiled(const SceneView *view);
-// Where shadow rays pass surfaces, in words: why what moves is not known beside those, null where it is.
-const char *rey_veils_gap(const SceneView *view);
 // Whether what only vertex normals move is known for a sensor: silhouettes have no part in it.
 bool rey_turning_known(const SceneView *view, const SensorRecord *sensor);
 // Whether edges are known along chains of smooth mirrors and glass that begin at a vertex other than the camera.

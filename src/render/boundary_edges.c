@@ -140,6 +140,11 @@ static bool counts(const Render *r, EdgeRecord *e) {
     return own || moved == 0;
 }
 
+// Whether shadow rays pass an edge's surface that lets more or less of the light through on either side of lines.
+static bool parts_shadows(const Render *r, int32_t kind, const EdgeRecord *e) {
+    return kind == BOUNDARY_INDIRECT && r->job.veils_turn && (r->job.live[r->scene->view.shapes[e->shape].group] & LIVE_UNEVEN);
+}
+
 // May cut the edge to what the film sees.
 static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
@@ -164,7 +169,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
         return 0;
     }
     factor *= w->kind == BOUNDARY_RIDING && view->shapes[e->shape].emitter >= 0 ? RIDING_GLOW : 1;
-    bool marks = w->kind == BOUNDARY_PRIMARY || boundary_is_paired(w->kind);
+    bool marks = w->kind == BOUNDARY_PRIMARY || boundary_is_paired(w->kind) || parts_shadows(r, w->kind, e);
     if (w->kind != BOUNDARY_PRIMARY && (turning != (e->kind == EDGE_TERMINATOR) || (e->kind == EDGE_MARK && !marks))) {
         return 0;
     }
@@ -188,7 +193,7 @@ static double edge_weight(const Render *r, const Weigher *w, EdgeRecord *e) {
 // Whether what lies on a shape matters: along chains and from collisions, what moves shows it also where it stands still.
 static bool seen_moving(const void *render, int32_t id, int32_t instance) {
     const Render *r = render;
-    return (r->terms & REY_TERM_SPECULAR) || r->job.rides || moves_on_film(r, id, instance);
+    return (r->terms & REY_TERM_SPECULAR) || r->job.rides || r->job.veils_turn || moves_on_film(r, id, instance);
 }
 
 static rey_result find_meetings(Render *r) {

@@ -5,6 +5,7 @@
 #include "render/blame.h"
 #include "render/boundary.h"
 #include "render/cuts.h"
+#include "render/veils.h"
 #include "shape/shape.h"
 
 // Whether there is a map within another one. within: it is inside one.
@@ -33,8 +34,7 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
         return "where 'path' with hide_emitters drops rays that only pass";
     }
     if (rey_veils_gap(view)) {
-        return "beside thin glass, or masks that differ from place to place, that the shadow rays of 'volpath' pass to lights at a "
-               "point or with one direction";
+        return "beside masks and thin glass that the shadow rays of 'volpath' pass to lights of the kind 'directionalarea'";
     }
     if (rey_boundary_chained(view) && !rey_chains_known(view, sensor)) {
         return "beside these smooth mirrors and glass";

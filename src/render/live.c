@@ -4,6 +4,7 @@
 #include "bsdf/table.h"
 #include "emitter/table.h"
 #include "render/blame.h"
+#include "render/veils.h"
 
 static bool texture_live(const SceneView *view, const PathJob *job, int32_t id) {
     if (id < 0) {
@@ -104,11 +105,15 @@ static void moving_groups(const SceneView *view, const PathJob *job, int32_t *li
 }
 
 void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
+    const bool points = job->any_places || job->any_motion || job->glides || job->rides;
+    const bool sharp = points && job->veils && rey_veils_sharp(view);
     for (int64_t i = 0; i < view->groups_count; i++) {
         const Group *group = view->groups + i;
         // What moves changes the directions from which every surface is lit.
         bool scattering = job->any_normals || job->any_places || job->any_motion || bsdf_live(view, job, group->bsdf);
-        live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0);
+        live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0) |
+                  (rey_veil_is_uneven(view, group->bsdf) ? LIVE_UNEVEN : 0);
+        job->veils_turn |= sharp && (live[i] & LIVE_UNEVEN);
     }
     moving_groups(view, job, live);
     for (int64_t i = 0; i < view->media_count && view->has_media; i++) {

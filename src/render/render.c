@@ -14,6 +14,7 @@
 #include "render/shards.h"
 #include "render/terms.h"
 #include "render/update.h"
+#include "render/veils.h"
 #include "scene/sink.h"
 
 #include <string.h>
@@ -333,12 +334,12 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     if (result != REY_OK) {
         return result;
     }
+    const bool veiled = scene->view.through && rey_boundary_veiled(&scene->view) && !rey_veils_gap(&scene->view);
+    r->job.veils = veiled && (r->needed & ~REY_TERM_INTERIOR);
     if (!request.asked) {
         rey_live_groups(&scene->view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + scene->view.volumes_count);
     }
     r->job.spp = set_spp(r);
-    const bool veiled = scene->view.through && rey_boundary_veiled(&scene->view) && !rey_veils_gap(&scene->view);
-    r->job.veils = veiled && (r->needed & ~REY_TERM_INTERIOR);
     r->rims = rey_rims_move(scene, selection);
     r->facing = r->job.watch_turned && !rey_facing_gap(&scene->view, r->plan.sensor) && (!scene->view.has_media || r->job.rides);
     r->terms = (r->needed | REY_TERM_INTERIOR) & (def->terms ? def->terms : ~0);

@@ -13,6 +13,7 @@
 #include "render/particles.h"
 #include "render/rims.h"
 #include "render/texture_steps.h"
+#include "render/veils.h"
 #include "scene/sink.h"
 
 #include <stdio.h>
@@ -121,9 +122,8 @@ const char *rey_rides_gap(const SceneView *view) {
         }
     }
     if (rey_veils_gap(view)) {
-        return "in scenes with participating media, what moves changes the ways through thin glass, or masks that differ from "
-               "place to place, past which shadow rays lead to lights at a point or with one direction (or past any mask to "
-               "'directionalarea'). It is known where all lights are surfaces or environments";
+        return "in scenes with participating media, what moves changes the ways through masks and thin glass past which shadow "
+               "rays lead to lights of the kind 'directionalarea'";
     }
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";

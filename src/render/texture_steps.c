@@ -39,19 +39,11 @@ const char *rey_spots_gap(const SceneView *view, const Param *p) {
 
 const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *texture) {
     // Vertices move over their surfaces where the sensor sees them, and along chains; others are attached to them.
-    const bool film = term != REY_TERM_INDIRECT, passed = rey_veils_gap(view) != NULL;
+    const bool film = term != REY_TERM_INDIRECT;
     for (int32_t i = 0; i < (int32_t)view->textures_count && film; i++) {
         if (view->textures[i].kind == TEXTURE_VOLUME && jumps_itself(view->textures + i)) {
             *texture = i;
             return "the jumps of volumes with filter_type=\"nearest\"";
-        }
-    }
-    for (int64_t i = 0; i < view->bsdfs_count; i++) {
-        for (int k = 0; k < MAX_SLOTS && passed && rey_bsdf_opens(view->bsdfs[i].kind); k++) {
-            *texture = view->bsdfs[i].slot[k];
-            if (texture_jumps(view, *texture)) {
-                return "the jumps of opacities that shadow rays pass";
-            }
         }
     }
     for (int64_t i = 0; i < view->emitters_count && film; i++) {

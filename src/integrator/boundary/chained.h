@@ -29,13 +29,6 @@ KFN Ray chained_ray(Vec3 p, Vec3 d, Vec3 n, Float behind, Float step, int side) 
     return (Ray){o, d, f_set(INFINITY)};
 }
 
-// Where rays from the edge begin, out of the way of its surfaces: beside silhouettes, and towards the viewer where there are two.
-KFN Vec3 chained_offset(const Segment *s) {
-    const EdgePoint *e = &s->edge;
-    Float step = interaction_step(e->p);
-    return v3_select(s->silhouette, v3_madd(e->p, step, s->n), v3_madd(e->p, -4.0f * step, s->d));
-}
-
 // Lanes of m from whose near points rays meet the edge between its surfaces.
 static Mask chained_between(Tracer *t, const BoundaryJob *b, const Segment *s, Vec3 near, Mask m, Float *behind) {
     const EdgePoint *e = &s->edge;
@@ -74,7 +67,7 @@ static void chained_keep(const Segment *s, Vec3 o, const Hit *near, Float behind
 
 // Finds the near points of segments in any direction, and keeps those that meet the edge between its surfaces.
 static void chained_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int number, Segments *q) {
-    Vec3 o = chained_offset(s);
+    Vec3 o = segment_before(s, segment_offset(s));
     Ray back = {o, v3_neg(s->d), f_set(INFINITY)};
     t->job->rays += m_count(s->m);
     Hit near = trace_closest(t->scene, &back, s->m, false);

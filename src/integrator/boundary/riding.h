@@ -13,10 +13,11 @@
 // Segments that end on lights and whose near points are collisions or, where there are chains, pieces of these: no chain ends on a
 // light at a point or of one direction.
 static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number, Segments *q) {
-    Vec3 o = segment_stand(t, s, segment_offset(s));
-    Int around = medium_around(t, o, s->d, s->m);
+    Vec3 o = segment_stand(t, s, segment_offset(s)), before = segment_before(s, o);
+    Int around = medium_around(t, before, segment_aside(s), s->m);
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
-    Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, &key, segment_unveiled(t, s, s->m), s->m);
+    Ray back = {before, v3_neg(s->d), f_set(INFINITY)};
+    Leg leg = leg_trace(t, back, before, around, &key, segment_unveiled(t, s, s->m), s->m);
     Mask m = leg.m & (mi_lt(i_set(-1), leg.air) | (mi_lt(s->source, i_set(0)) & m_set(b->chains)));
     m = m_any(m) ? segment_shine(t, s, o, around, v3_length(v3_sub(leg.near.p, o)), number, m) : m;
     // Directions stay, and the ends slide over their lights.
@@ -29,7 +30,7 @@ static void riding_shine(Tracer *t, const BoundaryJob *b, Segment *s, Int number
 
 // Segments in any direction. Surfaces that scatter see the same air on both sides of an edge between two faces.
 static void riding_trace(Tracer *t, const BoundaryJob *b, const Segment *s, Int number, Segments *q) {
-    Vec3 o = chained_offset(s);
+    Vec3 o = segment_before(s, segment_offset(s));
     Int around = medium_around(t, o, v3_neg(s->d), s->m); // towards the edge, rays may slip through between its faces
     SampleKey key = stream_key(t, number, 0, STREAM_PROBE);
     Leg leg = leg_trace(t, (Ray){o, v3_neg(s->d), f_set(INFINITY)}, o, around, &key, m_set(false), s->m);
@@ -91,7 +92,7 @@ static NOINLINE Spec extinction_at(const Tracer *t, Int medium, Vec3 p, Vec3 d, 
 
 // Keeps those of them that the edge sees.
 static void riding_see(Tracer *t, const BoundaryJob *b, Segment *s, Vec3 near, Int number, Segments *q) {
-    Vec3 o = chained_offset(s), d = v3_neg(s->d);
+    Vec3 o = segment_before(s, segment_offset(s)), d = v3_neg(s->d);
     Leg leg = {.air = medium_around(t, near, d, s->m)};
     leg.near = (Hit){i_set(-1), i_set(0), f_set(0), f_set(0), near, i_set(0)};
     leg.weight = extinction_at(t, leg.air, near, d, s->m);

@@ -33,14 +33,9 @@ static Hit veils_meet(Tracer *t, Ray *ray, const SampleKey *key, Float *chance, 
 // Jumps have either sign.
 KFN Float jump_size(Spec l) { return f_max(spec_max(l), spec_max(spec_scale(l, f_set(-1)))); }
 
-// What of a light comes along the first ray, on the side of an edge that lies open, less what comes along the second one. Both
-// begin `lead` before the edge, in the medium `around`, which counts from there on.
-static Spec veils_jump(Tracer *t, const Ray rays[2], Float lead, Int around, Int number, Mask m) {
-    Spec through[2];
-    for (int side = 0; side < 2; side++) {
-        Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false, lead};
-        Mask blocked;
-        through[side] = walk_transmittance(t, rays[side], m_set(false), m, t->scene->has_media ? &fog : NULL, &blocked, NULL);
-    }
-    return spec_sub(through[0], through[1]);
+// What of a light comes along a ray that begins `lead` before an edge, in the medium `around`, which counts from there on.
+static Spec veils_past(Tracer *t, Ray ray, Float lead, Int around, Int number, Mask m) {
+    Fog fog = {around, stream_key(t, number, 0, STREAM_SHADOW), false, lead};
+    Mask blocked;
+    return walk_transmittance(t, ray, m_set(false), m, t->scene->has_media ? &fog : NULL, &blocked, NULL);
 }
