@@ -172,9 +172,6 @@ static const char *gap_of_lookups(const SceneView *view) {
                 return "surfaces have volumes of filter_type=\"nearest\" as textures, whose jumps from voxel to "
                        "voxel pass over points that move";
             }
-            if (rey_texture_holds(view, view->bsdfs[i].slot[k], rey_is_volume) && rey_bsdf_holds(view, i, rey_bsdf_opens)) {
-                return "surfaces that let a part of the light pass have volumes as textures, which rays that move pass elsewhere";
-            }
         }
     }
     for (int64_t i = 0; i < view->emitters_count && view->volumes_count > 0; i++) {

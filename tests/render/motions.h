@@ -334,6 +334,8 @@ static const Motion motions[] = {
     {"veil_panes.xml", "tube.to_world", SHIFT, {0.6f, 0.3f, 1}, 0.02, 3072, 12288},
     {"veil_panes.xml", "lamp.to_world", SHIFT, {1, 0.5f, 0.3f}, 0.02, 128, 1024},
     {"veil_panes.xml", "camera.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1024, 4096},
+    {"veil_solid.xml", "card.to_world", SHIFT, {0.4f, 0.8f, 0.5f}, 0.02, 384, 3072},
+    {"veil_solid.xml", "camera.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 1024, 5120},
     {"ride_veil_panes.xml", "pane.to_world", TURN, {0.5f, 1, 0.2f}, 1, 768, 3072},
     {"ride_veil_panes.xml", "lamp.to_world", SHIFT, {1, 0.5f, 0.3f}, 0.02, 256, 1024},
     {"ride_veil_glow.xml", "veil.to_world", SHIFT, {0, -0.6f, 1}, 0.05, 1024, 6144},
