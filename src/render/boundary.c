@@ -12,7 +12,6 @@
 #include "render/light_borders.h"
 #include "render/terms.h"
 #include "render/texture_steps.h"
-#include "render/veils.h"
 #include "scene/sink.h"
 #include "sensor/kinds.h"
 #include "shape/cut.h"
@@ -74,10 +73,8 @@ bool rey_boundary_veiled(const SceneView *view) {
 ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sensor) {
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
-    const char *passed = rey_veils_gap(view);
     const char *what = !rey_boundary_sees(sensor)    ? "this sensor"
-                       : passed                      ? passed
-                       : step                        ? step
+                         : step                        ? step
                        : !rey_boundary_chained(view) ? "functions that let light pass"
                                                      : NULL;
     if (what) {

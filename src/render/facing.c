@@ -5,7 +5,6 @@
 #include "render/blame.h"
 #include "render/boundary.h"
 #include "render/cuts.h"
-#include "render/veils.h"
 #include "shape/shape.h"
 
 // Whether there is a map within another one. within: it is inside one.
@@ -32,9 +31,6 @@ const char *rey_facing_gap(const SceneView *view, const SensorRecord *sensor) {
     }
     if (view->drops) {
         return "where 'path' with hide_emitters drops rays that only pass";
-    }
-    if (rey_veils_gap(view)) {
-        return "beside masks and thin glass that the shadow rays of 'volpath' pass to lights of the kind 'directionalarea'";
     }
     if (rey_boundary_chained(view) && !rey_chains_known(view, sensor)) {
         return "beside these smooth mirrors and glass";

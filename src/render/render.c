@@ -14,7 +14,6 @@
 #include "render/shards.h"
 #include "render/terms.h"
 #include "render/update.h"
-#include "render/veils.h"
 #include "scene/sink.h"
 
 #include <string.h>
@@ -334,8 +333,7 @@ static rey_result derivative_begin(Render *r, rey_scene *scene, const rey_render
     if (result != REY_OK) {
         return result;
     }
-    const bool veiled = scene->view.through && rey_boundary_veiled(&scene->view) && !rey_veils_gap(&scene->view);
-    r->job.veils = veiled && (r->needed & ~REY_TERM_INTERIOR);
+    r->job.veils = scene->view.through && rey_boundary_veiled(&scene->view) && (r->needed & ~REY_TERM_INTERIOR);
     if (!request.asked) {
         rey_live_groups(&scene->view, &r->job, (int32_t *)(uintptr_t)r->job.volume_at + scene->view.volumes_count);
     }

@@ -13,7 +13,6 @@
 #include "render/particles.h"
 #include "render/rims.h"
 #include "render/texture_steps.h"
-#include "render/veils.h"
 #include "scene/sink.h"
 
 #include <stdio.h>
@@ -120,10 +119,6 @@ const char *rey_rides_gap(const SceneView *view) {
         if (passes && shape->emitter >= 0) {
             return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
         }
-    }
-    if (rey_veils_gap(view)) {
-        return "in scenes with participating media, what moves changes the ways through masks and thin glass past which shadow "
-               "rays lead to lights of the kind 'directionalarea'";
     }
     if (has_projector(view)) {
         return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";

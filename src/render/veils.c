@@ -2,7 +2,6 @@
 #include "render/veils.h"
 
 #include "bsdf/table.h"
-#include "emitter/emitter.h"
 #include "emitter/table.h"
 #include "render/blame.h"
 #include "render/boundary.h"
@@ -25,18 +24,7 @@ bool rey_veil_is_uneven(const SceneView *view, int32_t bsdf) {
 bool rey_veils_sharp(const SceneView *view) {
     bool sharp = false;
     for (int64_t i = 0; i < view->emitters_count; i++) {
-        int32_t kind = view->emitters[i].kind;
-        sharp |= rey_emitter_kinds[kind].form == EMITTER_IS_DELTA || kind == EMITTER_DIRECTIONALAREA;
+        sharp |= rey_emitter_kinds[view->emitters[i].kind].form == EMITTER_IS_DELTA;
     }
     return sharp && view->through && rey_boundary_veiled(view);
-}
-
-const char *rey_veils_gap(const SceneView *view) {
-    bool sheaf = false;
-    for (int64_t i = 0; i < view->emitters_count; i++) {
-        sheaf |= view->emitters[i].kind == EMITTER_DIRECTIONALAREA;
-    }
-    return sheaf && rey_veils_sharp(view)
-               ? "the shadow rays of 'volpath', which pass masks and thin glass to lights of the kind 'directionalarea'"
-               : NULL;
 }

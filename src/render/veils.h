@@ -7,5 +7,3 @@
 bool rey_veil_is_uneven(const SceneView *view, int32_t bsdf);
 // Whether shadow rays pass such surfaces on their way to such lights.
 bool rey_veils_sharp(const SceneView *view);
-// In words: why what moves is not known beside those, null where it is.
-const char *rey_veils_gap(const SceneView *view);

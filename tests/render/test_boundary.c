@@ -253,7 +253,6 @@ static void test_refused(void **state) {
         const char *word;
     } cases[] = {{"layers.xml", "camera.to_world", 3, "'specular'"},
                  {"ride_veil.xml", "camera.to_world", 3, "smooth mirrors, glass, masks"},
-                 {"veil_sheaf.xml", "ball.to_world", 3, "lights of the kind 'directionalarea'"},
                  {"ride_hidden.xml", "camera.to_world", 3, "look past them"},
                  {"ride_hidden.xml", "bulb.to_world", 3, "look past them"},
                  {"ride_cut.xml", "tile.to_world", 3, "cut off what comes through participating media"},
