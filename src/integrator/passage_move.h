@@ -3,7 +3,7 @@
 //   dT = -T int s grad(extinction) . dw ds - T extinction(end) d(length) + T sum_i dx_i (extinction behind - in front),
 //   dx_i = n . (v_i - s_i dw) / n . w
 // at the borders i that it crosses (border.h). In media of flakes the extinction also changes by its slope along dw itself.
-// NOT differentiated: jumps between nearest voxels, and surfaces that dim what passes them, under rays that turn.
+// What surfaces dim is in walk_adj.h. NOT differentiated: jumps between nearest voxels under rays that turn.
 #pragma once
 
 #include "integrator/beacon.h"

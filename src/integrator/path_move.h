@@ -10,8 +10,7 @@
 // adjoints of its position where it meets the next surface (drag) and of its direction (turn) back through the chain.
 // Radiance that leaves a vertex is thus of two kinds: `attached`, and what came along a chain. Light samples cannot make
 // chains, so that no MIS weight joins the two.
-// NOT differentiated: visibility, jumps of what the camera sees, surfaces that let a path between two vertices pass, and
-// transmittances of shadow rays.
+// NOT differentiated here: visibility, jumps of what the camera sees, and transmittances of shadow rays (walk_adj.h).
 #pragma once
 
 #include "integrator/beacon_view.h"

@@ -44,7 +44,7 @@ static NOINLINE void walk_adj(const Tracer *t, const Walk *walk, Spec dt, Turn *
             BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &hit), t->floor);
             Vec3 wo = frame_to_local(&si.sh, walk->d), dwi = v3_zero(), dwo = v3_zero(), unused = v3_zero();
             Frame dframe = {v3_zero(), v3_zero(), v3_zero()};
-            const bool turns = turn && t->job->veils_turn && (t->job->live[id] & LIVE_UNEVEN);
+            const bool turns = turn && (t->job->live[id] & LIVE_UNEVEN);
             SurfaceAdj worth = surface_adj_zero();
             sink->at = turns ? &worth.at : NULL;
             sink->point = turns ? &worth.p : NULL;

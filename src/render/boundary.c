@@ -74,7 +74,7 @@ ChainObstacle rey_chains_obstacle(const SceneView *view, const SensorRecord *sen
     int32_t texture = -1;
     const char *step = rey_texture_unknown_step(view, REY_TERM_SPECULAR, &texture);
     const char *what = !rey_boundary_sees(sensor)    ? "this sensor"
-                         : step                        ? step
+                       : step                        ? step
                        : !rey_boundary_chained(view) ? "functions that let light pass"
                                                      : NULL;
     if (what) {

@@ -111,9 +111,10 @@ void rey_live_groups(const SceneView *view, PathJob *job, int32_t *live) {
         const Group *group = view->groups + i;
         // What moves changes the directions from which every surface is lit.
         bool scattering = job->any_normals || job->any_places || job->any_motion || bsdf_live(view, job, group->bsdf);
+        const bool uneven = sharp && rey_veil_is_uneven(view, group->bsdf);
         live[i] = (scattering ? LIVE_SCATTERING : 0) | (emitter_live(view, job, group->emitter) ? LIVE_EMISSION : 0) |
-                  (rey_veil_is_uneven(view, group->bsdf) ? LIVE_UNEVEN : 0);
-        job->veils_turn |= sharp && (live[i] & LIVE_UNEVEN);
+                  (uneven ? LIVE_UNEVEN : 0);
+        job->veils_turn |= uneven;
     }
     moving_groups(view, job, live);
     for (int64_t i = 0; i < view->media_count && view->has_media; i++) {
