@@ -39,7 +39,7 @@ typedef struct EdgeRecord {
     int32_t fan, fan_count; // meshes: where more than two triangles meet, such vertices of the others, in `fans`
     int32_t sides, side_count; // other surfaces that end along all of it, among the SharedSides (shared.h)
     int32_t sharers;     // how many records count for it together, 0 as 1
-    int32_t crease;      // whether and why shading jumps across it: EDGE_SMOOTH, _CREASE, _SOFT
+    int32_t crease;      // whether and why shading jumps across it: EDGE_SMOOTH, _CREASE, _SOFT, _STEP
     float first, last;   // the part of it that counts, within [0, 1]
 } EdgeRecord;
 

@@ -96,16 +96,12 @@ static Spec segment_folded(Tracer *t, const Segment *s, Mask m) {
 // What comes through the points beside lines along which a surface's share jumps, from the side that s->n points to less from the
 // other one.
 static Spec segment_mark_jump(Tracer *t, const Segment *s, Int around, Float behind, Int number, Mask m) {
-    const bool media = t->scene->has_media;
-    Mask blocked, may;
+    Mask may;
     Vec3 past = s->edge.p;
     Int beyond = around;
-    Spec first = walk_pass(t, &s->edge.beside[0], s->d, m_set(false), m, &past, &may, media ? &beyond : NULL);
-    beyond = around;
-    Spec second = walk_pass(t, &s->edge.beside[1], s->d, m_set(false), m, &past, &may, media ? &beyond : NULL);
-    Fog fog = {beyond, stream_key(t, number, 0, STREAM_SHADOW), false, f_set(0)};
-    Ray ahead = segment_reach(t, s, past, behind);
-    Spec through = walk_transmittance(t, ahead, m_set(false), m, media ? &fog : NULL, &blocked, NULL);
+    Spec first = walk_pass(t, &s->edge.beside[0], s->d, m_set(false), m, &past, &may, NULL);
+    Spec second = walk_pass(t, &s->edge.beside[1], s->d, m_set(false), m, &past, &may, t->scene->has_media ? &beyond : NULL);
+    Spec through = veils_past(t, segment_reach(t, s, past, behind), f_set(0), beyond, number, m);
     return spec_mul(spec_sub(second, first), through); // s->n points away from edge.side[0]
 }
 
