@@ -94,7 +94,7 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
     *edge = *e;
     *number = (float)weight;
     *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_TUBE || e->kind == EDGE_MARK ||
-              e->kind == EDGE_TERMINATOR || e->kind == EDGE_MESH;
+              e->kind == EDGE_TERMINATOR || e->kind == EDGE_MESH || e->kind == EDGE_MEETING;
     return REY_OK;
 }
 

@@ -1,7 +1,7 @@
 // beam.h: between which points of a surface the light of a spot or a projector ends abruptly or jumps (render/light_borders.h).
 #pragma once
 
-#include "emitter/emitter.h"
+#include "emitter/beam.h"
 #include "integrator/boundary/field.h"
 
 // A border of light between two points: whose it is, -1 = there is none, and its unit normal.

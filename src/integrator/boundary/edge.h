@@ -1,6 +1,7 @@
 // edge.h: points of the curves along which pictures jump, one curve per lane.
 #pragma once
 
+#include "emitter/beam.h"
 #include "integrator/boundary/facet.h"
 #include "integrator/boundary/mark.h"
 #include "integrator/boundary/round.h"
@@ -175,6 +176,18 @@ static void edge_of_meeting(const SceneView *scene, const BoundaryJob *b, Int e,
     out->side[0] = v3_select(m, v3_cross(tangent, g[0]), out->side[0]);
     out->side[1] = v3_select(m, v3_neg(out->side[0]), out->side[1]);
     out->open = out->open & ~m;
+    out->border = m & mi_lt(out->met.shape, i_set(0)) & mi_lt(i_set(-1), out->met.prim);
+}
+
+// The points beside the border of a light on a surface: so close that seldom another border lies between them.
+static void edge_beside_border(const SceneView *scene, EdgePoint *out) {
+    const Float step = 0.1f * interaction_step(out->p);
+    for (int k = 0; k < 2; k++) {
+        Vec3 normal, p = v3_madd(out->p, step * f_safe_rcp(v3_length(out->side[k])), out->side[k]);
+        Hit hit = point_hit(scene, i_select(out->border, out->hit.shape, i_set(-1)), out->hit.prim, out->hit.instance, p, &normal);
+        hit.p = p;
+        out->beside[k] = hit_select(out->border, &hit, out->beside + k);
+    }
 }
 
 // The line along which a texture jumps, on both sides of which the same surface is seen.
@@ -204,32 +217,6 @@ static void edge_of_mark(const SceneView *scene, const BoundaryJob *b, Int e, Fl
     out->side[0] = v3_select(m, f.across, out->side[0]);
     out->side[1] = v3_select(m, v3_neg(f.across), out->side[1]);
     out->open = out->open & ~m;
-}
-
-// Adds the adjoint dp of points p of the borders of lights, which move with their poses and projectors' fields of view: p = A q,
-// where q moves with the extent of the picture across the axis.
-static void borders_move_adj(const SceneView *scene, Int light, Vec3 p, Vec3 dp, Sink *sink, Mask m) {
-    static const int kinds[2][2] = {{EMITTER_SPOT, SLOT(Spot, to_world)}, {EMITTER_PROJECTOR, SLOT(Projector, to_world)}};
-    Float rows[3] = {dp.x, dp.y, dp.z};
-    for (int i = 0; i < 2; i++) {
-        Mask mine = m & mi_eq(EMITTER_FIELD(scene, i_select(m, light, i_set(0)), kind), i_set(kinds[i][0]));
-        if (!m_any(mine)) {
-            continue;
-        }
-        Light of = {scene->emitters, i_select(mine, light, i_set(i_lane(light, m_first(mine)))), true};
-        Vec3 q = light_to_local(scene, &of, p);
-        for (int k = 0; k < 3; k++) {
-            light_place_adj(&of, kinds[i][1], 4 * k, rows[k] * q.x, sink, mine);
-            light_place_adj(&of, kinds[i][1], 4 * k + 1, rows[k] * q.y, sink, mine);
-            light_place_adj(&of, kinds[i][1], 4 * k + 2, rows[k] * q.z, sink, mine);
-            light_place_adj(&of, kinds[i][1], 4 * k + 3, rows[k], sink, mine);
-        }
-        if (kinds[i][0] == EMITTER_PROJECTOR) {
-            Vec3 across = v3_madd(v3_scale(light_pose_column(scene, &of, kinds[i][1], 0), q.x), q.y,
-                                  light_pose_column(scene, &of, kinds[i][1], 1));
-            projector_extent_adj(scene, &of, v3_dot(dp, across) / light_table(scene, &of, PROJECTOR_EXTENT), sink, mine);
-        }
-    }
 }
 
 // Adds what lines of textures are worth that move where their steps F change: to_uv has them change by `df`.
@@ -264,6 +251,7 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     Mask mesh = mi_eq(kind, i_set(EDGE_MESH)), terminator = mi_eq(kind, i_set(EDGE_TERMINATOR));
     out.meeting = mi_eq(kind, i_set(EDGE_MEETING));
     out.met = out.hit;
+    out.border = m_set(false);
     if (m_any(mesh)) {
         edge_of_mesh(scene, b, e, t, mesh, &out);
     }
@@ -283,6 +271,9 @@ static NOINLINE EdgePoint edge_sample(const SceneView *scene, const BoundaryJob 
     out.line = i_set(-1);
     if (m_any(out.mark)) {
         edge_of_mark(scene, b, e, t, out.mark, &out);
+    }
+    if (m_any(out.border)) {
+        edge_beside_border(scene, &out);
     }
     out.hit.p = out.p;
     return out;

@@ -28,6 +28,7 @@ typedef struct EdgePoint {
     Hit met;
     Vec3 across[2];
     Mask mark;          // a line of its surface's texture; beside: the points on both sides of it, the first one at side[0]
+    Mask border;        // the border of a light on it, of which `beside` says the same
     Hit beside[2];
     Vec2 nudge[2];      // what is added to their uv
     Mask half;          // it lies on the surface's end, and moves with to_uv alone

@@ -92,13 +92,13 @@ static Mask primary_visible(Tracer *t, const BoundaryJob *b, const PrimarySample
     if (t->scene->hide_emitters) { // the sensor sees nothing of lights
         m = m & mi_lt(SHAPE_FIELD(t->scene, i_select(m, s->edge.hit.shape, i_set(0)), emitter), i_set(0));
     }
-    // Paths beside marks, where normals turn away and between the triangles of a mesh start on their surfaces (primary_look), also
-    // where these are narrower than the paths' step.
+    // Paths beside marks and borders of light, where normals turn away and between the triangles of a mesh start on their surfaces
+    // (primary_look), also where these are narrower than the paths' step, as they are next to outlines.
     Mask turns = m_gt(v3_dot(s->edge.normal, s->edge.normal), f_set(0));
     const EdgePoint *e = &s->edge;
     Mask parts = m_lt(edge_rise(e, e->side[0], s->n) * edge_rise(e, e->side[1], s->n), f_set(0)); // neither is seen edge-on
     Mask inner = primary_is_mesh(t, s) & ~s->silhouette & mi_lt(i_set(-1), e->other) & parts;
-    Mask clips = edge_clips(&s->edge), own = m & (s->edge.mark | turns | inner | clips);
+    Mask clips = edge_clips(&s->edge), own = m & (e->mark | e->border | turns | inner | clips);
     Mask visible = edge_between(t, b, &s->edge, true, s->silhouette, s->n, rays, m & ~own);
     if (m_any(own)) {
         Ray ray = primary_ray(t, s, 0).ray;
@@ -111,7 +111,7 @@ static Mask primary_visible(Tracer *t, const BoundaryJob *b, const PrimarySample
         Mask clear = mi_lt(hit.shape, i_set(0)) | m_gt(found, reach * (1.0f - 2e-5f));
         clear = clear | (clips & m_gt(found, reach - interaction_step(s->edge.p))); // rays may begin there
         clear = clear | (same & (mi_eq(hit.prim, s->edge.hit.prim) | mi_eq(hit.prim, s->edge.other)));
-        visible = visible | (own & ((s->edge.mark & here) | ((turns | inner | clips) & clear)));
+        visible = visible | (own & (((e->mark | e->border) & here) | ((turns | inner | clips) & clear)));
     }
     return visible;
 }
@@ -275,7 +275,8 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
         for (int side = 0; side < 2 && m_any(own); side++) {
             primary_touch(t, &s, side * half + k, side ? 1 : -1, own);
         }
-        for (int side = 0; side < 2 && m_any(round | s.edge.mark | turns); side++) {
+        Mask lines = s.edge.mark | s.edge.border;
+        for (int side = 0; side < 2 && m_any(round | lines | turns); side++) {
             int32_t at = side * half + k;
             Mask inside = round & (side ? above : ~above);
             const Workspace *ws = &t->ws;
@@ -286,7 +287,7 @@ static void primary_look(Tracer *t, const BoundaryJob *b, const Pinhole *pinhole
                        v3_select(inside, s.edge.inner, record_v3(ws->hit_x, ws->hit_y, ws->hit_z, at)),
                        i_select(inside, s.edge.hit.instance, i_load(ws->hit_instance + at))};
             Hit beside = hit_select(side ? above : ~above, s.edge.beside, s.edge.beside + 1);
-            hit = hit_select(m & s.edge.mark, &beside, &hit);
+            hit = hit_select(m & lines, &beside, &hit);
             hit = hit_select(turns, &s.edge.hit, &hit);
             hit_store(t, at, &hit);
         }
