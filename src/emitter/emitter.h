@@ -36,11 +36,12 @@ enum {
 
 // Where in theta the coordinates of a light's position are, in the world; false of lights that are not at a point.
 KFN bool emitter_place(const EmitterRecord *e, int32_t at[3]) {
-    const bool point = e->kind == EMITTER_POINT;
+    const bool point = e->kind == EMITTER_POINT, spot = e->kind == EMITTER_SPOT;
+    const int pose = spot ? SLOT(Spot, to_world) : SLOT(Projector, to_world);
     for (int k = 0; k < 3; k++) {
-        at[k] = point ? e->slot[SLOT(Point, position)] + k : e->slot[SLOT(Spot, to_world)] + 4 * k + 3;
+        at[k] = point ? e->slot[SLOT(Point, position)] + k : e->slot[pose] + 4 * k + 3;
     }
-    return point || e->kind == EMITTER_SPOT;
+    return point || spot || e->kind == EMITTER_PROJECTOR;
 }
 
 KFN bool emitter_is_delta(const EmitterRecord *e) { return EMITTER_DELTA_KINDS >> e->kind & 1; }

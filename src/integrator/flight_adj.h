@@ -7,7 +7,7 @@
 // NOT differentiated: the choice of distances, channels and real collisions. Where media lie: border.h.
 #pragma once
 
-#include "integrator/border.h"
+#include "integrator/shaft.h"
 
 enum { FLIGHT_POINTS = 2 }; // per flight, and per piece of a shadow ray
 
@@ -181,6 +181,9 @@ static NOINLINE void flight_adj(const Tracer *t, const FlightAdj *a, int32_t liv
 
 static void flight_sweep(Tracer *t, const RecordBatch *batch, Int slot, Spec suffix, Mask finite, Sink *sink) {
     const int32_t live = t->job->live[t->scene->groups_count + batch->group];
+    if (t->job->beam_count > 0) {
+        shafts_sweep(t, batch, finite, sink);
+    }
     if (!(live & (LIVE_EXTINCTION | LIVE_GLOW | LIVE_BORDER))) {
         return;
     }

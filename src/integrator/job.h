@@ -3,6 +3,7 @@
 
 #include "scene/scene.h"
 #include "shape/corners.h"
+#include "shape/marks.h"
 
 // MODE_REPLAY: the picture of another scene along the paths of this one (path_replay.h).
 enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV, MODE_REPLAY };
@@ -65,6 +66,9 @@ typedef struct PathJob {
     int32_t seen_x, seen_y, seen_width, seen_height; // what of the film is sampled, in pixels (beacon_view.h)
     const int32_t *beacon_of;     // by emitter: its beacon, -1 = none
     int32_t *lamp_medium;         // not null: by emitter, filled with the medium that it lies in, -1 = none, before all else
+    const BeamRecord *beams;      // where light ends or jumps in media, if anything moves (shaft.h)
+    const StepRecord *beam_steps;
+    int32_t beam_count;
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none

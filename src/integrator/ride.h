@@ -10,6 +10,7 @@
 // Shadow rays from collisions keep their direction, and their ends slide over the lights; those from surfaces keep both ends.
 // Borders of media are passed, and points of the way between attached ends move with both (ride_add). The sensor's ray moves as
 // the sensor says: by o' + s d' at the distance s, with a collision there or where it meets a surface (first_ride_adj).
+// Borders of light in the air are passed as those of media are (shaft.h).
 // What masks and thin glass let pass stays on its line, of which the stretch before them grows as that behind them shrinks.
 #pragma once
 

@@ -6,6 +6,7 @@
 #include "emitter/emitter.h"
 #include "render/blame.h"
 #include "render/boundary.h"
+#include "render/boundary_edges.h"
 #include "render/light_borders.h"
 #include "render/live.h"
 #include "render/projection.h"
@@ -317,6 +318,27 @@ static rey_result find_lamps(Render *r) {
     return result;
 }
 
+// Borders of light in media move past collisions, and these past them; and what collisions see of borders on surfaces is known
+// where they ride.
+static rey_result find_beams(Render *r) {
+    const SceneView *view = &r->scene->view;
+    PathJob *job = &r->job;
+    if (!view->has_media || !(job->any_motion || job->any_places || job->glides)) {
+        return REY_OK;
+    }
+    rey_result result = rey_beam_records(r->scene, &r->beam_steps, &r->beams);
+    job->beams = r->beams.data;
+    job->beam_steps = r->beam_steps.data;
+    job->beam_count = (int32_t)r->beams.count;
+    for (int32_t i = 0; i < job->beam_count && result == REY_OK; i++) {
+        if (rey_light_moves(r, job->beams[i].light)) {
+            job->glides = false;
+            job->rides = job->any_motion = true;
+        }
+    }
+    return result;
+}
+
 rey_result rey_lights_ride(Render *r) {
     const SceneView *view = &r->scene->view;
     bool beside = false;
@@ -324,7 +346,8 @@ rey_result rey_lights_ride(Render *r) {
         int32_t at[3];
         beside |= emitter_place(view->emitters + i, at) && lights_what_moves(r, i);
     }
-    rey_result result = beside ? find_lamps(r) : REY_OK;
+    rey_result result = find_beams(r);
+    result = result == REY_OK && beside ? find_lamps(r) : result;
     if (!beside || result != REY_OK || rey_rides_gap(view) || turns(view)) {
         return result;
     }
@@ -337,9 +360,14 @@ rey_result rey_lights_ride(Render *r) {
     return REY_OK;
 }
 
-// Whether the light of a light at a point jumps, or all but.
-static bool light_jumps(const SceneView *view, const EmitterRecord *e) {
-    return e->kind == EMITTER_SPOT && (rey_light_is_abrupt(view, e) || rey_light_is_steep(view, e));
+// Whether the light of a light ends abruptly or jumps in the air, or all but: next to the light, where all its borders meet, what
+// they bring to flights has no finite variance.
+static bool has_borders(const Render *r, int32_t light) {
+    bool found = rey_light_is_steep(&r->scene->view, r->scene->view.emitters + light);
+    for (int32_t i = 0; i < (int32_t)r->beams.count && !found; i++) {
+        found = ARRAY_AT(r->beams, BeamRecord, i).light == light;
+    }
+    return found;
 }
 
 // Whether the sensor is one that is looked up backwards.
@@ -354,7 +382,7 @@ static bool beacon_of_light(const Render *r, int32_t light, Beacon *beacon) {
     const EmitterRecord *e = view->emitters + light;
     const bool seen = light_is_shifted(r, light);
     int32_t at[3];
-    if (!emitter_place(e, at) || light_jumps(view, e) || (seen && !camera_is_known(r))) {
+    if (!emitter_place(e, at) || has_borders(r, light) || (seen && !camera_is_known(r))) {
         return false;
     }
     const double p[3] = {(double)view->theta[at[0]], (double)view->theta[at[1]], (double)view->theta[at[2]]};
@@ -373,7 +401,7 @@ static rey_result refuse_lamp(const Render *r, int32_t light) {
     const char *why = "so close to a surface (grids of distances count as close) or to the border of its medium";
     char name[OBJECT_NAME];
     rey_name_emitter(r->scene, light, name);
-    why = light_jumps(view, view->emitters + light) ? "where its beam_width is its cutoff_angle, or all but it" : why;
+    why = has_borders(r, light) ? "where its light ends abruptly or jumps" : why;
     why = light_is_shifted(r, light) && !camera_is_known(r) ? "with sensors that are no cameras" : why;
     why = medium_is_even(view, r->lamp_medium[light]) ? why : "where the medium differs from place to place";
     why = turns(view) ? "in scenes with smooth mirrors, glass, masks or normals of their own" : why;
@@ -419,4 +447,6 @@ void rey_beacons_end(Render *r) {
     rey_free(r->scene->ctx, r->lamp_medium);
     rey_free(r->scene->ctx, r->beacons);
     rey_free(r->scene->ctx, r->beacon_of);
+    rey_array_free(r->scene->ctx, &r->beams);
+    rey_array_free(r->scene->ctx, &r->beam_steps);
 }

@@ -94,30 +94,6 @@ bool rey_chains_known(const SceneView *view, const SensorRecord *sensor) {
     return !rey_chains_obstacle(view, sensor).what;
 }
 
-static bool moves_always(const void *user, int32_t shape, int32_t instance) {
-    UNUSED(user);
-    UNUSED(shape);
-    UNUSED(instance);
-    return true;
-}
-
-// Collisions that ride along with surfaces may see all curves along which borders of light pass through surfaces, also those that
-// stand still.
-static rey_result check_borders(rey_scene *scene, int term) {
-    Array meetings = {0};
-    rey_result result = rey_meetings_with_borders(scene, NULL, 0, moves_always, NULL, &meetings);
-    for (size_t i = 0; i < meetings.count && result == REY_OK; i++) {
-        const MeetingRecord *m = &ARRAY_AT(meetings, MeetingRecord, i);
-        if (m->shape[1] < 0) {
-            char name[OBJECT_NAME];
-            rey_name_shape(scene, m->shape[0], name);
-            result = refuse(scene, term, "the curves along which the border of a light passes over surfaces", name);
-        }
-    }
-    rey_array_free(scene->ctx, &meetings);
-    return result;
-}
-
 // Whether lines of textures that a selection moves over their surfaces are known.
 static rey_result check_lines(const Render *r, int term) {
     int32_t bsdf, emitter, shape;
@@ -211,7 +187,7 @@ static rey_result boundary_check(const Render *r, int term) {
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
         bool steep = rey_light_is_steep(view, view->emitters + i), moves = r->job.any_motion;
-        bool lost = view->has_media || (!r->def.terms && !(r->terms & REY_TERM_PRIMARY)); // it became abrupt
+        bool lost = (!r->def.terms && !(r->terms & REY_TERM_PRIMARY)); // it became abrupt
         bool hard = lost && rey_light_is_abrupt(view, view->emitters + i);
         for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
             moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
@@ -224,7 +200,7 @@ static rey_result boundary_check(const Render *r, int term) {
                           name);
         }
     }
-    return r->job.rides || (view->has_media && term == REY_TERM_SPECULAR) ? check_borders(scene, term) : REY_OK;
+    return REY_OK;
 }
 
 void rey_boundaries_free(Render *r) {

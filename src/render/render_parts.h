@@ -60,6 +60,7 @@ typedef struct Render {
     Beacon *beacons;       // those of the job
     int32_t *beacon_of;
     Array marks;           // curves along which textures jump (shape/marks.h)
+    Array beams, beam_steps; // of the job: borders of light in media
     BoundaryPlan boundary[BOUNDARY_KINDS];
     int32_t faces;         // which way shading normals were met: FACES_ bits
     int64_t borders, astray; // as in PathJob, of paths from the sensor

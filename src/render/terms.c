@@ -62,8 +62,7 @@ static int terms_known(const rey_scene *scene, const rey_render_def *def, int ch
     if (p->moves_rims) {
         return still | REY_TERM_PRIMARY | REY_TERM_INDIRECT | chains;
     }
-    const int light = REY_TERM_INTERIOR | (scene->view.has_media ? 0 : REY_TERM_PRIMARY);
-    return (p->emitter >= 0 ? light : still) | REY_TERM_INDIRECT | chains;
+    return (p->emitter >= 0 ? REY_TERM_INTERIOR | REY_TERM_PRIMARY : still) | REY_TERM_INDIRECT | chains;
 }
 
 static bool jumps(const VolumeNode *v) { return v->kind == VOLUME_GRID && v->filter == FILTER_NEAREST; }
@@ -85,15 +84,6 @@ static bool is_jumping_volume(const SceneView *view, const TextureNode *t) {
     return t->kind == TEXTURE_VOLUME && jumps(view->volumes + t->volume);
 }
 
-static bool has_projector(const SceneView *view) {
-    for (int64_t i = 0; i < view->emitters_count; i++) {
-        if (view->emitters[i].kind == EMITTER_PROJECTOR) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static const char *gap_of_voxels(const SceneView *view) {
     for (int64_t i = 0; i < view->volumes_count; i++) {
         if (jumps(view->volumes + i)) {
@@ -101,14 +91,6 @@ static const char *gap_of_voxels(const SceneView *view) {
         }
     }
     return NULL;
-}
-
-// What is not known of cameras that move among media and their borders alone, null where all is.
-static const char *gap_of_glides(const SceneView *view) {
-    if (has_projector(view)) {
-        return "in scenes with participating media, collisions that move with the camera pass the border of a projector's light";
-    }
-    return gap_of_voxels(view);
 }
 
 // What is not known of surfaces that move in scenes with media, and of cameras among them, null where all is.
@@ -119,9 +101,6 @@ const char *rey_rides_gap(const SceneView *view) {
         if (passes && shape->emitter >= 0) {
             return "in scenes with participating media, lights on surfaces of the kind 'null' are passed where something moves";
         }
-    }
-    if (has_projector(view)) {
-        return "in scenes with participating media, collisions that move with what is seen pass the border of a projector's light";
     }
     return gap_of_voxels(view);
 }
@@ -145,7 +124,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
         return NULL;
     }
     if (p->camera >= 0) {
-        return rey_cameras_glide(view) ? gap_of_glides(view) : rey_rides_gap(view);
+        return rey_cameras_glide(view) ? gap_of_voxels(view) : rey_rides_gap(view);
     }
     if (p->geometry >= 0 || p->instance >= 0) {
         return rey_rides_gap(view);

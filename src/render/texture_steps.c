@@ -20,15 +20,10 @@ static bool texture_jumps(const SceneView *view, int32_t id) {
 }
 
 const char *rey_spots_gap(const SceneView *view, const Param *p) {
-    const bool moves = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->emitter >= 0;
     for (int64_t i = 0; i < view->emitters_count; i++) {
         const EmitterRecord *e = view->emitters + i;
         if (e->kind != EMITTER_SPOT || !texture_jumps(view, e->slot[SLOT(Spot, texture)])) {
             continue;
-        }
-        if (view->has_media && moves) {
-            return "in scenes with participating media, the lines along which a spot's texture jumps are not known where something "
-                   "moves";
         }
         if (p->texture >= 0 && e->slot[SLOT(Spot, cutoff_angle)] == p->texture) {
             return "the lines along which a spot's texture jumps move with its cutoff_angle";
@@ -49,7 +44,7 @@ const char *rey_texture_unknown_step(const SceneView *view, int term, int32_t *t
     for (int64_t i = 0; i < view->emitters_count && film; i++) {
         const EmitterRecord *e = view->emitters + i;
         const EmitterKind *kind = rey_emitter_kinds + e->kind;
-        bool known = e->kind == EMITTER_PROJECTOR || (e->kind == EMITTER_SPOT && !view->has_media); // light_borders.c
+        bool known = e->kind == EMITTER_PROJECTOR || e->kind == EMITTER_SPOT; // light_borders.c
         for (int k = 0; k < kind->param_count && e->shape < 0 && !known; k++) {
             *texture = kind->params[k].type < EMITTER_PARAM_POSITION ? e->slot[k] : -1;
             if (texture_jumps(view, *texture)) {

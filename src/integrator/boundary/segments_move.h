@@ -35,7 +35,7 @@ static void segments_ahead_adj(const Indirect *in, int32_t k, Vec3 n, Float both
     if (m_any(attached)) {
         points_move_adj(in->t, &far, v3_madd(met, -both * along, n), v3_zero(), sink, attached);
     }
-    Mask border = m & ~attached & mi_lt(i_set(-1), far.prim) & m_set(in->b->kind == BOUNDARY_CHAINED);
+    Mask border = m & ~attached & mi_lt(i_set(-1), far.prim) & m_set(boundary_is_paired(in->b->kind));
     if (sink->any_places && m_any(border)) {
         borders_move_adj(in->t->scene, far.prim, far.p, met, sink, border);
     }
