@@ -331,10 +331,19 @@ static rey_result find_beams(Render *r) {
     job->beam_steps = r->beam_steps.data;
     job->beam_count = (int32_t)r->beams.count;
     for (int32_t i = 0; i < job->beam_count && result == REY_OK; i++) {
-        if (rey_light_moves(r, job->beams[i].light)) {
-            job->glides = false;
-            job->rides = job->any_motion = true;
+        const int32_t light = job->beams[i].light;
+        if (!rey_light_moves(r, light)) {
+            continue;
         }
+        if (rey_rides_gap(view)) {
+            char name[OBJECT_NAME];
+            rey_name_emitter(r->scene, light, name);
+            return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
+                            "no term of the gradient of '%s', whose light ends abruptly or jumps, exists yet: %s", name,
+                            rey_rides_gap(view));
+        }
+        job->glides = false;
+        job->rides = job->any_motion = true;
     }
     return result;
 }
@@ -342,11 +351,11 @@ static rey_result find_beams(Render *r) {
 rey_result rey_lights_ride(Render *r) {
     const SceneView *view = &r->scene->view;
     bool beside = false;
+    rey_result result = find_beams(r);
     for (int64_t i = 0; i < view->emitters_count && view->has_media; i++) {
         int32_t at[3];
         beside |= emitter_place(view->emitters + i, at) && lights_what_moves(r, i);
     }
-    rey_result result = find_beams(r);
     result = result == REY_OK && beside ? find_lamps(r) : result;
     if (!beside || result != REY_OK || rey_rides_gap(view) || turns(view)) {
         return result;

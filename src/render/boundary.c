@@ -187,7 +187,7 @@ static rey_result boundary_check(const Render *r, int term) {
     }
     for (int64_t i = 0; i < view->emitters_count; i++) {
         bool steep = rey_light_is_steep(view, view->emitters + i), moves = r->job.any_motion;
-        bool lost = (!r->def.terms && !(r->terms & REY_TERM_PRIMARY)); // it became abrupt
+        bool lost = !r->def.terms && !(r->terms & REY_TERM_PRIMARY); // it became abrupt
         bool hard = lost && rey_light_is_abrupt(view, view->emitters + i);
         for (int k = 0; k < MAX_EMITTER_SLOTS; k++) {
             moves |= r->job.place_at[MAX_EMITTER_SLOTS * i + k] >= 0;
