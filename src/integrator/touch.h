@@ -13,9 +13,9 @@ enum { MOST_SURFACES_IN_A_ROW = 64 }; // a ray that meets more is taken to be bl
 static inline bool node_is_null(const BsdfNode *node) { return node->kind == BSDF_NULL; }
 static inline bool node_spreads(const BsdfNode *node) { return node->spreads; }
 
-// Lanes of m, all of which have a shape, whose functions are so.
+// Lanes of m, all of which have a shape, whose functions are so. The others may have any number for one.
 KFN Mask lanes_that(bool (*are)(const BsdfNode *node), const SceneView *scene, Int shape, Mask m) {
-    Int groups = SHAPE_FIELD(scene, i_max(shape, i_set(0)), group);
+    Int groups = SHAPE_FIELD(scene, i_select(m, shape, i_set(0)), group);
     Mask found = m_set(false);
     for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(groups, m_first(left));
