@@ -61,12 +61,11 @@ static Shafts shafts_load(const Tracer *t, const RecordBatch *batch) {
 }
 
 // Offers the lanes of m the border at the distance `at` with the normal n of the light's space, one of `count`.
-static NOINLINE void shaft_offer(const Tracer *t, const Light *l, Float at, Vec3 n, Float count, Float u, Mask m, Shafts *s) {
+static NOINLINE void shaft_offer(const Tracer *t, const Light *l, const Float extent[2], Float at, Vec3 n, Float count, Float u,
+                                 Mask m, Shafts *s) {
     const SceneView *scene = t->scene;
     at = f_select(m, at, f_set(0));
     LightSample to = emitter_sample_as(scene, l, v3_madd(s->o, at, s->d), (Vec2){f_set(0), f_set(0)});
-    Float extent[2];
-    beam_extent(scene, l, extent);
     Vec3 normal = light_gradient_to_world(scene, l, n);
     Float along = v3_dot(normal, s->d), steep = f_sqrt(n.x * n.x + n.y * n.y);
     // Along the ray, (u, v) cross the border as n has it, or against that.
@@ -91,10 +90,10 @@ static NOINLINE void shaft_offer(const Tracer *t, const Light *l, Float at, Vec3
 }
 
 // Of the lines of a step of the light's picture that flights pass, any one.
-static void shaft_lines(const Tracer *t, const Light *l, const StepRecord *step, Vec3 q, Vec3 dq, Shafts *s) {
+static void shaft_lines(const Tracer *t, const Light *l, const Float extent[2], const StepRecord *step, Vec3 q, Vec3 dq,
+                        Shafts *s) {
     Vec2 u = rng_2d(&s->random, SHAFT_DIMENSION + s->asked++);
-    Float extent[2], ends[2];
-    beam_extent(t->scene, l, extent);
+    Float ends[2];
     // Where the flight is before the light, its value rises or falls all the way.
     Float level = -q.z * f_safe_rcp(dq.z), low = s->low, high = s->high;
     low = f_select(m_gt(dq.z, f_set(0)), f_max(low, level), low);
@@ -112,14 +111,12 @@ static void shaft_lines(const Tracer *t, const Light *l, const StepRecord *step,
     Float at = -v3_dot(n, q) * f_safe_rcp(v3_dot(n, dq));
     m = m & m_ge(count, f_set(1)) & m_gt(at, low) & m_lt(at, high) & m_gt(q.z + at * dq.z, f_set(0));
     if (m_any(m)) {
-        shaft_offer(t, l, at, n, count, u.y, m, s);
+        shaft_offer(t, l, extent, at, n, count, u.y, m, s);
     }
 }
 
 // The cone of a spot, x^2 + y^2 = tan^2 z^2, where flights enter or leave it.
-static void shaft_cone(const Tracer *t, const Light *l, Vec3 q, Vec3 dq, Shafts *s) {
-    Float extent[2];
-    beam_extent(t->scene, l, extent);
+static void shaft_cone(const Tracer *t, const Light *l, const Float extent[2], Vec3 q, Vec3 dq, Shafts *s) {
     const Float t2 = extent[0] * extent[0];
     Float a = dq.x * dq.x + dq.y * dq.y - t2 * dq.z * dq.z, b = q.x * dq.x + q.y * dq.y - t2 * q.z * dq.z;
     Float c = q.x * q.x + q.y * q.y - t2 * q.z * q.z, square = b * b - a * c;
@@ -130,7 +127,7 @@ static void shaft_cone(const Tracer *t, const Light *l, Vec3 q, Vec3 dq, Shafts 
         Mask m = s->m & m_gt(square, f_set(0)) & m_gt(root[k], s->low) & m_lt(root[k], s->high) & m_gt(p.z, f_set(0));
         Float u = rng_1d(&s->random, SHAFT_DIMENSION + s->asked++);
         if (m_any(m)) {
-            shaft_offer(t, l, root[k], v3(p.x, p.y, -t2 * p.z), f_set(1), u, m, s);
+            shaft_offer(t, l, extent, root[k], v3(p.x, p.y, -t2 * p.z), f_set(1), u, m, s);
         }
     }
 }
@@ -141,11 +138,13 @@ static void shafts_choose(const Tracer *t, Shafts *s) {
         const BeamRecord *beam = t->job->beams + i;
         Light l = light_alone(t->scene->emitters + beam->light, i_set(beam->light));
         Vec3 q = light_to_local(t->scene, &l, s->o), dq = light_direction_to_local(t->scene, &l, s->d);
+        Float extent[2];
+        beam_extent(t->scene, &l, extent);
         if (beam->cone) {
-            shaft_cone(t, &l, q, dq, s);
+            shaft_cone(t, &l, extent, q, dq, s);
         }
         for (int32_t k = beam->first; k < beam->end; k++) {
-            shaft_lines(t, &l, t->job->beam_steps + k, q, dq, s);
+            shaft_lines(t, &l, extent, t->job->beam_steps + k, q, dq, s);
         }
     }
     s->m = s->m & mi_lt(i_set(-1), s->light);

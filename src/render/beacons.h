@@ -3,7 +3,8 @@
 
 #include "render/render_parts.h"
 
-// Where lights at a point that lie within media move, or the sensor beside them: collisions ride (integrator/ride.h), which
+// Where lights at a point that lie within media move, or the sensor beside them, or lights whose borders media show
+// (integrator/shaft.h; fills job->beams): collisions ride (integrator/ride.h), which
 // job->rides and what goes with it say from here on. Not where directions matter beyond what collisions see (rey_beacons_begin),
 // and where collisions cannot ride.
 rey_result rey_lights_ride(Render *r);

@@ -55,11 +55,16 @@ static bool clips(const Render *r, const EdgeRecord *e) {
     return m->shape[1] < 0 && m->prim[1] < 0;
 }
 
-// Whether it is where light ends on a surface that only mirrors or refracts, on which nothing shows it.
-static bool ends_unseen(const Render *r, const EdgeRecord *e) {
+// Whether it is where light ends on a surface.
+static bool ends_light(const Render *r, const EdgeRecord *e) {
     const MeetingRecord *m = &ARRAY_AT(r->meetings, MeetingRecord, e->prim);
+    return m->shape[1] < 0 && m->prim[1] >= 0;
+}
+
+// The same of a surface that only mirrors or refracts, on which nothing shows it.
+static bool ends_unseen(const Render *r, const EdgeRecord *e) {
     const SceneView *view = &r->scene->view;
-    return m->shape[1] < 0 && m->prim[1] >= 0 && !view->bsdfs[view->shapes[m->shape[0]].bsdf].spreads;
+    return ends_light(r, e) && !view->bsdfs[view->shapes[e->shape].bsdf].spreads;
 }
 
 static rey_result accumulate(Render *r, BoundaryPlan *plan, Array *kept, Array *weights) {
@@ -94,7 +99,7 @@ static rey_result keep_edge(Render *r, const EdgeRecord *e, double weight, bool 
     *edge = *e;
     *number = (float)weight;
     *round |= e->kind == EDGE_OUTLINE || e->kind == EDGE_SIDE || e->kind == EDGE_TUBE || e->kind == EDGE_MARK ||
-              e->kind == EDGE_TERMINATOR || e->kind == EDGE_MESH || e->kind == EDGE_MEETING;
+              e->kind == EDGE_TERMINATOR || e->kind == EDGE_MESH || (e->kind == EDGE_MEETING && ends_light(r, e));
     return REY_OK;
 }
 

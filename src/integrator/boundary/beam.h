@@ -26,19 +26,17 @@ typedef struct BeamPoints {
 
 static BeamPoints beam_points(const SceneView *scene, const Light *l, Vec3 from, Vec3 to) {
     BeamPoints p = {.q = {light_to_local(scene, l, from), light_to_local(scene, l, to)}};
+    beam_extent(scene, l, p.extent);
     for (int k = 0; k < 2; k++) {
         Mask before = m_gt(p.q[k].z, f_set(0));
         TexCoord uv;
         if (l->e->kind == EMITTER_SPOT) {
             SpotBeam beam = spot_beam(scene, l, beam_slope(p.q[k]));
             p.inside[k] = before & m_gt(beam.falloff, f_set(0));
-            p.extent[0] = p.extent[1] = -beam.tangent;
             uv = beam.uv;
         } else {
             ProjectorBeam beam = projector_beam(scene, l, beam_slope(p.q[k]), f_set(1));
             p.inside[k] = before & beam.inside;
-            p.extent[0] = beam.x;
-            p.extent[1] = beam.y;
             uv = beam.uv;
         }
         p.uv[k] = (Vec2){uv.x, uv.y};

@@ -55,7 +55,7 @@ typedef struct BoundaryJob {
     const BeamRecord *beams;  // where light ends or jumps in the air; their steps are among these
     const float *cdf;         // cumulative probabilities of the edges
     int32_t edge_count, beam_count;
-    bool round;               // outlines of round surfaces, marks, terminators or edges of smooth meshes are among them
+    bool round;               // outlines of round surfaces, marks, borders, terminators or edges of meshes are among them
     float scale;              // of the adjoint: samples per pixel of the interior over samples of this term
     int64_t first, count;     // of the samples, in their numbering
     bool lines;               // lines of textures move over their surfaces
