@@ -131,6 +131,7 @@ typedef struct Steps {
     int32_t shape;
     bool varies; // with uv
     bool oriented; // with the direction of the tangents
+    bool framed;   // with all of the parameterisation
 } Steps;
 
 static rey_result push_step(Steps *s, TextureStep step) {
@@ -211,6 +212,7 @@ static rey_result add_bsdf(Steps *s, int32_t id) {
     const BsdfNode *node = s->scene->view.bsdfs + id;
     rey_result result = REY_OK;
     s->oriented |= id >= 0 && rey_bsdf_oriented(&s->scene->view, node);
+    s->framed |= id >= 0 && node->surface;
     for (int k = 0; id >= 0 && k < MAX_SLOTS && result == REY_OK; k++) {
         result = add_texture(s, node->slot[k], rey_bsdf_takes_slope(node->kind, k));
     }
@@ -245,6 +247,9 @@ rey_result rey_texture_steps(rey_scene *scene, const int32_t *to_uv_at, Array *s
         }
         if (result == REY_OK && s.oriented) {
             result = push_step(&s, (TextureStep){.sort = STEP_TANGENTS, .at = -1});
+        }
+        if (result == REY_OK && s.framed) {
+            result = push_step(&s, (TextureStep){.sort = STEP_FRAMES, .at = -1});
         }
     }
     return result;

@@ -209,48 +209,80 @@ static void side_uv(const SceneView *view, const ShapeRecord *shape, const Side 
     }
 }
 
-// The unit vector along which u grows in a triangle, as interactions have it, and its normal.
-static void triangle_tangent(const SceneView *view, const ShapeRecord *shape, int32_t prim, double tangent[3], double n[3]) {
+// How points of a triangle move with u and v, as interactions have it, and its unit normal.
+static void triangle_frame(const SceneView *view, const ShapeRecord *shape, int32_t prim, double moves[2][3], double n[3]) {
     const int32_t *corners = mesh_indices(view, shape) + 3 * (int64_t)prim;
     const float *p[3], *uv[3] = {NULL, NULL, NULL};
-    double u = 1, v = 0, e[2][3], sizes[2] = {0, 0};
+    double by[2][2] = {{1, 0}, {0, 1}}, e[2][3], size = 0; // by: of u and v, of the two edges
     for (int k = 0; k < 3; k++) {
         p[k] = vertex_of(view, shape, corners[k]);
         uv[k] = shape->uvs >= 0 ? view->theta + shape->uvs + 2 * (int64_t)corners[k] : NULL;
     }
     if (uv[0]) {
-        double v1 = (double)uv[1][1] - (double)uv[0][1], v2 = (double)uv[2][1] - (double)uv[0][1];
-        double det = ((double)uv[1][0] - (double)uv[0][0]) * v2 - v1 * ((double)uv[2][0] - (double)uv[0][0]);
-        u = fabs(det) > 1e-20 ? v2 / det : 1;
-        v = fabs(det) > 1e-20 ? -v1 / det : 0;
+        double u1 = (double)uv[1][0] - (double)uv[0][0], u2 = (double)uv[2][0] - (double)uv[0][0];
+        double v1 = (double)uv[1][1] - (double)uv[0][1], v2 = (double)uv[2][1] - (double)uv[0][1], det = u1 * v2 - v1 * u2;
+        if (fabs(det) > 1e-20) {
+            by[0][0] = v2 / det, by[0][1] = -v1 / det;
+            by[1][0] = -u2 / det, by[1][1] = u1 / det;
+        }
     }
     for (int k = 0; k < 3; k++) {
         e[0][k] = (double)p[1][k] - (double)p[0][k];
         e[1][k] = (double)p[2][k] - (double)p[0][k];
-        tangent[k] = u * e[0][k] + v * e[1][k];
-        sizes[0] += tangent[k] * tangent[k];
+        for (int i = 0; i < 2; i++) {
+            moves[i][k] = by[i][0] * e[0][k] + by[i][1] * e[1][k];
+        }
     }
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
         n[k] = e[0][i] * e[1][j] - e[0][j] * e[1][i];
-        sizes[1] += n[k] * n[k];
+        size += n[k] * n[k];
     }
     for (int k = 0; k < 3; k++) {
-        tangent[k] = sizes[0] > 0 ? tangent[k] / sqrt(sizes[0]) : 0;
-        n[k] = sizes[1] > 0 ? n[k] / sqrt(sizes[1]) : 0;
+        n[k] = size > 0 ? n[k] / sqrt(size) : 0;
     }
+}
+
+static double distance(const double a[3], const double b[3]) {
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 // Whether the tangents of two triangles differ by more than the angle between them explains.
 static bool tangents_jump(const SceneView *view, const ShapeRecord *shape, const Side *a, const Side *b) {
-    double t[2][3], n[2][3], tangents = 0, normals = 0;
-    triangle_tangent(view, shape, a->at / 3, t[0], n[0]);
-    triangle_tangent(view, shape, b->at / 3, t[1], n[1]);
-    for (int k = 0; k < 3; k++) {
-        tangents += (t[0][k] - t[1][k]) * (t[0][k] - t[1][k]);
-        normals += (n[0][k] - n[1][k]) * (n[0][k] - n[1][k]);
+    static const double zero[3] = {0, 0, 0};
+    double moves[2][2][3], n[2][3];
+    for (int i = 0; i < 2; i++) {
+        triangle_frame(view, shape, (i ? b : a)->at / 3, moves[i], n[i]);
+        double size = distance(moves[i][0], zero);
+        for (int k = 0; k < 3; k++) {
+            moves[i][0][k] = size > 0 ? moves[i][0][k] / size : 0;
+        }
     }
-    return sqrt(tangents) > 2 * sqrt(normals) + 1e-4;
+    return distance(moves[0][0], moves[1][0]) > 2 * distance(n[0], n[1]) + 1e-4;
+}
+
+// Whether points move with u and v otherwise on one of two triangles than on the other, along the surface.
+static bool frames_jump(const SceneView *view, const ShapeRecord *shape, const Side *a, const Side *b) {
+    static const double zero[3] = {0, 0, 0};
+    double moves[2][2][3], n[2][3];
+    triangle_frame(view, shape, a->at / 3, moves[0], n[0]);
+    triangle_frame(view, shape, b->at / 3, moves[1], n[1]);
+    for (int i = 0; i < 2; i++) {
+        double between[3], up[3], along = 0, square = 0;
+        for (int k = 0; k < 3; k++) {
+            between[k] = moves[0][i][k] - moves[1][i][k];
+            up[k] = n[0][k] + n[1][k];
+            along += between[k] * up[k];
+            square += up[k] * up[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            up[k] *= square > 0 ? along / square : 0;
+        }
+        if (distance(between, up) > 1e-4 * distance(moves[0][i], zero)) {
+            return true;
+        }
+    }
+    return false;
 }
 
 // Whether the textures of a shape, whose steps begin at number `first`, jump along an edge.
@@ -264,7 +296,9 @@ static bool texture_jumps(const SceneView *view, const Array *steps, size_t firs
     side_uv(view, view->shapes + id, sides + r->side[1], uv[1]);
     for (size_t i = first; i < steps->count && ARRAY_AT(*steps, TextureStep, i).shape == id; i++) {
         int32_t sort = ARRAY_AT(*steps, TextureStep, i).sort;
-        bool turns = sort == STEP_TANGENTS && tangents_jump(view, view->shapes + id, sides + r->side[0], sides + r->side[1]);
+        const Side *a = sides + r->side[0], *b = sides + r->side[1];
+        bool turns = sort == STEP_TANGENTS && tangents_jump(view, view->shapes + id, a, b);
+        turns |= sort == STEP_FRAMES && frames_jump(view, view->shapes + id, a, b);
         if (turns || sort == STEP_FACES || (sort == STEP_SEAMS && memcmp(uv[0], uv[1], sizeof uv[0]) != 0)) {
             return true;
         }

@@ -285,7 +285,7 @@ rey_result rey_marks_find(rey_scene *scene, const Array *steps, MarkMoves *moves
             continue;
         }
         if (shape->kind != SHAPE_MESH) {
-            result = s->sort == STEP_TANGENTS ? REY_OK : mark_round(&w, i);
+            result = s->sort == STEP_TANGENTS || s->sort == STEP_FRAMES ? REY_OK : mark_round(&w, i);
         } else if (s->sort == STEP_LINES) {
             result = mark_mesh(&w, i);
         }

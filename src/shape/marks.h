@@ -6,7 +6,8 @@
 // Where the textures of a shape jump. STEP_LINES: where u x + v y + offset, (x, y) the surface's own uv, is a whole number from
 // `low` to `high`. STEP_FACES: from triangle to triangle. STEP_SEAMS: where uv itself does, between triangles and where
 // round surfaces close. STEP_TANGENTS: where the direction in which u grows does, by which the surface scatters, between triangles.
-enum { STEP_LINES, STEP_FACES, STEP_SEAMS, STEP_TANGENTS };
+// STEP_FRAMES: where the vectors by which points move with u and v do, by which heights are slopes.
+enum { STEP_LINES, STEP_FACES, STEP_SEAMS, STEP_TANGENTS, STEP_FRAMES };
 // Of STEP_LINES, (u, v, offset) is `scale` times a row of the texture's to_uv, less a constant, and that row begins at number `at`
 // of the selection, -1 = it is not selected.
 typedef struct TextureStep {

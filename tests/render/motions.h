@@ -210,6 +210,8 @@ static const Motion motions[] = {
     {"marks_bump.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.3f}, 0.03, 256, 1024},
     {"marks_bump.xml", "tile.to_world", TURN, {0.2f, 0.3f, 1}, 1, 256, 1024},
     {"marks_bump.xml", "kite.positions", SHEAR, {0, 0, 0}, 0.05, 256, 1024},
+    {"marks_relief.xml", "roof.positions", SHEAR, {0, 0, 0}, 0.02, 256, 1024},
+    {"marks_relief.xml", "camera.to_world", SHIFT, {1, 0.4f, 0.3f}, 0.02, 256, 1024},
     {"marks_view.xml", "lamp.to_world", SHIFT, {1, 0, 0.5f}, 0.02, 256, 1024},
     {"lines_view.xml", "floor.bsdf.reflectance.to_uv", ADD, {0}, 0.01, 256, 1024},
     {"lines_view.xml", "wall.bsdf.brdf_0.reflectance.to_uv", ADD, {0}, 0.01, 256, 1024},
