@@ -344,7 +344,7 @@ static rey_result accel_create(rey_scene *scene) {
     }
     find_own_spheres(&scene->view);
     rey_open_find(&scene->view);
-    // Rays look for what lies in the borders of media (trace_beside).
+    // Rays look for what lies in the borders of media (trace_others).
     enum RTCSceneFlags flags = scene->view.has_media ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : RTC_SCENE_FLAG_NONE;
     rtcSetSceneFlags(scene->view.embree, flags);
     // One structure over all boxes is better than a fast one where there are many instances.

@@ -100,7 +100,7 @@ KFN Hit trace_kinds(const SceneView *scene, const Ray *ray, int which, Mask m, b
         range.tmax = spheres_meet(scene, ray, which, m, &hit.shape);
     }
     if (scene->open_triangles_count && (which & MEET_OPEN)) {
-        triangles_meet(scene, ray, i_set(-1), m, &range.tmax, &hit);
+        triangles_meet(scene, ray, NULL, m, &range.tmax, &hit);
     }
     return packet_closest(scene, &range, &hit, m, &context);
 }
@@ -114,7 +114,7 @@ KFN Hit trace_closest(const SceneView *scene, const Ray *ray, Mask m, bool coher
 static NOINLINE Hit trace_open(const SceneView *scene, const Ray *ray, Mask m) {
     Hit hit = HIT_NONE;
     Float t = spheres_meet(scene, ray, MEET_OPEN, m, &hit.shape);
-    triangles_meet(scene, ray, i_set(-1), m, &t, &hit);
+    triangles_meet(scene, ray, NULL, m, &t, &hit);
     hit.p = v3_madd(ray->o, f_zero_unless(mi_lt(i_set(-1), hit.shape), t), ray->d);
     return hit;
 }
@@ -123,11 +123,12 @@ static NOINLINE Hit trace_open(const SceneView *scene, const Ray *ray, Mask m) {
 typedef struct Aside {
     struct RTCIntersectContext context; // the first, so that Embree's callback finds the rest
     int32_t ALIGNED(64) shape[LANES];
+    int32_t ALIGNED(64) prim[LANES];    // -1: all of the shape's
     int32_t ALIGNED(64) instance[LANES];
 } Aside;
 
 static void aside_filter(const struct RTCFilterFunctionNArguments *a) {
-    enum { RAY_ID = 10, HIT_SHAPE = 6, HIT_INSTANCE = 7 }; // rows of Embree's packets
+    enum { RAY_ID = 10, HIT_PRIM = 5, HIT_SHAPE = 6, HIT_INSTANCE = 7 }; // rows of Embree's packets
     const Aside *aside = (const Aside *)a->context;
     const int32_t *rays = (const int32_t *)a->ray, *hits = (const int32_t *)a->hit;
     const unsigned n = a->N;
@@ -135,26 +136,34 @@ static void aside_filter(const struct RTCFilterFunctionNArguments *a) {
         if (a->valid[i]) {
             int32_t lane = rays[RAY_ID * n + i];
             bool own = hits[HIT_SHAPE * n + i] == aside->shape[lane] && hits[HIT_INSTANCE * n + i] == aside->instance[lane];
-            a->valid[i] = own ? 0 : a->valid[i];
+            bool prim = aside->prim[lane] < 0 || hits[HIT_PRIM * n + i] == aside->prim[lane];
+            a->valid[i] = own && prim ? 0 : a->valid[i];
         }
     }
 }
 
-// What other shapes have at the point of a hit, on the way of rays that step over it: up to `step` before it, and `behind` after.
-static NOINLINE Hit trace_beside(const SceneView *scene, const Hit *hit, Vec3 d, Float step, Float behind, Mask m) {
+// Closest hits on anything but the primitives of `hit`, or, where its prim is -1, its shapes.
+static NOINLINE Hit trace_others(const SceneView *scene, const Hit *hit, Ray ray, Mask m) {
     Aside aside;
     rtcInitIntersectContext(&aside.context);
     aside.context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     aside.context.filter = aside_filter;
     Mask inside = mi_lt(i_set(0), SHAPE_FIELD(scene, i_max(hit->shape, i_set(0)), flags) & SHAPE_INSTANCED);
     i_store(aside.shape, hit->shape);
+    i_store(aside.prim, hit->prim);
     i_store(aside.instance, i_select(inside, hit->instance + (int32_t)scene->shapes_count, i_set(-1)));
-    Ray ray = {v3_madd(hit->p, -step, d), d, step + f_min(behind, step)};
     Hit other = HIT_NONE;
     if (scene->open_triangles_count) {
-        triangles_meet(scene, &ray, hit->shape, m, &ray.tmax, &other);
+        triangles_meet(scene, &ray, hit, m, &ray.tmax, &other);
     }
     return packet_closest(scene, &ray, &other, m, &aside.context);
+}
+
+// What other shapes have at the point of a hit, on the way of rays that step over it: up to `step` before it, and `behind` after.
+KFN Hit trace_beside(const SceneView *scene, const Hit *hit, Vec3 d, Float step, Float behind, Mask m) {
+    Hit all = *hit;
+    all.prim = i_set(-1);
+    return trace_others(scene, &all, (Ray){v3_madd(hit->p, -step, d), d, step + f_min(behind, step)}, m);
 }
 
 // Lanes of m in whose way nothing is that Embree knows.

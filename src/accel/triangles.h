@@ -48,8 +48,9 @@ KFN void open_view(const SceneView *scene, Vec3 o, Vec3 d, OpenView *view) {
     }
 }
 
-// Puts closer hits of the lanes of m on such triangles into *hit and their distances into *t. aside: a shape that is left aside.
-static NOINLINE void triangles_meet(const SceneView *scene, const Ray *ray, Int aside, Mask m, Float *t, Hit *hit) {
+// Puts closer hits of the lanes of m on such triangles into *hit and their distances into *t. aside: what is left aside, null =
+// nothing, as trace_others has it.
+static NOINLINE void triangles_meet(const SceneView *scene, const Ray *ray, const Hit *aside, Mask m, Float *t, Hit *hit) {
     Float low;
     OpenView view;
     m = triangles_may_meet(scene, ray, *t, m, &low);
@@ -70,7 +71,11 @@ static NOINLINE void triangles_meet(const SceneView *scene, const Ray *ray, Int 
         const float *g = triangle->normal;
         Vec3 n = v3(f_set((real)g[0]), f_set((real)g[1]), f_set((real)g[2]));
         Float sum = u + v + w, rcp = f_safe_rcp(sum), at = v3_dot(n, view.corner[triangle->corner]) * rcp + low;
-        Mask closer = inside & m_gt(at, f_set(0)) & m_lt(at, *t) & ~m_eq(sum, f_set(0)) & ~mi_eq(aside, i_set(triangle->shape));
+        Mask closer = inside & m_gt(at, f_set(0)) & m_lt(at, *t) & ~m_eq(sum, f_set(0));
+        if (aside) {
+            Mask all = mi_lt(aside->prim, i_set(0)), own = all | mi_eq(aside->prim, i_set(triangle->prim));
+            closer = closer & ~(mi_eq(aside->shape, i_set(triangle->shape)) & own);
+        }
         *t = f_select(closer, at, *t);
         hit->shape = i_select(closer, i_set(triangle->shape), hit->shape);
         hit->prim = i_select(closer, i_set(triangle->prim), hit->prim);
@@ -84,6 +89,6 @@ static NOINLINE void triangles_meet(const SceneView *scene, const Ray *ray, Int 
 KFN Mask triangles_block(const SceneView *scene, const Ray *ray, Mask m) {
     Float t = ray->tmax;
     Hit hit = {i_set(-1), i_set(0), f_set(0), f_set(0), v3_zero(), i_set(0)};
-    triangles_meet(scene, ray, i_set(-1), m, &t, &hit);
+    triangles_meet(scene, ray, NULL, m, &t, &hit);
     return m & mi_lt(i_set(-1), hit.shape);
 }

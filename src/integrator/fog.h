@@ -35,38 +35,103 @@ KFN void borders_watch(const Tracer *t, const Group *group, Vec3 ng, Vec3 d, Int
     }
 }
 
-// The medium behind borders that rays along d pass at a hit, `far` by the hit alone: of two in one place (touch.h), the ray
-// crosses first the one whose near side is the medium that it comes from.
-static NOINLINE Int medium_touching(const Tracer *t, const Hit *hit, Vec3 d, Int medium, Int far, Mask m) {
-    const SceneView *scene = t->scene;
-    Float step = interaction_step(hit->p);
-    Hit other = trace_beside(scene, hit, d, step, step, m);
-    Int groups = SHAPE_FIELD(scene, i_max(other.shape, i_set(0)), group), out = far;
-    for (Mask left = m & mi_lt(i_set(-1), other.shape), mine; m_any(left); left = left & ~mine) {
+// The media before and behind surfaces that rays along d, which are in `medium`, meet at a hit.
+static NOINLINE void media_beside(const SceneView *scene, const Hit *hit, Vec3 d, Int medium, Mask m, Int *before, Int *behind) {
+    Int groups = SHAPE_FIELD(scene, i_select(m, hit->shape, i_set(0)), group);
+    *before = *behind = medium;
+    for (Mask left = m, mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(groups, m_first(left));
         const Group *group = scene->groups + id;
         mine = left & mi_eq(groups, i_set(id));
-        if (group->interior < 0 && group->exterior < 0) {
-            continue;
-        }
-        Hit safe = other;
-        int32_t shape = i_lane(other.shape, m_first(mine));
-        safe.shape = i_select(mine, other.shape, i_set(shape));
-        safe.prim = i_select(mine, other.prim, i_set(i_lane(other.prim, m_first(mine))));
-        safe.instance = i_select(mine, other.instance, i_set(i_lane(other.instance, m_first(mine))));
+        Hit safe = *hit;
+        safe.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, m_first(mine))));
+        safe.prim = i_select(mine, hit->prim, i_set(i_lane(hit->prim, m_first(mine))));
+        safe.instance = i_select(mine, hit->instance, i_set(i_lane(hit->instance, m_first(mine))));
         Vec3 ng = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe).ng;
-        Int near = medium_behind(group, ng, v3_neg(d), medium), beyond = medium_behind(group, ng, d, medium);
-        // Two boxes of one medium: the ray leaves first the one that it is in.
-        Mask second = mi_eq(near, far) & ~(mi_eq(near, medium) & ~mi_eq(beyond, far));
-        out = i_select(mine & second, beyond, out);
+        *before = i_select(mine, medium_behind(group, ng, v3_neg(d), medium), *before);
+        *behind = i_select(mine, medium_behind(group, ng, d, medium), *behind);
     }
-    return out;
+}
+
+// The medium behind borders that rays along d pass at a hit, `far` by the hit alone: of two in one place (touch.h), the ray
+// crosses first the one whose near side is the medium that it comes from.
+static NOINLINE Int medium_touching(const Tracer *t, const Hit *hit, Vec3 d, Int medium, Int far, Mask m) {
+    Float step = interaction_step(hit->p);
+    Int near, beyond;
+    Hit other = trace_beside(t->scene, hit, d, step, step, m);
+    m = m & mi_lt(i_set(-1), other.shape);
+    media_beside(t->scene, &other, d, medium, m, &near, &beyond);
+    // Two boxes of one medium: the ray leaves first the one that it is in.
+    Mask second = mi_eq(near, far) & ~(mi_eq(near, medium) & ~mi_eq(beyond, far));
+    return i_select(m & second, beyond, far);
 }
 
 // The medium that rays of m along d go on in behind a hit that they pass.
 KFN Int medium_passed(const Tracer *t, const Group *group, const Interaction *si, const Hit *hit, Vec3 d, Int medium, Mask m) {
     Int far = medium_behind(group, si->ng, d, medium);
     return t->scene->borders_touch && m_any(m) ? medium_touching(t, hit, d, medium, far, m) : far;
+}
+
+// Lanes of m whose hits are so near to an edge of a surface that rays may meet another face of it before they have gone a step.
+static NOINLINE Mask hits_near_edges(const SceneView *scene, const Group *group, const Hit *hit, Float step, Mask m) {
+    enum { SHARPEST = 4 }; // one over the least sine of the angle between two faces
+    if (group->shape_kind != SHAPE_MESH || (group->shape_flags & SHAPE_INSTANCED)) {
+        return m & m_set(group->shape_kind == SHAPE_MESH || group->shape_kind == SHAPE_DISK || group->shape_kind == SHAPE_CYLINDER);
+    }
+    Corners c = mesh_corners(scene, hit->shape, hit->prim);
+    Int positions = SHAPE_FIELD(scene, hit->shape, positions);
+    Vec3 p[3], edge[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = theta_v3(scene, positions + c.i[k] * 3);
+    }
+    Float longest = f_set(0);
+    for (int k = 0; k < 3; k++) {
+        edge[k] = v3_sub(p[(k + 1) % 3], p[k]);
+        longest = f_max(longest, v3_dot(edge[k], edge[k]));
+    }
+    Float least = f_min(f_min(hit->u, hit->v), 1.0f - hit->u - hit->v);
+    return m & ~m_gt(least * v3_length(v3_cross(edge[0], edge[1])), SHARPEST * step * f_sqrt(longest));
+}
+
+// Borders that rays of m along d meet less than a step behind a hit that they pass, as next to an edge of a box: they are passed,
+// too, and where something else lies there, rays go on half-way to it. *o and *medium: as of one border.
+static NOINLINE void pass_close_borders(const Tracer *t, const Hit *hit, Vec3 d, Float step, Mask m, Vec3 *o, Int *medium) {
+    enum { MOST_FACES = 4 };
+    const SceneView *scene = t->scene;
+    Hit from = *hit;
+    Float left = step;
+    for (int i = 0; i < MOST_FACES && m_any(m); i++) {
+        Float skip = t->scene->borders_touch ? 0.02f * step : f_set(0); // two in one place have been parted already
+        Hit next = trace_others(scene, &from, (Ray){v3_madd(from.p, skip, d), d, left - skip}, m);
+        Mask found = m & mi_lt(i_set(-1), next.shape), nulls = null_lanes(scene, next.shape, found);
+        Float way = v3_dot(v3_sub(next.p, from.p), d);
+        *o = v3_select(found & ~nulls, v3_madd(from.p, 0.5f * way, d), *o);
+        Int before, behind;
+        media_beside(scene, &next, d, *medium, nulls, &before, &behind);
+        *medium = i_select(nulls, behind, *medium);
+        from = hit_select(nulls, &next, &from);
+        left = left - f_zero_unless(nulls, way);
+        m = nulls & m_gt(left, f_set(0));
+    }
+}
+
+// Where rays of m along d that pass the surface of a hit go on, and the medium that they do so in. Past borders of media, which may
+// touch each other, a ray stays on its line: next to outlines, a step to the side would lengthen what lies within by much more than
+// that step, and lengths count. Others, such as thin glass, it leaves as it leaves any surface, so that it meets the back of a body
+// next to the body's outline.
+static NOINLINE Vec3 pass_on(const Tracer *t, const Group *group, const Interaction *si, const Hit *hit, Vec3 d, Mask m,
+                             Int *medium) {
+    *medium = i_select(m, medium_passed(t, group, si, hit, d, *medium, m), *medium);
+    if (!group_is_null(t->scene, group)) {
+        return interaction_offset(si, d);
+    }
+    Vec3 o = interaction_behind(si, d);
+    Float step = interaction_step(si->p);
+    m = hits_near_edges(t->scene, group, hit, step, m);
+    if (m_any(m)) {
+        pass_close_borders(t, hit, d, step, m, &o, medium);
+    }
+    return o;
 }
 
 KFN Track track_of(const Tracer *t, int32_t medium) {

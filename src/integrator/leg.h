@@ -22,11 +22,11 @@ static NOINLINE Mask leg_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask m, V
         int32_t id = i_lane(groups, m_first(left));
         const Group *group = scene->groups + id;
         mine = left & mi_eq(groups, i_set(id));
-        if (group_is_null(scene, group)) {
+        if (group_is_null(scene, group) && group->emitter < 0) { // light is seen by the paths themselves
             Hit safe = walk_hit(hit, mine);
             Interaction si = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe);
-            *o = v3_select(mine, interaction_behind(&si, d), *o);
-            *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);
+            Vec3 past = pass_on(t, group, &si, &safe, d, mine, medium);
+            *o = v3_select(mine, past, *o);
             passed = passed | mine;
         }
     }

@@ -213,9 +213,8 @@ static int32_t particle_scatter(Tracer *t, const Landing *at, int32_t bounce, in
         i_compress(next->depth + next_count, at->v.depth + i_select(passed, i_set(0), i_set(1)), m);
     }
     if (t->scene->has_media) {
-        o = v3_select(passed, interaction_past(&at->si, w.d, group_is_null(t->scene, at->group)), o);
-        Int medium = medium_behind(at->group, at->si.ng, w.d, at->v.medium), through = medium;
-        through = medium_passed(t, at->group, &at->si, &at->v.hit, w.d, at->v.medium, m & passed);
+        Int medium = medium_behind(at->group, at->si.ng, w.d, at->v.medium), through = at->v.medium;
+        o = v3_select(passed, pass_on(t, at->group, &at->si, &at->v.hit, w.d, m & passed, &through), o);
         i_compress(next->medium + next_count, i_select(passed, through, medium), m);
         f_compress(next->skip + next_count, v3_dot(v3_sub(o, at->si.p), w.d), m);
     }

@@ -171,8 +171,8 @@ KFN int32_t scatter_paths(Tracer *t, const Group *group, const Vertex *v, const 
     Vec3 o = interaction_offset(si, w.d);
     Int medium = medium_behind(group, si->ng, w.d, v->medium);
     if (scene->has_media && m_any(w.m & w.passed)) {
-        o = v3_select(w.passed, interaction_past(si, w.d, group_is_null(scene, group)), o);
-        Int through = medium_passed(t, group, si, &v->hit, w.d, v->medium, w.m & w.passed);
+        Int through = v->medium;
+        o = v3_select(w.passed, pass_on(t, group, si, &v->hit, w.d, w.m & w.passed, &through), o);
         medium = i_select(w.passed, through, medium);
     }
     append_paths(t, v, si->p, o, &w, medium, next_count);

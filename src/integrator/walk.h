@@ -149,11 +149,9 @@ static NOINLINE Spec walk_pass(const Tracer *t, const Hit *hit, Vec3 d, Mask end
         BsdfCall call = bsdf_call(scene, group->bsdf, texcoord(si.uv, &safe), t->floor);
         Vec3 wo = frame_to_local(&si.sh, d);
         pass = spec_select(mine, bsdf_eval(&call, v3_neg(wo), wo, i_set(LOBE_NULL)), pass);
-        *o = v3_select(mine, interaction_past(&si, d, medium && group_is_null(scene, group)), *o);
+        Vec3 past = medium ? pass_on(t, group, &si, &safe, d, mine, medium) : interaction_offset(&si, d);
+        *o = v3_select(mine, past, *o);
         *may = *may | mine;
-        if (medium) {
-            *medium = i_select(mine, medium_passed(t, group, &si, &safe, d, *medium, mine), *medium);
-        }
     }
     return pass;
 }

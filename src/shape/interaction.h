@@ -51,15 +51,8 @@ KFN Vec3 interaction_offset(const Interaction *si, Vec3 d) {
     return v3_madd(si->p, f_copysign(interaction_step(si->p), v3_dot(si->ng, d)), si->ng);
 }
 
-// The same of a ray that passes undeviated. It stays the same line: next to outlines, a step to the side would lengthen what lies
-// within by much more than that step, and in media the lengths count.
+// The same of a ray that passes undeviated and stays the same line.
 KFN Vec3 interaction_behind(const Interaction *si, Vec3 d) { return v3_madd(si->p, interaction_step(si->p), d); }
-
-// Of one that passes si along d. Past borders of media, which may touch each other, it stays on its line; others, such as thin
-// glass, it leaves as it leaves any surface, so that it meets the back of a body next to the body's outline.
-KFN Vec3 interaction_past(const Interaction *si, Vec3 d, bool border) {
-    return border ? interaction_behind(si, d) : interaction_offset(si, d);
-}
 
 // Density per solid angle, seen from ref along d, of points that are uniform over an area around si.
 KFN Float area_density(Vec3 ref, Vec3 d, const Interaction *si, Float area) {

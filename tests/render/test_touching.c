@@ -152,8 +152,60 @@ static void test_faces_that_rays_run_along(void **state) {
     sun_over_box("0.1, 0.05, -1", "<lookat origin='0, 0, 0' target='6, -3, -8' up='0, 1, 0'/>", NULL);
 }
 
+// A clear box of fog, whose edges rays pass at less than a step from its next face, lets all of the sky through; near and far from
+// the origin. A lamp on a surface of the kind null hangs before a body of fog and is seen.
+static void see(const char *what, const char *text, int lanes, double expected, double least) {
+    float image[3 * ACROSS * ACROSS];
+    Room room = room_of((const char *const[]){"<scene version='3.0.0'>", text, "</scene>", NULL}, 2, lanes, NULL, 0);
+    rey_render_def def = def_make(256, 0, 1);
+    ok(room, rey_render(room.scene, &def, image, NULL));
+    double mean = 0, lowest = 1e9;
+    for (int i = 0; i < 3 * ACROSS * ACROSS; i++) {
+        mean += (double)image[i] / (3 * ACROSS * ACROSS);
+        lowest = fmin(lowest, (double)image[i]);
+    }
+    if (fabs(mean - expected) > 2e-4 || lowest < least) {
+        fail_msg("%s, %d lanes: mean %.6g, least %.6g, expected %.6g", what, lanes, mean, lowest, expected);
+    }
+    room_close(room);
+}
+
+#define CLEAR_BOX(place) \
+    "<integrator type='volpath'/><medium type='homogeneous' id='fog'><float name='sigma_t' value='1e-6'/>" \
+    "<float name='albedo' value='0'/></medium>" \
+    "<sensor type='orthographic'><transform name='to_world'><scale value='2'/><lookat origin='-3, 2, 4' target='0, 0, 0' " \
+    "up='0, 1, 0'/><translate " place "/></transform>" \
+    "<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/></film></sensor>" \
+    "<shape type='cube'><transform name='to_world'><rotate x='1' y='0.3' z='0.2' angle='35'/><translate " place "/></transform>" \
+    "<bsdf type='null'/><ref name='interior' id='fog'/></shape>" SKY
+
+static void test_edges_of_borders(void **state) {
+    UNUSED(state);
+    for (int lanes = 0; lanes < 2; lanes++) {
+        see("a box", CLEAR_BOX("x='0'"), lanes, 1, 0.995);
+        see("a box at 100", CLEAR_BOX("x='100' z='-100'"), lanes, 1, 0.99);
+        see("a box at 1000", CLEAR_BOX("x='1000' z='-1000'"), lanes, 1, 0.98);
+    }
+}
+
+static void test_null_lamps(void **state) {
+    UNUSED(state);
+    for (int lanes = 0; lanes < 2; lanes++) {
+        see("a lamp",
+            "<integrator type='volpath'/><medium type='homogeneous' id='fog'><float name='sigma_t' value='1e-6'/></medium>"
+            "<sensor type='orthographic'><transform name='to_world'><scale value='0.3'/><lookat origin='0, 0, 4' target='0, 0, 0' "
+            "up='0, 1, 0'/></transform>"
+            "<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/></film></sensor>"
+            "<shape type='sphere'><bsdf type='null'/><ref name='interior' id='fog'/></shape>"
+            "<shape type='rectangle'><transform name='to_world'><translate z='1.5'/></transform><bsdf type='null'/>"
+            "<emitter type='area'><float name='radiance' value='2'/></emitter></shape>",
+            lanes, 2, 1.99);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_piles), cmocka_unit_test(test_lights_beside_borders),
-                                       cmocka_unit_test(test_faces_that_rays_run_along)};
+                                       cmocka_unit_test(test_faces_that_rays_run_along),
+                                       cmocka_unit_test(test_edges_of_borders), cmocka_unit_test(test_null_lamps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
