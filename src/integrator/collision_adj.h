@@ -31,7 +31,7 @@ static NOINLINE void collision_flow(Tracer *t, const RecordBatch *batch, Int slo
     s->ahead = s->scattered & mi_eq(i_gather(t->ws.next, slot), i_set(NEXT_STILL));
     s->attached = spec_zero_unless(s->ahead, spec_scale(spec_gather(t->ws.attached, slot), f_load(r->sw + batch->first)));
     Float before = f_load(r->u + batch->first); // distance of the vertex before it
-    Mask m = s->connected & m_set(medium_is_even(t->scene, batch->group)), first = records_first(t, batch, m);
+    Mask m = s->connected, first = records_first(t, batch, m);
     s->flow = (BeaconFlow){f_set(0), f_set(0), v3_zero(), v3_zero(), v3_zero(), first};
     if (t->pinhole && m_any(first)) {
         s->flow = beacon_view(t, s->light, slot, s->hit.p, first);
@@ -82,12 +82,34 @@ static NOINLINE CollisionSweep collision_load(Tracer *t, const RecordBatch *batc
     return s;
 }
 
+// What collisions per volume, which scatter of the light sample's `lit`, change with where they lie, dp, and with the direction w
+// along which they are met, dw. Nothing changes where nothing collides, but for voxels about it.
+static NOINLINE void collisions_slope(const Tracer *t, const CollisionSweep *s, Spec lit, Vec3 w, Vec3 *dp, Vec3 *dw) {
+    const SceneView *scene = t->scene;
+    const MediumNode *medium = s->at.medium;
+    Mask m = m_gt(s->flow.share, f_set(0));
+    Spec brought = spec_scale(lit, s->light_phase), by_extinction = spec_zero();
+    for (int c = 0; c < SPEC_N; c++) { // of a medium with a sigma_s, that over the extinction is the albedo
+        Float worth = medium->sigma_s >= 0 ? brought.c[c] : brought.c[c] * s->at.albedo.c[c];
+        by_extinction.c[c] = f_zero_unless(m, worth * f_safe_rcp(s->extinction.c[c]));
+    }
+    extinction_slope(scene, medium, GAIN, s->hit.p, w, by_extinction, m, dp, dw);
+    if (medium->sigma_s < 0 && scene->volumes[medium->albedo].kind == VOLUME_GRID) {
+        v3_acc(dp, volume_slope(scene, scene->volumes + medium->albedo, s->hit.p, spec_zero_unless(m, brought)));
+    }
+}
+
 // What the flow asks of the motion of the light beyond that of the ray, beside what is on the way of either: of a contribution
 // `lit` of the light sample, by which dwi is the adjoint of the direction back, and ride that of the collision's position.
 static NOINLINE Vec3 flow_adj(const Tracer *t, const CollisionSweep *s, Int slot, Spec lit, Vec3 dwi, Vec3 ride) {
     const BeaconFlow *flow = &s->flow;
     Spec worth = spec_scale(spec_mul(lit, s->at.albedo), s->light_phase);
-    Vec3 w = v3_neg(s->at.wi), across = v3_madd(dwi, -v3_dot(w, dwi), w);
+    Vec3 w = v3_neg(s->at.wi), dw = v3_zero();
+    if (!medium_is_even(t->scene, (int32_t)(s->at.medium - t->scene->media))) {
+        collisions_slope(t, s, lit, w, &ride, &dw);
+    }
+    dwi = v3_sub(dwi, dw);
+    Vec3 across = v3_madd(dwi, -v3_dot(w, dwi), w);
     Vec3 d = v3_madd(v3_madd(ride, -flow->rcp, across), -spec_dot(worth, s->extinction), w);
     d = v3_madd(v3_scale(d, flow->share), spec_sum(worth), flow->slope);
     if (t->job->mode == MODE_REVERSE && flows_drift(t)) { // in forward mode: flow_drift
@@ -164,7 +186,7 @@ static NOINLINE Vec3 collision_adj(const Tracer *t, const CollisionSweep *s, Int
         phase_adj(&s->at.call, s->at.wi, s->light_d, spec_dot(lit, s->at.albedo), sink, s->connected, &dwi, &move.d);
         lights_move_adj(scene, s->light, s->connected, s->hit.p, s->light_d, s->light_distance, &move, sink);
         if (t->job->rides && t->job->beacons) {
-            pull = flow_adj(t, s, slot, lit, dwi, move.ref);
+            pull = flow_adj(t, s, slot, lit, dwi, v3_add(move.ref, slope));
         }
     }
     if (live & LIVE_ALBEDO) {

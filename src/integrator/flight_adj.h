@@ -61,6 +61,23 @@ static NOINLINE void extinction_turn(const SceneView *scene, const MediumNode *m
     flakes_area_turn(scene, medium->flakes, p, w, projection_adj(scene, medium, v, p, spec_zero_unless(m, d)), dp, dw);
 }
 
+// Adds to dp and dw what the adjoint d of a part of the extinction along w at a point of the world makes of the two.
+static NOINLINE void extinction_slope(const SceneView *scene, const MediumNode *medium, int part, Vec3 p, Vec3 w, Spec d, Mask m,
+                                      Vec3 *dp, Vec3 *dw) {
+    const VolumeNode *v = medium_part(scene, medium, part);
+    d = spec_zero_unless(m, d);
+    if (medium->flakes >= 0) {
+        Vec3 point = v3_zero(), turn = v3_zero();
+        extinction_turn(scene, medium, part, p, w, d, m, &point, &turn);
+        v3_acc(dp, v3_select(m, point, v3_zero()));
+        v3_acc(dw, v3_select(m, turn, v3_zero()));
+        d = spec_scale(d, flakes_area(scene, medium->flakes, p, w));
+    }
+    if (v->kind == VOLUME_GRID) {
+        v3_acc(dp, volume_slope(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale]))));
+    }
+}
+
 // Points spread evenly over [low, high], one in each of FLIGHT_POINTS parts of it.
 KFN Float flight_point(Float low, Float high, const SampleKey *key, uint32_t dimension, int k) {
     return f_lerp(low, high, (rng_1d(key, dimension + (uint32_t)k) + (real)k) * ((real)1 / FLIGHT_POINTS));
@@ -127,17 +144,10 @@ static NOINLINE FlightAdj flight_adj_load(const Tracer *t, const RecordBatch *ba
 
 // Adds to g what the adjoint d of a part of the extinction at a distance along the flight makes of the ray.
 static NOINLINE void flight_point_glide(const Tracer *t, const FlightAdj *a, int part, Float at, Spec d, Glide *g, Mask m) {
-    const SceneView *scene = t->scene;
-    Vec3 p = v3_madd(a->f.o, at, a->f.d);
-    if (a->medium->flakes >= 0) {
-        Vec3 dp = v3_zero(), dw = v3_zero();
-        extinction_turn(scene, a->medium, part, p, a->f.d, d, m, &dp, &dw);
-        glide_add(g, p, dp, m);
-        g->turn = v3_add(g->turn, v3_select(m, dw, v3_zero()));
-        d = spec_scale(d, flakes_area(scene, a->medium->flakes, p, a->f.d));
-    }
-    d = spec_scale(d, f_set((real)scene->theta[a->medium->scale]));
-    glide_look(scene, g, medium_part(scene, a->medium, part), p, d, m);
+    Vec3 p = v3_madd(a->f.o, at, a->f.d), dp = v3_zero(), dw = v3_zero();
+    extinction_slope(t->scene, a->medium, part, p, a->f.d, d, m, &dp, &dw);
+    glide_add(g, p, dp, m);
+    g->turn = v3_add(g->turn, dw);
 }
 
 // Accumulates that adjoint.

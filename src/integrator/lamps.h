@@ -46,10 +46,7 @@ static void lamps_find(Tracer *t) {
             const int32_t id = i_lane(medium, i);
             const real p[3] = {places[0][k + i], places[1][k + i], places[2][k + i]};
             if (id >= 0) {
-                const Track track = track_of(t, id);
-                if (track_is_uniform(&track)) {
-                    lamp_keep(t, p, id);
-                }
+                lamp_keep(t, p, id);
             }
         }
     }

@@ -114,8 +114,8 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
                 Vec3 end = v3_madd(walk->o[i], f_select(ends, high, f_set(0)), walk->d);
                 Filling f = medium_filling(t, id, end, walk->d);
                 turn->distance = turn->distance - f_zero_unless(ends, spec_dot(dt, f.extinction));
-                Mask unknown = medium_is_even(scene, id) ? turn->points & ~turn->beacons : turn->points;
-                watch_light(t, end, id, walk->d, ends & unknown & m_gt(spec_max(f.extinction), f_set(0)), sink);
+                Mask unknown = ends & turn->points & ~turn->beacons;
+                watch_light(t, end, id, walk->d, unknown & m_gt(spec_max(f.extinction), f_set(0)), sink);
             }
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);

@@ -185,4 +185,27 @@ KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, Majoran
     return found;
 }
 
+// The same, but that lanes which get to the distance `stop` first stand there, under the majorant of their cell, and are found.
+static NOINLINE Mask majorant_until(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Float stop,
+                                    Mask m) {
+    Mask left = m & w->m, found = m_set(false);
+    while (m_any(left)) {
+        Float majorant = majorant_here(scene, medium, w);
+        Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
+        Mask stops = left & m_lt(stop, exit);
+        Float through = majorant * f_max(f_min(stop, exit) - w->t, f_set(0));
+        Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);
+        w->majorant = f_select(left, majorant, w->majorant);
+        w->t = f_select(here, w->t + depth * f_safe_rcp(majorant), f_select(left, f_min(stop, exit), w->t));
+        depth = depth - through;
+        found = found | here | stops;
+        left = left & ~(here | stops);
+        if (m_any(left)) {
+            majorant_step(medium, w, border, left);
+            left = left & w->m;
+        }
+    }
+    return found;
+}
+
 KFN Vec3 majorant_point(const MajorantWalk *w) { return v3_madd(w->o, w->t, w->d); }

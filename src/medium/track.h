@@ -22,7 +22,7 @@ typedef struct Track {
     const VolumeNode *sigma_t;
     bool padded;
     bool roulette; // walks whose transmittance is small end by chance, and those that go on count more
-    const Vec3 *focus; // half of the collisions in homogeneous media are looked for near these points of the world; or null
+    const Vec3 *focus; // points of the world near which a part of the collisions is looked for; or null
     int32_t foci;
 } Track;
 
@@ -297,12 +297,75 @@ static NOINLINE Flight grey_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, M
     return flight;
 }
 
-// Delta tracking in colour, and along the paths of another scene; of a flight towards tmax, no farther than `far`.
+// Flights that are tracked look for collisions near the foci at tentative collisions of a kind of their own. Of these there are
+// `rate` per radian that a focus sees pass, so that one which is near is not passed by chance, and LURED_SHARE of them are real
+// wherever something may collide. The extinction knows nothing of that: weights do.
+typedef struct Lure {
+    Foci foci;
+    Float rate;
+    Float next[MOST_FOCI]; // distances of the next ones
+} Lure;
+
+#define LURED_RATE 0.25f
+#define LURED_SHARE 0.5f
+
+// The first tentative collision behind t that focus number k asks for.
+KFN Float lure_after(const Lure *l, int32_t k, Float t, Float u) {
+    const Focus *f = &l->foci.each[k];
+    Float s, c, angle = f_atan2(t - f->along, f->across) + track_depth(u) * f_safe_rcp(l->rate);
+    Mask none = m_ge(angle, f_set(0.5f * PI - 1e-4f)) | ~m_gt(l->rate, f_set(0));
+    f_sincos(f_select(none, f_set(0), angle), &s, &c);
+    return f_select(none, f_set(INFINITY), f_max(f->along + f->across * s / c, t));
+}
+
+// The share of such collisions in what collides anyway is that of flights, as far as the bound of the medium knows.
+static NOINLINE Lure lure_start(const Track *t, const MajorantWalk *w, Vec3 o, Vec3 d, Float tmax, const SampleKey *key,
+                                uint32_t dimension) {
+    const MediumNode *medium = t->medium;
+    const Float most = table_at(t->scene, i_set(medium->table + medium->nx * medium->ny * medium->nz));
+    Float depth = f_zero_unless(m_gt(most, f_set(0)), most * (w->end - w->t));
+    Lure l = {.foci = foci_look(t, o, d, tmax), .rate = LURED_RATE * (1.0f - f_exp(-depth))};
+    for (int32_t k = 0; k < l.foci.count; k++) {
+        l.next[k] = lure_after(&l, k, w->t, rng_1d(key, dimension + (uint32_t)k));
+    }
+    return l;
+}
+
+KFN Float lure_next(const Lure *l) {
+    Float next = l->next[0];
+    for (int32_t k = 1; k < l->foci.count; k++) {
+        next = f_min(next, l->next[k]);
+    }
+    return next;
+}
+
+// How many there are per distance at t. Those that were at t are followed by others.
+static NOINLINE Float lure_rate(Lure *l, Float t, const SampleKey *key, uint32_t dimension) {
+    Float rate = f_set(0);
+    for (int32_t k = 0; k < l->foci.count; k++) {
+        const Focus *f = &l->foci.each[k];
+        Float beside = t - f->along;
+        rate = rate + l->rate * f->across * f_safe_rcp(f->across * f->across + beside * beside);
+        Mask passed = m_le(l->next[k], t);
+        if (m_any(passed)) {
+            l->next[k] = f_select(passed, lure_after(l, k, t, rng_1d(key, dimension + (uint32_t)k)), l->next[k]);
+        }
+    }
+    return rate;
+}
+
+// Delta tracking in colour, with foci, and along the paths of another scene; of a flight towards tmax, no farther than `far`.
 static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, Float tmax, Spec importance, Mask m,
                                      const SampleKey *key, uint32_t dimension) {
     SampleKey random = *key;
     random.sobol = false;
     MajorantWalk w = track_start(t, o, d, tmax, m);
+    const bool lured = t->foci > 0;
+    uint32_t lures = dimension + MOST_COLLISIONS;
+    Lure lure;
+    if (lured) {
+        lure = lure_start(t, &w, o, d, tmax, &random, lures);
+    }
     w.end = f_min(w.end, far);
     w.m = w.m & m_lt(w.t, w.end);
     Flight flight = {far, spec_set(f_set(1)), m_set(false)};
@@ -310,17 +373,25 @@ static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, 
     Mask left = w.m;
     for (uint32_t i = 0; i < MOST_COLLISIONS && m_any(left); i++) {
         Vec2 u = rng_2d(&random, dimension + i);
-        Mask met = majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
+        Mask met = lured ? majorant_until(t->scene, t->medium, &w, track_depth(u.x), lure_next(&lure), left)
+                         : majorant_next(t->scene, t->medium, &w, track_depth(u.x), left);
         Spec sigma = walk_extinction(t->scene, t, &w, o, d), counts = spec_mul(importance, weight);
-        Float real_share = spec_dot(counts, sigma) * f_safe_rcp(spec_sum(counts) * w.majorant);
+        Float tentative = w.majorant, more = f_set(0);
+        if (lured) {
+            lures += MOST_FOCI;
+            more = lure_rate(&lure, w.t, &random, lures);
+            tentative = tentative + more;
+            more = f_zero_unless(m_gt(w.majorant, f_set(0)), LURED_SHARE * more);
+        }
+        Float sum = spec_sum(counts), real_share = (spec_dot(counts, sigma) + more * sum) * f_safe_rcp(sum * tentative);
         real_share = f_clamp(real_share, f_set(t->padded ? PADDED_SHARE : 0), f_set(1));
         Mask collided = met & m_lt(u.y, real_share);
-        weight = spec_select(met, collision_weight(weight, sigma, w.majorant, real_share, collided), weight);
+        weight = spec_select(met, collision_weight(weight, sigma, tentative, real_share, collided), weight);
         if (t->values == t->scene) {
             flight.weight = weight;
         } else {
             Spec value = walk_extinction(t->values, t, &w, o, d);
-            Spec other = collision_weight(flight.weight, value, w.majorant, real_share, collided);
+            Spec other = collision_weight(flight.weight, value, tentative, real_share, collided);
             flight.weight = spec_select(met, other, flight.weight);
         }
         flight.t = f_select(collided, w.t, flight.t);
@@ -338,7 +409,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
         return t->foci > 0 ? focused_flight(t, o, d, tmax, importance, m, key, dimension)
                            : uniform_flight(t, d, tmax, importance, m, key, dimension);
     }
-    return track_is_grey(t) ? grey_flight(t, o, d, tmax, m, key, dimension)
+    return track_is_grey(t) && t->foci == 0 ? grey_flight(t, o, d, tmax, m, key, dimension)
                             : colour_flight(t, o, d, tmax, tmax, importance, m, key, dimension);
 }
 
@@ -355,7 +426,7 @@ static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Flo
         }
         return spec_scale(passed, f_safe_rcp(density));
     }
-    if (track_is_grey(t)) {
+    if (track_is_grey(t) && t->foci == 0) {
         return spec_set(f_set(1));
     }
     return colour_flight(t, o, d, far, tmax, importance, m, key, dimension).weight;

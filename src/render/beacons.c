@@ -88,13 +88,18 @@ static double beyond2(const double low[3], const double high[3], const double p[
     return sum;
 }
 
-// Distance of q to the surface of the unit cube.
-static double cube_distance(const double q[3]) {
-    static const double zero[3] = {0, 0, 0}, one[3] = {1, 1, 1};
-    double outside = beyond2(zero, one, q), inside = HUGE_VAL;
+// Distance of p to the surface of the box that a heterogeneous medium fills (medium/majorant.h).
+static double medium_box_distance(const SceneView *view, const VolumeNode *v, const double p[3]) {
+    double low[3] = {0, 0, 0}, high[3] = {1, 1, 1}, inside = HUGE_VAL;
     for (int k = 0; k < 3; k++) {
-        inside = fmin(inside, fmin(fabs(q[k]), fabs(q[k] - 1)));
+        for (int j = 0; j < 3 && v->to_world >= 0; j++) {
+            double along = (double)view->theta[v->to_world + 4 * k + j];
+            low[k] = (j ? low[k] : (double)view->theta[v->to_world + 4 * k + 3]) + fmin(along, 0);
+            high[k] = (j ? high[k] : (double)view->theta[v->to_world + 4 * k + 3]) + fmax(along, 0);
+        }
+        inside = fmin(inside, fmin(fabs(p[k] - low[k]), fabs(p[k] - high[k])));
     }
+    double outside = beyond2(low, high, p);
     return outside > 0 ? sqrt(outside) : inside;
 }
 
@@ -189,12 +194,8 @@ static double surface_distance(const SceneView *view, const double p[3], bool so
 static double free_radius(const SceneView *view, const double p[3]) {
     double least = surface_distance(view, p, false);
     for (int64_t i = 0; i < view->media_count; i++) {
-        const VolumeNode *v = view->volumes + view->media[i].sigma_t;
-        double q[3], worth;
         if (view->media[i].bounded) {
-            memcpy(q, p, sizeof q);
-            bool known = v->to_world < 0 || to_local(view->theta + v->to_world, q, q, &worth);
-            least = fmin(least, known ? cube_distance(q) * (v->to_world < 0 ? 1 : worth) : 0);
+            least = fmin(least, medium_box_distance(view, view->volumes + view->media[i].sigma_t, p));
         }
     }
     return within * least;
@@ -206,9 +207,6 @@ static bool turns(const SceneView *view) {
     for (int64_t i = 0; i < view->shapes_count; i++) {
         const ShapeRecord *shape = view->shapes + i;
         found |= (shape->flags & SHAPE_HAS_NORMALS) && !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
-    }
-    for (int64_t i = 0; i < view->media_count; i++) {
-        found |= rey_phase_varies(view, view->media[i].phase);
     }
     return found;
 }
@@ -412,7 +410,6 @@ static rey_result refuse_lamp(const Render *r, int32_t light) {
     rey_name_emitter(r->scene, light, name);
     why = has_borders(r, light) ? "where its light ends abruptly or jumps" : why;
     why = light_is_shifted(r, light) && !camera_is_known(r) ? "with sensors that are no cameras" : why;
-    why = medium_is_even(view, r->lamp_medium[light]) ? why : "where the medium differs from place to place";
     why = turns(view) ? "in scenes with smooth mirrors, glass, masks or normals of their own" : why;
     why = rey_rides_gap(view) ? rey_rides_gap(view) : why;
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
@@ -437,7 +434,7 @@ rey_result rey_beacons_begin(Render *r) {
     int32_t count = 0;
     for (int32_t i = 0; i < (int32_t)view->emitters_count; i++) {
         const int32_t medium = r->lamp_medium[i];
-        bool known = moves && medium >= 0 && medium_is_even(view, medium) && beacon_of_light(r, i, beacons + count);
+        bool known = moves && medium >= 0 && beacon_of_light(r, i, beacons + count);
         of[i] = known ? count++ : -1;
         if (needed && !known && medium >= 0 && lights_what_moves(r, i)) {
             return refuse_lamp(r, i);

@@ -168,8 +168,8 @@ static void measure(Room room, const Motion *m, const float worth[VALUES], doubl
 }
 
 // m null: the picture.
-static void check(const char *filter, const Motion *m) {
-    const rey_define define = {"filter", filter};
+static void check(const char *kind, const char *filter, const Motion *m) {
+    const rey_define defines[] = {{"filter", filter}, {"kind", kind}};
     const double slack = m ? 1e-3 : 3e-4; // of the quadrature
     double found[VALUES], error[VALUES], exact[VALUES], all = 0, noise = 0, sum = 0;
     float worth[VALUES];
@@ -187,11 +187,12 @@ static void check(const char *filter, const Motion *m) {
         worth[i] = (float)(uniform(&random) - 0.3);
     }
     assert_int_equal(rey_context_create(NULL, &room.ctx), REY_OK);
-    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_view.xml", &define, 1, &room.scene));
+    ok(room, rey_scene_load(room.ctx, RENDER_DIR "/beacon_view.xml", defines, 2, &room.scene));
     measure(room, m, worth, found, error);
     for (int i = 0; i < VALUES; i++) {
         double z = normal_of_t((found[i] - exact[i]) / hypot(error[i], slack * exact[i]), SEEDS - 1);
-        printf("%s %s %d: %.4g +- %.2g, exact %.4g, z %.1f\n", filter, m ? m->name : "picture", i, found[i], error[i], exact[i], z);
+        printf("%s %s %s %d: %.4g +- %.2g, exact %.4g, z %.1f\n", kind, filter, m ? m->name : "picture", i, found[i],
+               error[i], exact[i], z);
         assert_true(fabs(z) < 4);
         all += exact[i] * exact[i];
         noise += error[i] * error[i];
@@ -208,18 +209,25 @@ static const Motion fov = {"camera.x_fov", {20}, {0, 0, 0}, 0, 20};
 
 static void test_box(void **state) {
     UNUSED(state);
-    check("box", NULL);
-    check("box", &bulb);
+    check("homogeneous", "box", NULL);
+    check("homogeneous", "box", &bulb);
 }
 
 static void test_tent(void **state) {
     UNUSED(state);
-    check("tent", &camera);
-    check("tent", &fov);
+    check("homogeneous", "tent", &camera);
+    check("homogeneous", "tent", &fov);
+}
+
+static void test_tracked(void **state) {
+    UNUSED(state);
+    check("heterogeneous", "box", NULL);
+    check("heterogeneous", "box", &bulb);
+    check("heterogeneous", "tent", &camera);
 }
 
 int main(int argc, char **argv) {
-    struct CMUnitTest tests[] = {cmocka_unit_test(test_box), cmocka_unit_test(test_tent)};
+    struct CMUnitTest tests[] = {cmocka_unit_test(test_box), cmocka_unit_test(test_tent), cmocka_unit_test(test_tracked)};
     size_t count = tests_asked(tests, COUNT_OF(tests), argc, argv);
     return _cmocka_run_group_tests("beacon view", tests, count, NULL, NULL);
 }

@@ -348,7 +348,7 @@ static void test_refusals(void **state) {
     rey_render_def def = def_make(1, 0, 1);
     assert_int_not_equal(rey_jvp(room.scene, &def, (rey_selection){&bulb, 1}, along, image, NULL, NULL), REY_OK);
     assert_non_null(strstr(rey_error(room.ctx), "lies within a participating medium"));
-    // Cameras move away from no light within a medium.
+    // Cameras move where no light is within a medium, and where one hangs free there.
     int camera;
     float shift[16] = {[3] = 1};
     room_close(room);
@@ -357,8 +357,7 @@ static void test_refusals(void **state) {
     camera = rey_param_find(room.scene, "camera.to_world");
     ok(room, rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL));
     ok(room, rey_param_set(room.scene, rey_param_find(room.scene, "bulb.position"), within, 3));
-    assert_int_equal(rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL), REY_ERROR_INCOMPLETE);
-    assert_non_null(strstr(rey_error(room.ctx), "lies within a participating medium"));
+    ok(room, rey_jvp(room.scene, &def, (rey_selection){&camera, 1}, shift, image, NULL, NULL));
     room_close(room);
 }
 

@@ -25,9 +25,6 @@ static NOINLINE Spec beside_light(Tracer *t, Int light, Vec3 x, Vec3 away, Vec3 
     for (Mask left = m & mi_lt(i_set(-1), medium), mine; m_any(left); left = left & ~mine) {
         int32_t id = i_lane(medium, m_first(left));
         mine = left & mi_eq(medium, i_set(id));
-        if (!medium_is_even(scene, id)) {
-            continue;
-        }
         Hit hit = {i_set(0), i_set(0), f_set(0), f_set(0), x, i_set(0)};
         Collision c = collision_look(t, id, &hit, d);
         Track track = track_of(t, id);
