@@ -361,10 +361,12 @@ static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, 
     random.sobol = false;
     MajorantWalk w = track_start(t, o, d, tmax, m);
     const bool lured = t->foci > 0;
-    uint32_t lures = dimension + MOST_COLLISIONS;
+    SampleKey own = random; // of the foci's collisions: other walks take numbers of `random` right behind this one's
+    own.scramble = rng_mix(random.scramble, 0x6c757265u);
+    uint32_t lures = dimension;
     Lure lure;
     if (lured) {
-        lure = lure_start(t, &w, o, d, tmax, &random, lures);
+        lure = lure_start(t, &w, o, d, tmax, &own, lures);
     }
     w.end = f_min(w.end, far);
     w.m = w.m & m_lt(w.t, w.end);
@@ -379,7 +381,7 @@ static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, 
         Float tentative = w.majorant, more = f_set(0);
         if (lured) {
             lures += MOST_FOCI;
-            more = lure_rate(&lure, w.t, &random, lures);
+            more = lure_rate(&lure, w.t, &own, lures);
             tentative = tentative + more;
             more = f_zero_unless(m_gt(w.majorant, f_set(0)), LURED_SHARE * more);
         }
