@@ -87,16 +87,6 @@ KFN Spec uniform_extinction(const SceneView *scene, const Track *t, Vec3 d) {
     return t->medium->flakes >= 0 ? flakes_extinction(scene, t, v3_zero(), d) : bare_extinction(scene, t, v3_zero());
 }
 
-// The extinctions that distances of flights towards tmax are chosen by.
-KFN Spec uniform_deciding(const Track *t, Vec3 d, Float tmax) {
-    Spec sigma = uniform_extinction(t->scene, t, d);
-    Float least = PADDED_DEPTH * f_safe_rcp(tmax);
-    for (int c = 0; c < SPEC_N && t->padded; c++) {
-        sigma.c[c] = f_max(sigma.c[c], least);
-    }
-    return sigma;
-}
-
 KFN Spec uniform_transmittance(Spec sigma, Float t) {
     for (int c = 0; c < SPEC_N; c++) {
         // The distance may be infinite where the extinction is 0.
@@ -160,7 +150,7 @@ KFN Float uniform_distance(Float u, Float sigma) { return -f_log(1.0f - u) * f_s
 static NOINLINE Flight uniform_flight(const Track *track, Vec3 d, Float tmax, Spec importance, Mask m, const SampleKey *key,
                                       uint32_t dimension) {
     Vec2 u = rng_2d(key, dimension);
-    Spec sigma = uniform_deciding(track, d, tmax), value = uniform_extinction(track->values, track, d);
+    Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
     Float chosen = uniform_choice(sigma, importance, u.y), t = uniform_distance(u.x, chosen);
     Flight flight;
     flight.real = m & m_gt(chosen, f_set(0)) & m_lt(t, tmax);
@@ -253,7 +243,7 @@ KFN Float foci_share(Spec sigma, Spec importance, Float tmax) {
 static NOINLINE Flight focused_flight(const Track *track, Vec3 o, Vec3 d, Float tmax, Spec importance, Mask m,
                                       const SampleKey *key, uint32_t dimension) {
     Vec2 u = rng_2d(key, dimension);
-    Spec sigma = uniform_deciding(track, d, tmax), value = uniform_extinction(track->values, track, d);
+    Spec sigma = uniform_extinction(track->scene, track, d), value = uniform_extinction(track->values, track, d);
     Float chosen = uniform_choice(sigma, importance, u.y);
     Foci foci = foci_look(track, o, d, tmax);
     Float share = foci_share(sigma, importance, tmax), rest = 1.0f - share;
@@ -420,7 +410,7 @@ static NOINLINE Flight track_flight(const Track *t, Vec3 o, Vec3 d, Float tmax, 
 static NOINLINE Spec track_weight(const Track *t, Vec3 o, Vec3 d, Float far, Float tmax, Spec importance, Mask m,
                                   const SampleKey *key, uint32_t dimension) {
     if (track_is_uniform(t)) {
-        Spec sigma = uniform_deciding(t, d, tmax), passed = uniform_transmittance(uniform_extinction(t->values, t, d), far);
+        Spec sigma = uniform_extinction(t->scene, t, d), passed = uniform_transmittance(uniform_extinction(t->values, t, d), far);
         Float density = spec_dot(importance, uniform_transmittance(sigma, far));
         if (t->foci > 0) {
             Foci foci = foci_look(t, o, d, tmax);

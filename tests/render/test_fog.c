@@ -2,8 +2,6 @@
 // of all of these, also where the slab is empty. What is refused.
 #include "slab.h"
 
-#include "render/replay.h"
-
 #include <stdlib.h>
 
 static void expect(const Case *c, const char *what, const double *mean, const double *error, const double *expected,
@@ -106,37 +104,6 @@ static void test_empty(void **state) {
     }
     judge(c);
     judge(dark);
-}
-
-// The same by differences along replayed paths, which must collide where the recording scene has nothing to collide with.
-static void test_empty_replayed(void **state) {
-    UNUSED(state);
-    static const char *kinds[] = {"homogeneous", "heterogeneous"};
-    const double step = 1e-3, p = (1 - 0.09) / (4 * pi * pow(1.3, 3));
-    for (int i = 0; i < 2; i++) {
-        const rey_define defines[MOST_DEFINES] = {
-            {"albedo", "0.9, 0.5, 0.2"}, {"sun", "5"}, {"depth", "2"}, {"scale", "0"}, {"kind", kinds[i]}};
-        Room room = slab_open(defines, 2);
-        rey_scene *moved = NULL;
-        ok(room, rey_scene_load(room.ctx, RENDER_DIR "/slab.xml", defines, 5, &moved));
-        const float scale = (float)step;
-        ok(room, rey_param_set(moved, rey_param_find(moved, "fog.scale.value"), &scale, 1));
-        double sum = 0;
-        for (int s = 0; s < SETS; s++) {
-            float image[3 * PIXELS];
-            rey_render_def def = def_make(1024, (uint32_t)s, 1);
-            ok(room, rey_replay(room.scene, moved, &def, image, NULL));
-            for (int k = 0; k < PIXELS; k++) {
-                sum += (double)image[3 * k] / (PIXELS * SETS) / step;
-            }
-        }
-        const double expected = 2 * sigma[0] * 0.9 * p * 5;
-        if (fabs(sum - expected) > 0.02 * expected) {
-            fail_msg("%s: %.6g, expected %.6g", kinds[i], sum, expected);
-        }
-        rey_scene_destroy(moved);
-        room_close(room);
-    }
 }
 
 // I = j (1 - exp(-2 sigma)) / sigma, and 2 j where the slab is empty; dI / d sigma = -2 j there.
@@ -392,7 +359,6 @@ static void test_overlap(void **state) {
 int main(int argc, char **argv) {
     struct CMUnitTest tests[] = {cmocka_unit_test(test_transmittance), cmocka_unit_test(test_single_scattering),
                                        cmocka_unit_test(test_empty),         cmocka_unit_test(test_emission),
-                                       cmocka_unit_test(test_empty_replayed),
                                        cmocka_unit_test(test_furnace),       cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_overlap),
                                        cmocka_unit_test(test_far_plane),
