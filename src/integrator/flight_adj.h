@@ -74,7 +74,8 @@ static NOINLINE void extinction_slope(const SceneView *scene, const MediumNode *
         d = spec_scale(d, flakes_area(scene, medium->flakes, p, w));
     }
     if (v->kind == VOLUME_GRID) {
-        v3_acc(dp, volume_slope(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale]))));
+        Vec3 slope = volume_slope(scene, v, p, spec_scale(d, f_set((real)scene->theta[medium->scale])));
+        v3_acc(dp, v3_select(m, slope, v3_zero()));
     }
 }
 

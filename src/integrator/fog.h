@@ -35,6 +35,16 @@ KFN void borders_watch(const Tracer *t, const Group *group, Vec3 ng, Vec3 d, Int
     }
 }
 
+// The hit, with a shape of this group also in the lanes that hit another one.
+KFN Hit walk_hit(const Hit *hit, Mask mine) {
+    int lane = m_first(mine);
+    Hit safe = *hit;
+    safe.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, lane)));
+    safe.prim = i_select(mine, hit->prim, i_set(i_lane(hit->prim, lane)));
+    safe.instance = i_select(mine, hit->instance, i_set(i_lane(hit->instance, lane)));
+    return safe;
+}
+
 // The media before and behind surfaces that rays along d, which are in `medium`, meet at a hit.
 static NOINLINE void media_beside(const SceneView *scene, const Hit *hit, Vec3 d, Int medium, Mask m, Int *before, Int *behind) {
     Int groups = SHAPE_FIELD(scene, i_select(m, hit->shape, i_set(0)), group);
@@ -43,10 +53,7 @@ static NOINLINE void media_beside(const SceneView *scene, const Hit *hit, Vec3 d
         int32_t id = i_lane(groups, m_first(left));
         const Group *group = scene->groups + id;
         mine = left & mi_eq(groups, i_set(id));
-        Hit safe = *hit;
-        safe.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, m_first(mine))));
-        safe.prim = i_select(mine, hit->prim, i_set(i_lane(hit->prim, m_first(mine))));
-        safe.instance = i_select(mine, hit->instance, i_set(i_lane(hit->instance, m_first(mine))));
+        Hit safe = walk_hit(hit, mine);
         Vec3 ng = shape_interaction(scene, group->shape_kind, group->shape_flags, &safe).ng;
         *before = i_select(mine, medium_behind(group, ng, v3_neg(d), medium), *before);
         *behind = i_select(mine, medium_behind(group, ng, d, medium), *behind);
@@ -99,9 +106,8 @@ static NOINLINE void pass_close_borders(const Tracer *t, const Hit *hit, Vec3 d,
     enum { MOST_FACES = 4 };
     const SceneView *scene = t->scene;
     Hit from = *hit;
-    Float left = step;
+    Float left = step, skip = scene->borders_touch ? 0.02f * step : f_set(0); // two in one place have been parted already
     for (int i = 0; i < MOST_FACES && m_any(m); i++) {
-        Float skip = t->scene->borders_touch ? 0.02f * step : f_set(0); // two in one place have been parted already
         Hit next = trace_others(scene, &from, (Ray){v3_madd(from.p, skip, d), d, left - skip}, m);
         Mask found = m & mi_lt(i_set(-1), next.shape), nulls = null_lanes(scene, next.shape, found);
         Float way = v3_dot(v3_sub(next.p, from.p), d);

@@ -120,27 +120,16 @@ static NOINLINE void turned_fog_adj(const Tracer *t, const Walk *walk, Spec dt, 
             const VolumeNode *v = scene->volumes + medium->sigma_t;
             medium_span(scene, medium, v, walk->o[i], walk->d, &low, &high);
             Mask m = mine & m_gt(high, low) & m_finite(high);
-            const bool grid = v->kind == VOLUME_GRID, flakes = medium->flakes >= 0;
-            if (!(grid || flakes) || !m_any(m)) {
+            if (!(v->kind == VOLUME_GRID || medium->flakes >= 0) || !m_any(m)) {
                 continue;
             }
-            Float along = (high - low) * ((real)-1 / FLIGHT_POINTS), each = along * (real)scene->theta[medium->scale];
+            Spec lost = spec_scale(dt, (high - low) * ((real)-1 / FLIGHT_POINTS));
             for (int k = 0; k < FLIGHT_POINTS; k++) {
                 Float at = f_select(m, flight_point(low, high, key, (uint32_t)(i * FLIGHT_POINTS), k), f_set(0));
-                Vec3 p = v3_madd(walk->o[i], at, walk->d);
-                Float far = v3_dot(v3_sub(p, turn->from), walk->d);
-                Vec3 slope = v3_zero();
-                if (flakes) {
-                    Vec3 dw = v3_zero();
-                    extinction_turn(scene, medium, LOSS, p, walk->d, spec_scale(dt, along), m, &slope, &dw);
-                    turn->d = v3_add(turn->d, v3_select(m, dw, v3_zero()));
-                }
-                if (grid) {
-                    Float area = flakes ? flakes_area(scene, medium->flakes, p, walk->d) : f_set(1);
-                    v3_acc(&slope, volume_slope(scene, v, p, spec_zero_unless(m, spec_scale(dt, each * area))));
-                }
-                turn->d = v3_madd(turn->d, f_zero_unless(m, far), slope);
-                turn->shift = v3_add(turn->shift, v3_select(m, slope, v3_zero()));
+                Vec3 p = v3_madd(walk->o[i], at, walk->d), slope = v3_zero();
+                extinction_slope(scene, medium, LOSS, p, walk->d, lost, m, &slope, &turn->d);
+                turn->d = v3_madd(turn->d, f_zero_unless(m, v3_dot(v3_sub(p, turn->from), walk->d)), slope);
+                turn->shift = v3_add(turn->shift, slope);
             }
         }
     }

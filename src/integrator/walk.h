@@ -31,16 +31,6 @@ KFN Mask veils_end(const Tracer *t, Int light) {
     return t->job->veils ? ~light_is_delta(t->scene, i_max(light, i_set(0))) : m_set(false);
 }
 
-// The hit, with a shape of this group also in the lanes that hit another one.
-KFN Hit walk_hit(const Hit *hit, Mask mine) {
-    int lane = m_first(mine);
-    Hit safe = *hit;
-    safe.shape = i_select(mine, hit->shape, i_set(i_lane(hit->shape, lane)));
-    safe.prim = i_select(mine, hit->prim, i_set(i_lane(hit->prim, lane)));
-    safe.instance = i_select(mine, hit->instance, i_set(i_lane(hit->instance, lane)));
-    return safe;
-}
-
 // The medium at infinity: that of the sensor, unless it is the inside of some surface and not its outside, too.
 static Int medium_beyond(const Tracer *t) {
     int32_t id = t->sensor->medium;

@@ -163,40 +163,19 @@ KFN Float majorant_here(const SceneView *scene, const MediumNode *medium, const 
     return f_max(table_at(scene, cell + medium->table), w->least);
 }
 
-// Goes on until the majorants on the way have used up the optical depths. Lanes that get there are returned and stand at
-// w->t under w->majorant; the others have left the medium.
-KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Mask m) {
+// Goes on until the majorants on the way have used up the optical depths, or, unless `stop` is null, to the distance *stop. Lanes
+// that get to either are returned and stand at w->t under w->majorant; the others have left the medium.
+KFN Mask majorant_go(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, const Float *stop, Mask m) {
     Mask left = m & w->m, found = m_set(false);
     while (m_any(left)) {
         Float majorant = majorant_here(scene, medium, w);
         Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
+        Mask stops = stop ? left & m_lt(*stop, exit) : m_set(false);
+        exit = stop ? f_min(*stop, exit) : exit;
         Float through = majorant * f_max(exit - w->t, f_set(0));
         Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);
         w->majorant = f_select(left, majorant, w->majorant);
         w->t = f_select(here, w->t + depth * f_safe_rcp(majorant), f_select(left, exit, w->t));
-        depth = depth - through;
-        found = found | here;
-        left = left & ~here;
-        if (m_any(left)) {
-            majorant_step(medium, w, border, left);
-            left = left & w->m;
-        }
-    }
-    return found;
-}
-
-// The same, but that lanes which get to the distance `stop` first stand there, under the majorant of their cell, and are found.
-static NOINLINE Mask majorant_until(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Float stop,
-                                    Mask m) {
-    Mask left = m & w->m, found = m_set(false);
-    while (m_any(left)) {
-        Float majorant = majorant_here(scene, medium, w);
-        Float border = f_min(f_min(w->next[0], w->next[1]), w->next[2]), exit = f_min(border, w->end);
-        Mask stops = left & m_lt(stop, exit);
-        Float through = majorant * f_max(f_min(stop, exit) - w->t, f_set(0));
-        Mask here = left & m_gt(majorant, f_set(0)) & m_lt(depth, through);
-        w->majorant = f_select(left, majorant, w->majorant);
-        w->t = f_select(here, w->t + depth * f_safe_rcp(majorant), f_select(left, f_min(stop, exit), w->t));
         depth = depth - through;
         found = found | here | stops;
         left = left & ~(here | stops);
@@ -206,6 +185,15 @@ static NOINLINE Mask majorant_until(const SceneView *scene, const MediumNode *me
         }
     }
     return found;
+}
+
+KFN Mask majorant_next(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Mask m) {
+    return majorant_go(scene, medium, w, depth, NULL, m);
+}
+
+static NOINLINE Mask majorant_until(const SceneView *scene, const MediumNode *medium, MajorantWalk *w, Float depth, Float stop,
+                                    Mask m) {
+    return majorant_go(scene, medium, w, depth, &stop, m);
 }
 
 KFN Vec3 majorant_point(const MajorantWalk *w) { return v3_madd(w->o, w->t, w->d); }

@@ -352,10 +352,10 @@ static NOINLINE Flight colour_flight(const Track *t, Vec3 o, Vec3 d, Float far, 
     MajorantWalk w = track_start(t, o, d, tmax, m);
     const bool lured = t->foci > 0;
     SampleKey own = random; // of the foci's collisions: other walks take numbers of `random` right behind this one's
-    own.scramble = rng_mix(random.scramble, 0x6c757265u);
     uint32_t lures = dimension;
     Lure lure;
     if (lured) {
+        own.scramble = rng_mix(random.scramble, 0x6c757265u);
         lure = lure_start(t, &w, o, d, tmax, &own, lures);
     }
     w.end = f_min(w.end, far);

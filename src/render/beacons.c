@@ -90,12 +90,14 @@ static double beyond2(const double low[3], const double high[3], const double p[
 
 // Distance of p to the surface of the box that a heterogeneous medium fills (medium/majorant.h).
 static double medium_box_distance(const SceneView *view, const VolumeNode *v, const double p[3]) {
-    double low[3] = {0, 0, 0}, high[3] = {1, 1, 1}, inside = HUGE_VAL;
+    static const float none[12] = {[0] = 1, [5] = 1, [10] = 1};
+    const float *rows = v->to_world >= 0 ? view->theta + v->to_world : none;
+    double low[3], high[3], inside = HUGE_VAL;
     for (int k = 0; k < 3; k++) {
-        for (int j = 0; j < 3 && v->to_world >= 0; j++) {
-            double along = (double)view->theta[v->to_world + 4 * k + j];
-            low[k] = (j ? low[k] : (double)view->theta[v->to_world + 4 * k + 3]) + fmin(along, 0);
-            high[k] = (j ? high[k] : (double)view->theta[v->to_world + 4 * k + 3]) + fmax(along, 0);
+        low[k] = high[k] = (double)rows[4 * k + 3];
+        for (int j = 0; j < 3; j++) {
+            low[k] += fmin((double)rows[4 * k + j], 0);
+            high[k] += fmax((double)rows[4 * k + j], 0);
         }
         inside = fmin(inside, fmin(fabs(p[k] - low[k]), fabs(p[k] - high[k])));
     }

@@ -1,4 +1,5 @@
 // edges.c: which triangles of a mesh share which edges. Vertices at the same position are one (UV seams are no edges).
+#include "shape/cut.h"
 #include "shape/edge_pieces.h"
 #include "shape/marks.h"
 #include "shape/shape.h"
@@ -244,16 +245,16 @@ static void triangle_frame(const SceneView *view, const ShapeRecord *shape, int3
 }
 
 static double distance(const double a[3], const double b[3]) {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return sqrt(dot3(d, d));
 }
 
 // Whether the tangents of two triangles differ by more than the angle between them explains.
 static bool tangents_jump(const SceneView *view, const ShapeRecord *shape, const Side *a, const Side *b) {
-    static const double zero[3] = {0, 0, 0};
     double moves[2][2][3], n[2][3];
     for (int i = 0; i < 2; i++) {
         triangle_frame(view, shape, (i ? b : a)->at / 3, moves[i], n[i]);
-        double size = distance(moves[i][0], zero);
+        double size = sqrt(dot3(moves[i][0], moves[i][0]));
         for (int k = 0; k < 3; k++) {
             moves[i][0][k] = size > 0 ? moves[i][0][k] / size : 0;
         }
@@ -263,22 +264,17 @@ static bool tangents_jump(const SceneView *view, const ShapeRecord *shape, const
 
 // Whether points move with u and v otherwise on one of two triangles than on the other, along the surface.
 static bool frames_jump(const SceneView *view, const ShapeRecord *shape, const Side *a, const Side *b) {
-    static const double zero[3] = {0, 0, 0};
     double moves[2][2][3], n[2][3];
     triangle_frame(view, shape, a->at / 3, moves[0], n[0]);
     triangle_frame(view, shape, b->at / 3, moves[1], n[1]);
     for (int i = 0; i < 2; i++) {
-        double between[3], up[3], along = 0, square = 0;
+        double between[3], up[3];
         for (int k = 0; k < 3; k++) {
             between[k] = moves[0][i][k] - moves[1][i][k];
             up[k] = n[0][k] + n[1][k];
-            along += between[k] * up[k];
-            square += up[k] * up[k];
         }
-        for (int k = 0; k < 3; k++) {
-            up[k] *= square > 0 ? along / square : 0;
-        }
-        if (distance(between, up) > 1e-4 * distance(moves[0][i], zero)) {
+        double along = dot3(between, up), across2 = dot3(between, between) - along * along / fmax(dot3(up, up), 1e-30);
+        if (across2 > 1e-8 * dot3(moves[0][i], moves[0][i])) {
             return true;
         }
     }
