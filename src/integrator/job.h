@@ -4,6 +4,7 @@
 #include "scene/scene.h"
 #include "shape/corners.h"
 #include "shape/marks.h"
+#include "shape/panes.h"
 
 // MODE_REPLAY: the picture of another scene along the paths of this one (path_replay.h).
 enum { MODE_PRIMAL, MODE_REVERSE, MODE_FORWARD, MODE_AOV, MODE_REPLAY };
@@ -72,6 +73,7 @@ typedef struct PathJob {
     const int32_t *none;          // the offsets of a selection of nothing
     const CornerRecord *corners;  // those of a viewer from corner_at[viewer] to corner_at[viewer + 1]
     const int32_t *corner_at;     // null: there are none
+    const PaneSet *panes;         // over which points slide where they move (shape/pane.h); null: there are none
     bool glossy;                  // some surfaces scatter into narrow lobes (glossy.h)
     const int32_t *live;          // per group, and behind these per medium: LIVE_ mask
     bool live_extinctions;        // that of some medium depends on the selection

@@ -146,6 +146,7 @@ static Sink sink_of(const PathJob *job) {
                   .instance_at = job->instance_at,
                   .camera_at = job->camera_at,
                   .volume_at = job->volume_at,
+                  .panes = job->panes,
                   .any_volumes = job->any_volumes,
                   .any_sky = job->any_sky,
                   .sky_at = job->sky_at,

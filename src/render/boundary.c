@@ -221,6 +221,9 @@ void rey_boundaries_free(Render *r) {
     rey_array_free(ctx, &r->marks);
     rey_array_free(ctx, &r->corners);
     rey_free(ctx, r->corner_at);
+    rey_array_free(ctx, &r->pane_records);
+    rey_array_free(ctx, &r->pane_of);
+    rey_free(ctx, r->pane_at);
 }
 
 static rey_result reserve_workspaces(Render *r) {
@@ -390,6 +393,7 @@ static void boundary_unit(void *argument, int64_t shard, int worker) {
     BoundaryJob b = plan->job;
     b.job.adjoint = pass->r->job.adjoint;
     b.job.tangent = pass->r->job.tangent;
+    b.job.panes = pass->r->job.panes;
     // Of whole blocks of segments.
     int64_t per_shard = ((plan->samples + plan->shards - 1) / plan->shards + 15) / 16 * 16;
     b.first = shard * per_shard;

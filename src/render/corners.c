@@ -4,6 +4,7 @@
 #include "bsdf/table.h"
 #include "render/blame.h"
 #include "render/boundary.h"
+#include "sensor/kinds.h"
 
 typedef struct Sliding {
     const Render *render;
@@ -28,16 +29,64 @@ static bool wall_scatters(const SceneView *view, const CornerRecord *c) {
     return view->bsdfs[bsdf].spreads && !rey_bsdf_holds(view, bsdf, rey_bsdf_opens);
 }
 
+// Whether points may slide over the faces of a surface: it refracts into lobes, alike everywhere, moves, and has no corner with
+// another one, which would seem to move otherwise there.
+static bool pane_slides(const Render *r, int32_t id) {
+    const SceneView *view = &r->scene->view;
+    const ShapeRecord *shape = view->shapes + id;
+    const BsdfNode *node = view->bsdfs + shape->bsdf;
+    bool moves = r->job.points_at[id] >= 0 || r->job.pose_at[id] >= 0;
+    bool alike = node->glossy && node->transmits && !node->surface && node->child[0] < 0;
+    for (int k = 0; k < MAX_SLOTS && alike; k++) {
+        alike = node->slot[k] < 0 || view->textures[node->slot[k]].kind == TEXTURE_CONSTANT;
+    }
+    for (size_t i = 0; i < r->corners.count && alike; i++) {
+        const CornerRecord *c = &ARRAY_AT(r->corners, CornerRecord, i);
+        alike = c->viewer == c->wall || (c->viewer != id && c->wall != id);
+    }
+    return moves && alike && shape->collection < 0 && shape->emitter < 0;
+}
+
+// Over panes, points slide along the sensor's view.
+static rey_result find_panes(Render *r) {
+    const SceneView *view = &r->scene->view;
+    const SensorRecord *sensor = r->plan.sensor;
+    const bool parallel = sensor->kind == SENSOR_ORTHOGRAPHIC;
+    if (!parallel && sensor->kind != SENSOR_PERSPECTIVE && sensor->kind != SENSOR_THINLENS) {
+        return REY_OK;
+    }
+    const float *m = view->theta + sensor->to_world;
+    for (int k = 0; k < 3; k++) {
+        r->panes.eye[k] = m[4 * k + (parallel ? 2 : 3)];
+    }
+    r->panes.eye[3] = parallel ? 0 : 1;
+    r->pane_at = rey_alloc_array(r->scene->ctx, (size_t)view->shapes_count + 1, sizeof *r->pane_at);
+    for (int32_t id = 0; id < view->shapes_count && r->pane_at; id++) {
+        const size_t before = r->pane_of.count;
+        if (pane_slides(r, id) && rey_panes_find(r->scene, id, &r->pane_records, &r->pane_of) != REY_OK) {
+            return REY_ERROR_MEMORY;
+        }
+        r->pane_at[id] = r->pane_of.count > before ? (int32_t)before : -1;
+    }
+    r->panes.pane = r->pane_records.data;
+    r->panes.at = r->pane_at;
+    r->panes.of = r->pane_of.data;
+    r->job.panes = r->pane_records.count ? &r->panes : NULL;
+    return r->pane_at ? REY_OK : REY_ERROR_MEMORY;
+}
+
 rey_result rey_corners_begin(Render *r) {
     const SceneView *view = &r->scene->view;
     bool plain = !view->has_media && !view->through && !view->drops && !view->split;
-    if (!r->job.any_motion || !plain || r->request.asked || !(r->terms & REY_TERM_INTERIOR)) {
+    if (!r->job.any_motion || !plain || r->request.asked) {
         return REY_OK;
     }
     r->job.glossy = rey_bsdfs_used(view, rey_bsdf_glossy);
     r->job.none = r->none;
     const Sliding sliding = {r, r->job.any_camera || rey_boundary_chained(view)};
     rey_result result = rey_corners_find(r->scene, moves_on_film, &sliding, &r->corners);
+    // All terms have to know them, even where only one is asked for.
+    result = result == REY_OK ? find_panes(r) : result;
     CornerRecord *all = r->corners.data;
     size_t kept = 0;
     for (size_t i = 0; i < r->corners.count && result == REY_OK; i++) {

@@ -1,4 +1,5 @@
-// corners.h: where noise is taken out of the interior term: at inner corners (integrator/corner.h) and narrow lobes (glossy.h).
+// corners.h: where noise is taken out of the interior term: at inner corners (integrator/corner.h), at narrow lobes (glossy.h) and
+// on panes (shape/pane.h).
 #pragma once
 
 #include "render/render_parts.h"

@@ -56,6 +56,9 @@ typedef struct Render {
     bool meetings_found;
     Array corners;         // where the interior term looks through lenses (shape/corners.h)
     int32_t *corner_at;    // by viewer
+    PaneSet panes;         // of the job, where there are some; their records, and which shapes they are of
+    Array pane_records, pane_of;
+    int32_t *pane_at;
     int32_t *lamp_medium;  // by emitter, where it matters, else null: the medium that it lies in, -1 = none (beacons.h)
     Beacon *beacons;       // those of the job
     int32_t *beacon_of;

@@ -26,6 +26,7 @@ typedef struct Sink {
     const int32_t *instance_at; // per instance: its to_world
     const int32_t *camera_at;   // CAMERA_ numbers, of batches those of each part
     const int32_t *volume_at;   // per volume: its to_world
+    const struct PaneSet *panes; // over which points slide (shape/pane.h); null = there are none
     bool any_volumes;
     bool any_normals, any_attributes, any_places;
     bool any_motion, any_camera; // surfaces or the sensor move; the sensor does

@@ -5,6 +5,7 @@
 
 #include "shape/curve_move.h"
 #include "shape/mesh_move.h"
+#include "shape/pane.h"
 #include "shape/posed_move.h"
 #include "shape/sdfgrid_move.h"
 #include "shape/shape.h"
@@ -52,9 +53,11 @@ KFN void shape_slide(const SceneView *scene, int32_t kind, int32_t flags, const 
 KFN void surface_move_adj(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit, const Interaction *si,
                           const SurfaceAdj *d, Sink *sink, Mask m) {
     switch (kind) {
-    case SHAPE_MESH:
-        mesh_move_adj(scene, flags, hit, si, d, sink, m);
+    case SHAPE_MESH: {
+        const SurfaceAdj kept = sink->panes ? pane_adj(sink->panes, hit, si, d) : *d;
+        mesh_move_adj(scene, flags, hit, si, &kept, sink, m);
         break;
+    }
     case SHAPE_SPHERE:
         sphere_move_adj(scene, flags, hit, si, d, sink, m);
         break;

@@ -84,6 +84,8 @@ static const Motion motions[] = {
     {"glossy_veil.xml", "floor.to_world", TURN, {1, 0.3f, 0.2f}, 0.5, 128, 512},
     {"glossy_pane.xml", "pane.to_world", TURN, {1, 0.3f, 0.2f}, 1, 256, 1024},
     {"glossy_pane.xml", "wall.to_world", TURN, {1, 0.3f, 0.2f}, 1, 128, 512},
+    {"panes_lamp.xml", "pane.to_world", TURN, {1, 0.3f, 0.2f}, 1.5, 512, 4096},
+    {"panes_lamp.xml", "sheet.positions", ADD, {0}, 0.03, 1024, 3072},
     {"boundary_view.xml", "camera.to_world", TURN, {0.3f, 0.2f, 1}, 1, 256, 1024},
     {"boundary_view.xml", "camera.x_fov", ADD, {0, 0, 0}, 1, 256, 1024},
     {"boundary_view.xml", "camera.principal_point_offset_x", ADD, {0, 0, 0}, 0.01, 256, 1024},
