@@ -67,7 +67,7 @@ sanitize: setup
 	@$(MAKE) --no-print-directory -C build-asan -j$(JOBS)
 	@cd build-asan && REYNOLDS_TEST_EFFORT=0.25 ctest -j$(JOBS) --output-on-failure -LE 'slow|heavy|long'
 
-# Threads meet in the same places at every width.
+# Threads meet in the same places at every width, and in the first iterations of fits.
 tsan: setup
 	@cmake -S . -B build-tsan -DREYNOLDS_TSAN=ON -DREYNOLDS_WIDEST=1 > /dev/null
 	@$(MAKE) --no-print-directory -C build-tsan -j$(JOBS) threads
