@@ -217,7 +217,8 @@ static void test_modes(void **state) {
     test_named(room, m, param, tangent);
     room_close(room);
     const bool volumes = begins_with(m->room, "media_");
-    const bool seamless = volumes || begins_with(m->room, "glossy_") || strcmp(m->room, "ride_room.xml") == 0;
+    const bool glass = begins_with(m->room, "glossy_") || begins_with(m->room, "panes_");
+    const bool seamless = volumes || glass || strcmp(m->room, "ride_room.xml") == 0;
     const bool smoky = begins_with(m->room, "beacon_smoke") || begins_with(m->room, "beacon_flakes");
     const bool bulbs = begins_with(m->room, "ride_bulb") || smoky;
     const bool shades = strcmp(m->param, "block.to_world") == 0 || strcmp(m->param, "ball.to_world") == 0;
