@@ -113,11 +113,8 @@ typedef struct Weigher {
 
 static Weigher weigher_of(const Render *r, int32_t kind) {
     const SceneView *view = &r->scene->view;
-    const float *m = view->theta + r->plan.sensor->to_world;
-    Weigher w = {rey_projection_of(view, &r->plan), {m[3], m[7], m[11], 1}, kind, r->job.any_camera ? 1 : 0.25};
-    if (w.projection.parallel) {
-        w.eye[0] = m[2], w.eye[1] = m[6], w.eye[2] = m[10], w.eye[3] = 0;
-    }
+    Weigher w = {.projection = rey_projection_of(view, &r->plan), .kind = kind, .still = r->job.any_camera ? 1 : 0.25};
+    rey_sensor_eye(view, r->plan.sensor, w.eye);
     bool ends_move = r->job.any_motion || (kind == BOUNDARY_INDIRECT && r->job.any_places);
     w.still = kind == BOUNDARY_PRIMARY || !ends_move ? 0 : w.still;
     return w;

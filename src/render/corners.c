@@ -4,7 +4,7 @@
 #include "bsdf/table.h"
 #include "render/blame.h"
 #include "render/boundary.h"
-#include "sensor/kinds.h"
+#include "render/projection.h"
 
 typedef struct Sliding {
     const Render *render;
@@ -40,26 +40,25 @@ static bool pane_slides(const Render *r, int32_t id) {
     for (int k = 0; k < MAX_SLOTS && alike; k++) {
         alike = node->slot[k] < 0 || view->textures[node->slot[k]].kind == TEXTURE_CONSTANT;
     }
+    bool touched = false;
     for (size_t i = 0; i < r->corners.count && alike; i++) {
         const CornerRecord *c = &ARRAY_AT(r->corners, CornerRecord, i);
-        alike = c->viewer == c->wall || (c->viewer != id && c->wall != id);
+        touched |= c->viewer != c->wall && (c->viewer == id || c->wall == id);
     }
-    return moves && alike && shape->collection < 0 && shape->emitter < 0;
+    return moves && alike && !touched && shape->collection < 0 && shape->emitter < 0;
 }
 
 // Over panes, points slide along the sensor's view.
 static rey_result find_panes(Render *r) {
     const SceneView *view = &r->scene->view;
-    const SensorRecord *sensor = r->plan.sensor;
-    const bool parallel = sensor->kind == SENSOR_ORTHOGRAPHIC;
-    if (!parallel && sensor->kind != SENSOR_PERSPECTIVE && sensor->kind != SENSOR_THINLENS) {
+    double eye[4];
+    if (!rey_boundary_sees(r->plan.sensor)) {
         return REY_OK;
     }
-    const float *m = view->theta + sensor->to_world;
-    for (int k = 0; k < 3; k++) {
-        r->panes.eye[k] = m[4 * k + (parallel ? 2 : 3)];
+    rey_sensor_eye(view, r->plan.sensor, eye);
+    for (int k = 0; k < 4; k++) {
+        r->panes.eye[k] = (float)eye[k];
     }
-    r->panes.eye[3] = parallel ? 0 : 1;
     r->pane_at = rey_alloc_array(r->scene->ctx, (size_t)view->shapes_count + 1, sizeof *r->pane_at);
     for (int32_t id = 0; id < view->shapes_count && r->pane_at; id++) {
         const size_t before = r->pane_of.count;
@@ -78,14 +77,15 @@ static rey_result find_panes(Render *r) {
 rey_result rey_corners_begin(Render *r) {
     const SceneView *view = &r->scene->view;
     bool plain = !view->has_media && !view->through && !view->drops && !view->split;
-    if (!r->job.any_motion || !plain || r->request.asked) {
+    // All terms have to know the panes, even where only one is asked for.
+    bool glossy = rey_bsdfs_used(view, rey_bsdf_glossy), needed = glossy || (r->terms & REY_TERM_INTERIOR);
+    if (!r->job.any_motion || !plain || r->request.asked || !needed) {
         return REY_OK;
     }
-    r->job.glossy = rey_bsdfs_used(view, rey_bsdf_glossy);
+    r->job.glossy = glossy;
     r->job.none = r->none;
     const Sliding sliding = {r, r->job.any_camera || rey_boundary_chained(view)};
     rey_result result = rey_corners_find(r->scene, moves_on_film, &sliding, &r->corners);
-    // All terms have to know them, even where only one is asked for.
     result = result == REY_OK ? find_panes(r) : result;
     CornerRecord *all = r->corners.data;
     size_t kept = 0;

@@ -14,6 +14,14 @@ double rey_pose_size(const float *m) {
     return size;
 }
 
+void rey_sensor_eye(const SceneView *view, const SensorRecord *sensor, double eye[4]) {
+    const bool parallel = sensor->kind == SENSOR_ORTHOGRAPHIC;
+    for (int k = 0; k < 3; k++) {
+        eye[k] = (double)view->theta[sensor->to_world + 4 * k + (parallel ? 2 : 3)];
+    }
+    eye[3] = parallel ? 0 : 1;
+}
+
 Projection rey_projection_of(const SceneView *view, const FilmPlan *plan) {
     const SensorRecord *s = plan->sensor;
     Projection p = {.near = fmax((double)s->near_clip, 1e-6), .parallel = s->kind == SENSOR_ORTHOGRAPHIC,

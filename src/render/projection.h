@@ -17,6 +17,8 @@ typedef struct Projection {
 void rey_clip_borders(const SceneView *view, const FilmPlan *plan, LightBorder borders[4]);
 // Largest entry of a pose's linear part.
 double rey_pose_size(const float *m);
+// Where a sensor looks from: a point and 1, or the direction of parallel views and 0.
+void rey_sensor_eye(const SceneView *view, const SensorRecord *sensor, double eye[4]);
 Projection rey_projection_of(const SceneView *view, const FilmPlan *plan);
 void rey_to_sensor(const Projection *p, const double *world, double *out);
 // Of a point in the sensor's space [pixels].

@@ -52,12 +52,15 @@ KFN void shape_slide(const SceneView *scene, int32_t kind, int32_t flags, const 
 
 KFN void surface_move_adj(const SceneView *scene, int32_t kind, int32_t flags, const Hit *hit, const Interaction *si,
                           const SurfaceAdj *d, Sink *sink, Mask m) {
+    SurfaceAdj kept;
     switch (kind) {
-    case SHAPE_MESH: {
-        const SurfaceAdj kept = sink->panes ? pane_adj(sink->panes, hit, si, d) : *d;
-        mesh_move_adj(scene, flags, hit, si, &kept, sink, m);
+    case SHAPE_MESH:
+        if (sink->panes) {
+            kept = pane_adj(sink->panes, hit, si, d);
+            d = &kept;
+        }
+        mesh_move_adj(scene, flags, hit, si, d, sink, m);
         break;
-    }
     case SHAPE_SPHERE:
         sphere_move_adj(scene, flags, hit, si, d, sink, m);
         break;
