@@ -7,6 +7,7 @@
 #include "render/blame.h"
 #include "render/boundary.h"
 #include "render/boundary_edges.h"
+#include "render/cuts.h"
 #include "render/light_borders.h"
 #include "render/live.h"
 #include "render/projection.h"
@@ -205,10 +206,9 @@ static double free_radius(const SceneView *view, const double p[3]) {
 
 // Whether directions matter beyond what collisions see.
 static bool turns(const SceneView *view) {
-    bool found = rey_bsdfs_used(view, rey_bsdf_mirrors) || rey_bsdfs_used(view, rey_bsdf_turns) || rey_boundary_veiled(view);
+    bool found = rey_bsdfs_used(view, rey_bsdf_mirrors) || rey_boundary_veiled(view);
     for (int64_t i = 0; i < view->shapes_count; i++) {
-        const ShapeRecord *shape = view->shapes + i;
-        found |= (shape->flags & SHAPE_HAS_NORMALS) && !rey_bsdf_passes(view->bsdfs[shape->bsdf].kind);
+        found |= rey_cuts_within(view, view->shapes[i].bsdf);
     }
     return found;
 }
@@ -412,7 +412,7 @@ static rey_result refuse_lamp(const Render *r, int32_t light) {
     rey_name_emitter(r->scene, light, name);
     why = has_borders(r, light) ? "where its light ends abruptly or jumps" : why;
     why = light_is_shifted(r, light) && !camera_is_known(r) ? "with sensors that are no cameras" : why;
-    why = turns(view) ? "in scenes with smooth mirrors, glass, masks or normals of their own" : why;
+    why = turns(view) ? "in scenes with smooth mirrors, glass, masks, or maps without a shadowing function" : why;
     why = rey_rides_gap(view) ? rey_rides_gap(view) : why;
     return rey_fail(r->scene->ctx, REY_ERROR_INCOMPLETE,
                     "the gradient of what moves beside '%s', a light at a point that lies within a participating medium, does "

@@ -9,7 +9,7 @@
 // and where collisions cannot ride.
 rey_result rey_lights_ride(Render *r);
 // Where collisions ride: fills job->beacons. None, and job->beacons null, where directions matter beyond what collisions see:
-// smooth mirrors and glass, normals that are not the surfaces' own, phase functions that differ from place to place; and where
-// lights or the sensor move, with sensors that are no cameras. Refuses what moves beside lights that need one and have none.
+// smooth mirrors and glass, masks, maps without a shadowing function; and where lights or the sensor move, with sensors that are
+// no cameras. Refuses what moves beside lights that need one and have none.
 rey_result rey_beacons_begin(Render *r);
 void rey_beacons_end(Render *r);

@@ -333,11 +333,11 @@ static rey_result boundary_begin(Render *r, int32_t kind, BoundaryPlan *plan) {
     return result;
 }
 
-// Where the boundary terms are not computed, paths look out for shading normals that turn away. Indices of refraction move nothing
-// that the sensor sees itself.
+// Where the boundary terms are not computed, paths look out for shading normals that turn away. Indices of refraction, and lights
+// that collisions ride with, move nothing that the sensor sees itself.
 static void watch_smooth_normals(Render *r, bool look_out) {
     const SceneView *view = &r->scene->view;
-    const int both = REY_TERM_PRIMARY | REY_TERM_INDIRECT;
+    const int both = (r->needed & REY_TERM_PRIMARY) | REY_TERM_INDIRECT;
     bool whole = (r->terms & both) == both || (!r->def.terms && (r->terms & REY_TERM_SPECULAR));
     r->job.watch_smooth = (r->job.any_normals || r->job.any_motion) && (look_out || !whole);
     for (int64_t i = 0; i < view->shapes_count && r->job.watch_smooth; i++) {

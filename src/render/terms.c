@@ -356,7 +356,7 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
                         "that move beside them, does not exist yet here: points next to a light, from which its light is "
                         "scattered, must move as it does. Known are lights that hang free in a medium, in scenes without "
-                        "smooth mirrors, glass and normals of their own (docs/media.md)");
+                        "smooth mirrors, glass and masks (docs/media.md)");
     }
     if (result == REY_OK && r->astray > CHANCE_SLIPS + r->borders / BORDERS_PER_SLIP &&
         (selection_moves(r, selection) || r->job.live_borders)) {

@@ -26,12 +26,12 @@ static void slot_numbers(Tracer *t, const Segments *q, int64_t first) {
 
 static int32_t far_half(const Segments *q) { return (q->count + LANES - 1) / LANES * LANES; }
 
-// Starts paths along those segments that end on no light.
+// Starts paths along those segments that end on no light, nor beside one.
 static void far_start(Tracer *t, const Segments *q) {
     int32_t *slots = t->ws.order, n = 0;
     for (int32_t k = 0; k < q->count; k++) {
         slots[n] = k;
-        n += q->lit[k] != 1;
+        n += q->lit[k] != 1 && q->lit[k] != SEGMENT_BESIDE;
     }
     for (int32_t k = 0; k < n; k += LANES) {
         Mask m = m_first_n(n - k);

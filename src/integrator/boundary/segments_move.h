@@ -98,6 +98,16 @@ static Carried turnings_ahead_adj(const Indirect *in, int32_t k, Float worth, Si
     return (Carried){apart, v3_zero()};
 }
 
+// Of horizons that end beside lights at a point: n . (light' - x') over their distance.
+static void besides_ahead_adj(const Indirect *in, int32_t k, Float worth, Sink *sink, Mask m) {
+    const Segments *q = &in->q;
+    Vec3 n = v3_scale(record_v3(q->nx, q->ny, q->nz, k), worth * f_load(q->behind + k));
+    Hit x = LOAD_HIT(q, k, edge);
+    n = v3_select(m, n, v3_zero());
+    points_move_adj(in->t, &x, v3_neg(n), v3_zero(), sink, m);
+    beacon_flow_adj(in->t, i_load(q->source + k), i_set(0), n, m_set(false), sink, m);
+}
+
 // The motion of the curves along which surfaces meet, of the segments k..., by the two surfaces, worth `worth`.
 static void meetings_ahead_adj(const Indirect *in, int32_t k, Float worth, Sink *sink, Mask m) {
     const Segments *q = &in->q;
@@ -118,8 +128,12 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
     if (boundary_is_facing(in->b->kind)) {
         return facing_ahead_adj(in->t, q, k, boundary_is_chained(in->b->kind), worth, sink, m);
     }
+    Mask beside = m & mi_eq(i_load(q->lit + k), i_set(SEGMENT_BESIDE));
     if (boundary_is_terminator(in->b->kind) || boundary_is_horizon(in->b->kind)) {
-        return turnings_ahead_adj(in, k, worth, sink, m);
+        if (!still && m_any(beside)) {
+            besides_ahead_adj(in, k, worth, sink, beside);
+        }
+        return turnings_ahead_adj(in, k, worth, sink, m & ~beside);
     }
     if (boundary_is_rim(in->b->kind)) {
         return rims_ahead_adj(in->t, q, k, boundary_is_chained(in->b->kind), worth, sink, m);
@@ -131,12 +145,11 @@ static Carried ways_begin_adj(const Indirect *in, int32_t k, Float worth, bool s
         return (Carried){v3_zero(), v3_zero()};
     }
     Vec3 n = v3_select(m, record_v3(q->nx, q->ny, q->nz, k), v3_zero());
-    Mask beside = mi_eq(i_load(q->lit + k), i_set(SEGMENT_BESIDE)); // of which the near point alone counts
     if (!still) {
         segments_ahead_adj(in, k, n, worth, sink, m & ~beside);
     }
-    if (!still && sink->any_places && m_any(m & beside)) {
-        beacon_flow_adj(in->t, i_load(q->source + k), i_set(0), v3_scale(n, -worth), m_set(false), sink, m & beside);
+    if (!still && sink->any_places && m_any(beside)) { // of which the near point alone counts, and the light
+        beacon_flow_adj(in->t, i_load(q->source + k), i_set(0), v3_scale(n, -worth), m_set(false), sink, beside);
     }
     Float drag = f_select(beside, f_set(1), f_load(q->along + k) - 1.0f);
     return (Carried){v3_scale(n, drag * worth), v3_zero()};

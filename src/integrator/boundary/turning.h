@@ -13,10 +13,13 @@
 //   dI += integral dA_x dphi f |n_g . v| (dv / dw) F' L W                              horizon, -L from below
 // Cut: maps without a shadowing function scatter what comes from one side of the plane of the surface's own shading normal n
 // only, f with the cosine of the map's normal: as the horizon, f on either side.
-// In media, what collisions see and send keeps its direction as along chains, and what surfaces do comes through the air.
+// In media, what collisions see and send keeps its direction as along chains, and what surfaces do comes through the air. Of what
+// is scattered beside lights at a point, the part that moves as they do (beacon.h) lacks the second half of a horizon's F', by
+// segments that end there, as those of beside.h do.
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
 #pragma once
 
+#include "integrator/boundary/beside.h"
 #include "integrator/boundary/facing.h"
 
 // What a segment says of its light in `lit`, beside "no" and "from a light": all that comes along it, or the difference
@@ -134,6 +137,28 @@ static Mask turning_fly(Tracer *t, const BoundaryJob *b, const Turning *s, const
     return m;
 }
 
+// Stores the segments of m, which begin at o and whose lights are stored, one over `rcp` long.
+static void turning_keep(const Turning *s, Vec3 o, Float rcp, int32_t lit, Int number, const Hit *near, const Hit *far, Segments *q,
+                         Mask m) {
+    const int32_t at = q->count;
+    // Segments run from the near point, towards the sensor, to the far one: of a terminator, x is that.
+    Vec3 d = lit == SEGMENT_JUMP ? v3_neg(s->d) : s->d, n = v3_scale(s->n, s->weight * s->factor);
+    v3_compress(q->ox + at, q->oy + at, q->oz + at, o, m);
+    v3_compress(q->dx + at, q->dy + at, q->dz + at, d, m);
+    v3_compress(q->nx + at, q->ny + at, q->nz + at, n, m);
+    f_compress(q->behind + at, rcp, m);
+    f_compress(q->along + at, s->weight * s->factor, m);
+    f_compress(q->seen + at, f_set(0), m);
+    f_compress(q->unseen + at, f_set(0), m);
+    i_compress(q->lit + at, i_set(lit), m);
+    i_compress(q->rim + at, s->map, m);
+    i_compress(q->number + at, number, m);
+    KEEP_HIT(q, at, edge, &s->hit, s->p, m);
+    KEEP_HIT(q, at, near, near, near->p, m);
+    KEEP_HIT(q, at, far, far, far->p, m);
+    q->count += m_count(m);
+}
+
 // Finds where the segments end and keeps those that do.
 static void turning_trace(Tracer *t, const BoundaryJob *b, const Turning *s, Int number, Segments *q) {
     const bool horizon = !boundary_is_terminator(b->kind);
@@ -157,35 +182,85 @@ static void turning_trace(Tracer *t, const BoundaryJob *b, const Turning *s, Int
         return;
     }
     Float near = f_zero_unless(met, f_safe_rcp(v3_length(v3_sub(end.p, s->p))));
-    int32_t at = q->count;
-    // Segments run from the near point, towards the sensor, to the far one: of a terminator, x is that.
-    Vec3 d = horizon ? s->d : v3_neg(s->d), n = v3_scale(s->n, s->weight * s->factor);
-    v3_compress(q->ox + at, q->oy + at, q->oz + at, ray.o, m);
-    v3_compress(q->dx + at, q->dy + at, q->dz + at, d, m);
-    v3_compress(q->nx + at, q->ny + at, q->nz + at, n, m);
-    f_compress(q->behind + at, near, m);
-    f_compress(q->along + at, s->weight * s->factor, m);
-    f_compress(q->seen + at, f_set(0), m);
-    f_compress(q->unseen + at, f_set(0), m);
-    spec_compress(q->light, at, spec_set(f_set(1)), m);
-    i_compress(q->lit + at, i_set(horizon ? SEGMENT_ALL : SEGMENT_JUMP), m);
-    i_compress(q->source + at, i_set(-1), m);
-    i_compress(q->rim + at, s->map, m);
-    i_compress(q->number + at, number, m);
     end.shape = i_select(met, end.shape, i_set(-1));
-    KEEP_HIT(q, at, edge, &s->hit, s->p, m);
-    KEEP_HIT(q, at, near, horizon ? &s->hit : &end, horizon ? s->p : end.p, m);
-    KEEP_HIT(q, at, far, horizon ? &end : &s->hit, horizon ? end.p : s->p, m);
-    q->count += m_count(m);
+    spec_compress(q->light, q->count, spec_set(f_set(1)), m);
+    i_compress(q->source + q->count, i_set(-1), m);
+    const int32_t lit = horizon ? SEGMENT_ALL : SEGMENT_JUMP;
+    turning_keep(s, ray.o, near, lit, number, horizon ? &s->hit : &end, horizon ? &end : &s->hit, q, m);
+}
+
+// A horizon of a point x and a point of a ball around a light: in the plane of x's triangle, with one over the square of the
+// distance from the light, or from where the plane comes close to that. Returns the distance of the two.
+static Float turning_to_ball(Tracer *t, const BoundaryJob *b, Int slot, Turning *s, BesidePoint *end) {
+    SampleKey key = slot_key(t, slot);
+    const real count = (real)t->job->beacon_count;
+    Vec2 u = rng_2d(&key, DIMENSION_SEGMENT_END);
+    Float probability, pick = rng_1d(&key, DIMENSION_TURNING_SIDE) * (2 * count);
+    Vec3 cross;
+    turning_point(t->scene, b, &key, s, &cross, &probability);
+    s->n = s->ng;
+    s->map = i_set(-1);
+    Mask above = m_lt(pick, f_set(count));
+    s->factor = f_select(above, f_set(1), f_set(-1));
+    beside_ball(t, f_select(above, pick, pick - count), end);
+    Float height = v3_dot(v3_sub(end->centre, s->p), s->n), r2 = end->radius * end->radius;
+    Float least = f_max(height * height, 1e-6f * r2), range = f_log(r2 * f_safe_rcp(least)), sine, cosine;
+    Float away2 = least * f_exp(u.x * range), away = f_safe_sqrt(away2 - least);
+    Frame plane = frame_from_normal(s->n);
+    f_sincos(TWO_PI * u.y, &sine, &cosine);
+    Vec3 foot = v3_madd(end->centre, -height, s->n);
+    end->p = v3_madd(v3_madd(foot, away * cosine, plane.s), away * sine, plane.t);
+    end->r = v3_length(v3_sub(end->p, end->centre));
+    Vec3 across = v3_sub(end->p, s->p);
+    Float distance = v3_length(across);
+    s->d = v3_scale(across, f_safe_rcp(distance));
+    Float area = PI * away2 * range; // over the density of the point in the plane
+    s->weight = 0.5f * v3_length(cross) * area * (2 * count) * f_safe_rcp(probability * distance);
+    s->m = s->m & m_gt(probability, f_set(0)) & m_lt(least, r2) & m_lt(end->r, end->radius) & m_gt(s->weight, f_set(0)) &
+           m_finite(s->weight);
+    return distance;
+}
+
+// Keeps the horizons of m whose lights come from there.
+static void turning_beside(Tracer *t, const BoundaryJob *b, Int number, Float share, Mask m, Segments *q) {
+    Turning s = {.m = m};
+    BesidePoint end;
+    Segment way = {.source = i_set(-1)}; // to the ball, on the side that counts
+    way.distance = turning_to_ball(t, b, number, &s, &end);
+    if (!m_any(s.m)) {
+        return;
+    }
+    s.weight = s.weight * share;
+    way.d = s.d;
+    way.n = v3_scale(s.ng, s.factor);
+    way.edge.p = s.p;
+    BeaconShare still = beacon_share(end.radius, end.r, way.distance, s.m);
+    way.light = spec_scale(beside_light(t, &end, s.d, number, s.m), still.chi);
+    Vec3 o = segment_offset(&way);
+    Int around = medium_around(t, o, s.d, s.m);
+    m = segment_shine(t, &way, o, around, f_set(0), number, s.m & m_gt(spec_max(way.light), f_set(0)));
+    Leg leg = {.near = s.hit, .air = i_set(-1), .around = around, .weight = spec_set(f_set(1))};
+    segment_keep_leg(around, &leg, q, m);
+    Hit light = {i_set(-1), i_set(0), f_set(0), f_set(0), end.p, i_set(0)};
+    i_compress(q->source + q->count, end.light, m);
+    spec_compress(q->light, q->count, way.light, m);
+    turning_keep(&s, o, f_safe_rcp(way.distance), SEGMENT_BESIDE, number, &s.hit, &light, q, m);
 }
 
 // As segments_find.
 static void turnings_find(Tracer *t, const BoundaryJob *b, int64_t first, int32_t count, Segments *q) {
+    const bool beside = b->kind == BOUNDARY_RIDING_HORIZON && t->job->beacons;
+    const Float share = f_set(beside ? 2 : 1); // blocks of both take turns
     q->count = 0;
     for (int32_t i = 0; i < count; i += LANES) {
         batch_numbers(t, i, first);
         Turning s;
+        if (beside && (first + i) / SEGMENT_BLOCK % 2) {
+            turning_beside(t, b, i_iota() + i, share, m_first_n(count - i), q);
+            continue;
+        }
         turning_sample(t, b, i_iota() + i, m_first_n(count - i), &s);
+        s.weight = s.weight * share;
         if (m_any(s.m)) {
             turning_trace(t, b, &s, i_iota() + i, q);
         }
