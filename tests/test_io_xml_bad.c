@@ -18,7 +18,8 @@ typedef struct BadCase {
 #define S "<scene version='3.0.0'>\n"
 static const BadCase bad_cases[] = {
     {REY_ERROR_FORMAT, "", ":1:1: not well-formed XML: no element found"},
-    {REY_ERROR_FORMAT, S " <bsdf type='a'>\n</scene>", ":3:3: not well-formed XML: mismatched tag"},
+    {REY_ERROR_FORMAT, S " <bsdf type='a'>\n</scene>",
+     ":3:3: not well-formed XML: mismatched tag, expected </bsdf>, which line 2 opens"},
     {REY_ERROR_FORMAT, S "</scene><scene/>", ":2:9: not well-formed XML: junk"},
     {REY_ERROR_SCENE, "<scene/>", ":1:1: <scene> lacks the attribute 'version'"},
     {REY_ERROR_SCENE, "<scene version='3'/>", ":1:8: bad version '3', expected three numbers"},

@@ -147,6 +147,8 @@ static void XMLCALL on_start(void *user, const XML_Char *name, const XML_Char **
     if (result && frames > file->base && reader->frames.count == frames && reader->document->nodes.count == nodes) {
         result = rey_xml_overlook(reader, result);
         file->skipped = !result;
+    } else if (!result) {
+        rey_xml_top_frame(reader)->line = rey_xml_element_position(file).line;
     }
     stop_on(file, result);
 }
@@ -188,6 +190,25 @@ static void XMLCALL on_doctype(void *user, const XML_Char *name, const XML_Char 
     }
 }
 
+// What expat stopped at, and which element was open there.
+static rey_result fail_parse(const XmlFile *file) {
+    rey_context *ctx = file->reader->ctx;
+    enum XML_Error error = XML_GetErrorCode(file->parser);
+    const bool open = file->reader->frames.count > file->base && !file->skipped;
+    const bool other = XML_GetErrorByteIndex(file->parser) < 8 && error != XML_ERROR_NO_ELEMENTS;
+    char hint[128] = "";
+    if (error == XML_ERROR_NO_MEMORY) {
+        return rey_fail_memory(ctx, 0);
+    }
+    if (open && (error == XML_ERROR_TAG_MISMATCH || error == XML_ERROR_NO_ELEMENTS)) {
+        const XmlFrame *frame = rey_xml_top_frame(file->reader);
+        snprintf(hint, sizeof hint, ", expected </%s>, which line %d opens", frame->tag->name, frame->line);
+    } else if (other) {
+        snprintf(hint, sizeof hint, "; a scene begins with <scene version=\"3.0.0\">");
+    }
+    return rey_xml_fail(ctx, parser_position(file), REY_ERROR_FORMAT, "not well-formed XML: %s%s", XML_ErrorString(error), hint);
+}
+
 // expat takes its memory from the C library: its allocator hooks have no argument through which to reach a context.
 static rey_result run_parser(XmlFile *file) {
     rey_context *ctx = file->reader->ctx;
@@ -207,14 +228,7 @@ static rey_result run_parser(XmlFile *file) {
         int length = last ? (int)(file->bytes - at) : SLICE;
         if (XML_Parse(file->parser, file->text + at, length, last) != XML_STATUS_OK) {
             result = file->reader->result;
-            if (!result) {
-                enum XML_Error error = XML_GetErrorCode(file->parser);
-                bool other = XML_GetErrorByteIndex(file->parser) < 8 && error != XML_ERROR_NO_ELEMENTS;
-                const char *hint = other ? "; a scene begins with <scene version=\"3.0.0\">" : "";
-                result = error == XML_ERROR_NO_MEMORY ? rey_fail_memory(ctx, 0)
-                                                      : rey_xml_fail(ctx, parser_position(file), REY_ERROR_FORMAT,
-                                                                     "not well-formed XML: %s%s", XML_ErrorString(error), hint);
-            }
+            result = result ? result : fail_parse(file);
         }
         if (last) {
             break;

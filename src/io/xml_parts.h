@@ -77,6 +77,7 @@ typedef struct XmlFrame { // one open element
     Array children;             // rey_xml_child
     Array names;                // const char *: taken in this object
     rey_xml_property transform; // of an open <transform>
+    int line;                   // of its tag
 } XmlFrame;
 
 typedef struct XmlReader {

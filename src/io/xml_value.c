@@ -81,7 +81,7 @@ rey_result rey_xml_read_vector(XmlReader *reader, const XmlAttributes *attribute
             read_list(axis->value, 1, &out[i], &count);
         }
         if (count != 1) {
-            return fail_value(reader, axis, "one number");
+            return fail_value(reader, axis, "one number up to 3.4e38");
         }
     }
     if (value) {
