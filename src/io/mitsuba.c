@@ -194,9 +194,9 @@ static void mark_used(const rey_scene *scene, int32_t bsdf) {
     }
 }
 
-// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so does
-// what turns such mirrors' normals; what moves needs another where the normals of maps turn away from the viewer. Scattering
-// functions that no shape has do not count.
+// Behind smooth mirrors and glass, and behind surfaces that let paths pass, what moves needs a term of its own, and so do normals
+// that turn, of such mirrors and of what these show; what moves needs another where the normals of maps turn away from the viewer.
+// Scattering functions that no shape has do not count.
 static void name_further_terms(Builder *b) {
     rey_scene *scene = b->scene;
     bool bends = false, turns = false;
@@ -209,14 +209,11 @@ static void name_further_terms(Builder *b) {
     const int moving = (bends ? REY_TERM_SPECULAR : 0) | (turns ? REY_TERM_TERMINATOR : 0);
     for (size_t i = 0; i < scene->params.count; i++) {
         Param *p = &ARRAY_AT(scene->params, Param, i);
-        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ? moving : 0;
-        p->terms |= p->normals >= 0 ? moving & REY_TERM_TERMINATOR : 0;
+        p->terms |= p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 || p->normals >= 0 ? moving : 0;
         p->terms |= p->to_uv >= 0 && (p->terms & REY_TERM_PRIMARY) ? moving & REY_TERM_SPECULAR : 0; // lines of textures
         p->terms |= p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) ? moving & REY_TERM_SPECULAR : 0; // its shadows
         int32_t texture = p->texture >= 0 ? p->texture : p->to_uv;
-        bool mirror = p->normals >= 0
-                          ? kind_within(scene, ARRAY_AT(scene->build.shapes, ShapeRecord, p->normals).bsdf, rey_bsdf_mirrors)
-                          : (p->terms & REY_TERM_TERMINATOR) && texture >= 0 && texture_turns_mirror(scene, texture);
+        bool mirror = (p->terms & REY_TERM_TERMINATOR) && texture >= 0 && texture_turns_mirror(scene, texture);
         p->terms |= mirror ? REY_TERM_SPECULAR : 0;
         p->terms |= p->terms & REY_TERM_SPECULAR ? REY_TERM_INDIRECT : 0; // what chains turn moves shadows of what lies behind them
         p->terms = moves_border(scene, p) ? REY_TERM_INTERIOR : p->terms;

@@ -240,9 +240,8 @@ static int64_t picture_floats(const Render *r) {
 // selection.
 static rey_result map_selection(Render *r, rey_selection selection) {
     const SceneView *view = &r->scene->view;
-    int64_t textures = view->textures_count, shapes = view->shapes_count;
+    int64_t textures = view->textures_count, shapes = view->shapes_count, places = MAX_EMITTER_SLOTS * view->emitters_count;
     enum { PAD = 16 };
-    int64_t places = MAX_EMITTER_SLOTS * view->emitters_count;
     int64_t n = 2 * textures + 3 * shapes + view->instances_count + rey_motion_cameras(r->plan.sensor) + view->attributes_count +
                 places + view->volumes_count + view->groups_count + view->media_count + PAD;
     r->offsets = rey_alloc_array(r->scene->ctx, 2 * (size_t)n, sizeof *r->offsets);
@@ -281,7 +280,8 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_places |= p->emitter >= 0;
         r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
-        bool behind = p->emitter < 0 && (p->terms & REY_TERM_SPECULAR) && (p->to_uv < 0 || (p->terms & REY_TERM_TERMINATOR));
+        const int terms = p->emitter < 0 ? p->terms & r->needed : 0;
+        bool behind = (terms & REY_TERM_SPECULAR) && (p->to_uv < 0 || (p->terms & REY_TERM_TERMINATOR));
         r->job.any_motion |= behind || rey_facing_in_media(&r->scene->view, p);
         r->turns_rays |= behind && p->geometry < 0 && p->instance < 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;

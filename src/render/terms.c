@@ -116,7 +116,7 @@ static bool jumps_there(const SceneView *view, const Param *p) {
 }
 
 // What of a parameter's derivative is not known because of volumes or media, null where all is.
-static const char *gap_in_media(const SceneView *view, const Param *p) {
+static const char *gap_in_media(const SceneView *view, const Param *p, int terms) {
     if (jumps_there(view, p)) {
         return "with filter_type=\"nearest\" the volume jumps from voxel to voxel, and with \"trilinear\" it does not";
     }
@@ -129,7 +129,7 @@ static const char *gap_in_media(const SceneView *view, const Param *p) {
     if (p->geometry >= 0 || p->instance >= 0) {
         return rey_rides_gap(view);
     }
-    if (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR)) { // which turns rays at smooth mirrors and glass
+    if (p->emitter < 0 && p->to_uv < 0 && (terms & REY_TERM_SPECULAR)) { // which turns rays at smooth mirrors and glass
         return rey_rides_gap(view);
     }
     if (p->emitter >= 0 && (p->terms & REY_TERM_INDIRECT) && has_jumping_media(view)) {
@@ -245,12 +245,20 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
     }
     gap = def->estimator == REY_ESTIMATOR_SCORE ? gap_of_score(view, p) : NULL;
     gap = gap ? gap : gap_of_index(view, p);
-    gap = gap ? gap : gap_in_media(view, p);
+    gap = gap ? gap : gap_in_media(view, p, terms);
     gap = gap ? gap : rey_spots_gap(view, p);
     gap = gap ? gap : rey_endless_gap(view, view->sensors + def->sensor, p, terms);
     bool points = p->geometry >= 0 || p->instance >= 0 || p->camera >= 0 ||
-                  (p->emitter < 0 && p->to_uv < 0 && (p->terms & REY_TERM_SPECULAR));
+                  (p->emitter < 0 && p->to_uv < 0 && (terms & REY_TERM_SPECULAR));
     return gap || !points || rey_moves_border(view, p) ? gap : lookups;
+}
+
+// The terms that a parameter needs. Vertex normals of meshes that are no mirrors or glass turn away behind those, too; where that
+// is not known, paths look out for it instead (boundary.c).
+static int terms_needed(const SceneView *view, int chains, const Param *p) {
+    const bool known = chains && !view->drops && !(view->has_media && rey_rides_gap(view));
+    const bool turns = p->normals < 0 || rey_bsdf_holds(view, view->shapes[p->normals].bsdf, rey_bsdf_mirrors);
+    return known || turns ? p->terms : p->terms & ~REY_TERM_SPECULAR;
 }
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
@@ -270,7 +278,8 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_PARAM, "%s is not differentiable: %s", info.name, info.why);
         }
         const Param *p = &ARRAY_AT(scene->params, Param, selection.params[i]);
-        const char *gap = find_gap(&scene->view, def, p, info.terms, lookups);
+        const int terms = terms_needed(&scene->view, chains, p);
+        const char *gap = find_gap(&scene->view, def, p, terms, lookups);
         if (gap) {
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name, gap);
         }
@@ -287,7 +296,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return result;
         }
         int known = terms_known(scene, def, chains, p);
-        int missing = info.terms & ~known;
+        int missing = terms & ~known;
         bool interior = known & REY_TERM_INTERIOR;
         int bit = missing & -missing;
         char reason[REASON];
@@ -303,7 +312,7 @@ rey_result rey_terms_check(rey_scene *scene, const rey_render_def *def, rey_sele
             return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "no term of the gradient of %s exists yet: %s", info.name,
                             reason);
         }
-        *needed |= info.terms;
+        *needed |= terms;
     }
     if (selection.count > 0 && def->terms && !(def->terms & *needed)) {
         return rey_fail(scene->ctx, REY_ERROR_INCOMPLETE, "the gradient of %s has none of the terms that are asked for",
