@@ -147,8 +147,6 @@ static void XMLCALL on_start(void *user, const XML_Char *name, const XML_Char **
     if (result && frames > file->base && reader->frames.count == frames && reader->document->nodes.count == nodes) {
         result = rey_xml_overlook(reader, result);
         file->skipped = !result;
-    } else if (!result) {
-        rey_xml_top_frame(reader)->line = rey_xml_element_position(file).line;
     }
     stop_on(file, result);
 }

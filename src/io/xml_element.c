@@ -36,6 +36,7 @@ static rey_result push_frame(XmlReader *reader, const XmlTag *tag, rey_xml_node 
     frame->tag = tag;
     frame->node = node;
     frame->splice = splice;
+    frame->line = rey_xml_element_position(reader->file).line;
     return REY_OK;
 }
 

@@ -281,7 +281,7 @@ static rey_result map_selection(Render *r, rey_selection selection) {
         r->job.any_volumes |= p->volume >= 0;
         // What turns mirrored and refracted rays moves what lies behind.
         const int terms = p->emitter < 0 ? p->terms & r->needed : 0;
-        bool behind = (terms & REY_TERM_SPECULAR) && (p->to_uv < 0 || (p->terms & REY_TERM_TERMINATOR));
+        bool behind = (terms & REY_TERM_SPECULAR) && (p->to_uv < 0 || (terms & REY_TERM_TERMINATOR));
         r->job.any_motion |= behind || rey_facing_in_media(&r->scene->view, p);
         r->turns_rays |= behind && p->geometry < 0 && p->instance < 0;
         r->job.watch_turned |= (p->terms & REY_TERM_TERMINATOR) != 0;

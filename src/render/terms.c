@@ -257,8 +257,8 @@ static const char *find_gap(const SceneView *view, const rey_render_def *def, co
 // is not known, paths look out for it instead (boundary.c).
 static int terms_needed(const SceneView *view, int chains, const Param *p) {
     const bool known = chains && !view->drops && !(view->has_media && rey_rides_gap(view));
-    const bool turns = p->normals < 0 || rey_bsdf_holds(view, view->shapes[p->normals].bsdf, rey_bsdf_mirrors);
-    return known || turns ? p->terms : p->terms & ~REY_TERM_SPECULAR;
+    const bool watched = p->normals >= 0 && !rey_bsdf_holds(view, view->shapes[p->normals].bsdf, rey_bsdf_mirrors);
+    return watched && !known ? p->terms & ~REY_TERM_SPECULAR : p->terms;
 }
 
 // Refuses parameters whose derivative would lack a term; collects the terms that they need.
@@ -365,7 +365,7 @@ rey_result rey_terms_end(const Render *r, rey_result result, rey_selection selec
                         "the gradient of lights at a point that lie within a participating medium, and of cameras and surfaces "
                         "that move beside them, does not exist yet here: points next to a light, from which its light is "
                         "scattered, must move as it does. Known are lights that hang free in a medium, in scenes without "
-                        "smooth mirrors, glass and masks (docs/media.md)");
+                        "smooth mirrors, glass, masks, or maps without a shadowing function (docs/media.md)");
     }
     if (result == REY_OK && r->astray > CHANCE_SLIPS + r->borders / BORDERS_PER_SLIP &&
         (selection_moves(r, selection) || r->job.live_borders)) {

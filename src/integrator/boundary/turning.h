@@ -14,8 +14,8 @@
 // Cut: maps without a shadowing function scatter what comes from one side of the plane of the surface's own shading normal n
 // only, f with the cosine of the map's normal: as the horizon, f on either side.
 // In media, what collisions see and send keeps its direction as along chains, and what surfaces do comes through the air. Of what
-// is scattered beside lights at a point, the part that moves as they do (beacon.h) lacks the second half of a horizon's F', by
-// segments that end there, as those of beside.h do.
+// is scattered beside lights at a point, a part moves as they do (beacon.h): segments of horizons that end there, as those of
+// beside.h, bring the second half of its F'.
 // NOT differentiated: where lights at a point or with one direction cross the plane of a triangle.
 #pragma once
 
